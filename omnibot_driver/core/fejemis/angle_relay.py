@@ -28,9 +28,10 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit, in degrees, of the angle that a board may read after undetected damage.
+"""Limit, in degrees, of an angle to the left that a board may read after undetected damage.
 
-A text is not used if its damaged forms include this angle, a larger one, or one to the right.
+If damage could turn a text into a larger angle to the left, or into any other angle to the right,
+this text is avoided.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
@@ -51,10 +52,10 @@ class AngleRelay:
 
 
 def heard_instead(text: str) -> Iterator[float]:
-    """Yield the number that a board reads for each undetected loss of two characters of ``text``.
+    """Yield each number that a board may read after an undetected loss of two characters.
 
-    A loss is undetected if the checksum stays correct. If the remaining text is not a number, the
-    result is 0.
+    The loss is undetected if the checksum of ``text`` stays correct. If the remaining text is not a
+    number, the result is 0.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:

@@ -98,8 +98,7 @@ class FejemisBoard(Board):
 
     @property
     def front_angle_rad(self) -> float | None:
-        """Angle of the front wheel in rad, limited to ±90°; None while unknown, too old or faulty.
-        """
+        """Angle of the front wheel in rad, limited to ±90°; None if unknown, too old or faulty."""
         front = self._translation.front
         return front.drives_by_rad if front.known(self._now) else None
 
@@ -154,7 +153,9 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def flush(self, now: float) -> list[Reading]:
-        """Discard incomplete lines and end the running job as failed, because the ports are closed.
+        """Discard incomplete lines, because the ports are closed.
+
+        The running job ends as failed.
         """
         self._open(now)
         for half in self._ports.halves:
@@ -177,7 +178,7 @@ class FejemisBoard(Board):
         """Switch brush and lift off after a stall of the driver.
 
         The guard process may already have done so during the stall. The driver did not read during
-        the stall, so this time is not regarded as silence of the boards.
+        the stall. So this time is not regarded as silence of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
@@ -251,7 +252,7 @@ class FejemisBoard(Board):
     def emergency_stop(self) -> Packets:
         """Return ``stop`` for the drive board, and the lines that switch brush and lift off.
 
-        The front board has brush and lift, and does not know the command ``stop``.
+        Brush and lift belong to the front board, which does not know the command ``stop``.
         """
         return self._ports.ending("drive", b"stop") + self._all_off()
 

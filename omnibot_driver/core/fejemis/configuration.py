@@ -73,8 +73,7 @@ class Configuration:
         self.begin()
 
     def begin(self) -> None:
-        """Read all numbers and write all settings again, because the board may have other values.
-        """
+        """Read all numbers and write all settings again; the board may have lost them."""
         self.told.clear()
         self._once.clear()
         self._next_at = -math.inf
@@ -107,8 +106,7 @@ class Configuration:
         return self._new
 
     def due(self, now: float, *, stands: bool) -> list[bytes]:
-        """Return the lines to send now; settings are written only while the robot ``stands`` still.
-        """
+        """Return the lines to send now; settings are written only if the robot ``stands`` still."""
         if now < self._next_at:
             return []
         missing, unwritten = self._missing(), self._unwritten()
@@ -199,8 +197,7 @@ def text_of(setting: Written, numbers: tuple[float, ...]) -> bytes:
 
 
 def _near(told: tuple[float, ...], wanted: tuple[float, ...]) -> bool:
-    """Return whether the numbers that the board reports equal the wanted ones, except for rounding.
-    """
+    """Return whether the board's numbers equal the wanted ones, except for rounding."""
     return len(told) >= len(wanted) and all(
         abs(one - other) <= max(DIGIT, NEAR * abs(other))
         for one, other in zip(told, wanted, strict=False)

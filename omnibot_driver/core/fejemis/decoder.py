@@ -78,7 +78,7 @@ class FejemisDecoder:
         self._otherwise = 0
 
     def feed(self, data: bytes, now: float) -> list[Message]:
-        """Return the messages that are complete with ``data``, in order of arrival."""
+        """Decode ``data``, and return the messages of its complete lines, in order of arrival."""
         *lines, rest = (self._held + data).split(b"\n")
         found = []
         for line in lines:

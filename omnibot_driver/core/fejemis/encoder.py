@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Converts an order into motion lines for both boards, with regard to the front wheel's angle.
+"""Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
 The caller passes all packets that it sends to ``meaning``. From them the encoder notes which angle
 the front wheel must reach, and whether the drive board's speed is limited.
@@ -84,8 +84,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        This is so while the speed is limited, and always if lines have no checksums. Then a damaged
-        line is replaced after 15 ms.
+        They are sent again while the speed is limited. Without checksums, they are always sent
+        again, so that a damaged line is replaced after 15 ms.
         """
         return self.held or not self._pair.with_sums
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Learns the form of each kind of line: how many fields it has, and how many decimals each field.
+"""Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
 A board prints all lines of one kind in the same form. So a line in another form has lost or gained
 characters. After three lines in a row with the same new form, this form replaces the learnt one. A
@@ -14,11 +14,11 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: how often the form may vary before it is no longer checked.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: how many lines in another form end the check of their kind.
 
-The number counts lines in another form, among ``OF`` lines of one kind. ``VARIES`` is for lines
-with a correct checksum. Such lines are rarely damaged, so fewer of them show that the board itself
-varies the form.
+The lines are counted among ``OF`` lines of this kind. ``VARIES`` is for lines with a correct
+checksum. Such lines are rarely damaged, so fewer of them show that the board itself varies the
+form.
 """
 OF: Final = 24
 

@@ -22,7 +22,7 @@ A single line may be damaged.
 """
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Jump of the angle, in degrees, that is accepted in addition to ``FASTEST_DEGPS``."""
+"""Jump of the angle, in degrees, that is accepted in addition to a motion at ``FASTEST_DEGPS``."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -107,8 +107,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        A jump is believed when two angles in a row confirm it: the previous angle was rejected, and
-        this angle is near it.
+        Return True also for a jump that two angles in a row confirm: the previous angle was
+        rejected, and this angle is near it.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -40,7 +40,7 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 this line loses its last letter, the board reads it as a command that sets the geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
-"""The stream of each board without which the robot must not be driven."""
+"""For each board: the stream that must arrive while the robot is driven."""
 TOGETHER: Final = ("gyro", "acc")
 """Streams that are subscribed in one packet, so that the board sends both in the same cycle."""
 AGAIN_S: Final = 0.5
@@ -65,8 +65,8 @@ class Half:
 
     ``heard_at``: time in s of the last valid line.
 
-    If the needed stream pauses, the board may have restarted, and the line that reports the restart
-    may be lost. So the half is ``unsure`` until a heartbeat shows that the board's time has
+    If the ``NEEDED`` stream pauses, the board may have restarted, and the line that reports the
+    restart may be lost. So the half is ``unsure`` until a heartbeat shows that the board's time has
     continued.
     """
 
@@ -91,7 +91,7 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the ``NEEDED`` stream arrives and the board has not restarted since."""
+        """Whether the ``NEEDED`` stream arrives. A restart of the board resets this flag."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -150,8 +150,7 @@ class Half:
         self._at[keyword] = now
 
     def subscribe_again(self) -> None:
-        """Subscribe to all streams again, because the board may have forgotten its subscriptions.
-        """
+        """Subscribe to all streams again, because the board may have forgotten them."""
         self._at = {key: at for key, at in self._at.items() if key == "hbt"}
         self._next_at = -math.inf
         self.ready = False
@@ -224,8 +223,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first identity at once, and a different identity after two equal heartbeats.
-        """
+        """Accept the first identity at once, but another one only after two equal heartbeats."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:

@@ -11,9 +11,9 @@ and the first line of the next sample are both lost. Three observations show a f
 
 - A line of another kind comes between its two lines, and this kind does not usually come there.
 - The second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
-  pose: the times of two poses tell how many samples lie between them.
+  pose. The times of two poses tell how many samples lie between them.
 - The next pose comes in the same read, and shows that lines are missing since the previous pose. So
-  a pair is returned at this pose, or at the end of its read.
+  a pair is returned only at this pose, or at the end of the read.
 
 One false pair remains undetected: its lines come less than ``PAIR_WITHIN_S`` apart because they are
 late, and the read that completes the pair has no later pose.
@@ -36,13 +36,15 @@ PAIR_WITHIN_S: Final = 0.005
 """Longest time in s between the two lines of a pair that needs no further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``, ``SUREST_S``: how much evidence, in s, decides the order, and the largest evidence.
+"""``KNOWN_S``: evidence in s from which the order of the two lines is known.
+
+``SUREST_S``: largest evidence that is stored.
 
 The evidence shows which line of a sample comes first: the line with the longer pauses before it. It
 is the sum of the pauses before gyro lines minus the sum of those before acceleration lines.
 """
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that is added if a line of another kind comes in the pause.
+"""Evidence in s that is added to a pause if a line of another kind comes during the pause.
 
 Such a line shows that a control cycle has ended in the pause.
 """
@@ -86,7 +88,10 @@ Oriented = tuple[Attitude, float]
 
 
 class ImuPairs:
-    """Pairs the lines of the IMU; ``take`` returns pairs and orientations in order of arrival."""
+    """Forms pairs from the lines of the IMU.
+
+    ``take`` returns the pairs, and orientations between them, in order of arrival.
+    """
 
     def __init__(self) -> None:
         self.begin()
@@ -96,7 +101,9 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """The evidence of the order, in s: positive if gyro lines come first, else negative."""
+        """Evidence for the order of the lines, in s: positive for gyro first, negative for
+        acceleration.
+        """
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -135,7 +142,7 @@ class ImuPairs:
         self._queue.append((attitude, now))
 
     def pose(self, time_s: float) -> None:
-        """Receive the board's time of a pose, and decide on the pairs since the previous pose."""
+        """Receive the board's time of a pose, and find the false pairs since the previous pose."""
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
         if abs(periods) < 0.5:
@@ -150,7 +157,7 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the decided pairs and the orientations, in order of arrival.
+        """Return the pairs that are no longer doubtful, and the orientations, in order of arrival.
 
         The caller calls this after a pose and at the end of a read.
         """
@@ -220,7 +227,9 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Record that lines of these ``kinds`` came outside of a pair (``step`` 1) or within (-1).
+        """Record that lines of these ``kinds`` came in or between pairs.
+
+        ``step``: 1 between pairs, -1 within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))

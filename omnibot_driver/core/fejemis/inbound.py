@@ -20,9 +20,9 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""Receives the front wheel's angle in rad and the time in s.
+"""A function that receives the front wheel's angle in rad, and the time in s.
 
-The function returns whether a new fault is found: the wheel does not follow its commanded angle.
+It returns whether a new fault is found: the wheel does not follow its commanded angle.
 """
 
 
@@ -57,8 +57,7 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return a new angle to relay to the drive board, in rad; None if it was already returned.
-        """
+        """Return an angle to relay to the drive board, in rad; None if the angle is not new."""
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 

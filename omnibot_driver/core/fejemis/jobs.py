@@ -23,7 +23,7 @@ from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, Whe
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
-"""Why nothing may move after the user has requested to switch the power off."""
+"""The reason for refusing motion, brush and lift after the user has requested a power-off."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99. A checksum does not detect the loss of both digits."""
 WITHIN_S: Final = 8.0
@@ -58,7 +58,7 @@ class Jobs:
 
     ``done``: results that the caller has to take.
 
-    ``powering_off``: whether a board will soon cut the power.
+    ``powering_off``: whether the drive board will soon cut the power.
 
     ``reload``: whether the boards may have loaded another configuration. The caller must then read
     it again, and reset this flag.
@@ -124,7 +124,9 @@ class Jobs:
             self._finish(False, f"{self.job.value} failed: {why}")
 
     def interrupt(self, why: str) -> None:
-        """End the running job as failed if it needs the robot to stand still; ``why``: the reason.
+        """End the running job as failed if it needs the robot to stand still.
+
+        ``why``: the reason for the failure.
         """
         if self.at_rest:
             self.cancel(why)

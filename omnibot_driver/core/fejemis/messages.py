@@ -116,8 +116,7 @@ class Distance:
 
 @value(frozen=True, slots=True)
 class Infrared:
-    """``ir``: distances that both sensors measure, and their calibration if the line contains it.
-    """
+    """``ir``: distances that both sensors measure, and their calibration if the board sends it."""
 
     distances_m: tuple[float, float]
     calibration: tuple[float, ...] = ()
@@ -125,7 +124,7 @@ class Infrared:
 
 @value(frozen=True, slots=True)
 class WheelConfiguration:
-    """``conf``: wheel radii, gear, encoder ticks per revolution, track, and period of control."""
+    """``conf``: wheel radii, gear, encoder ticks per revolution, track, and control period."""
 
     left_radius_m: float
     right_radius_m: float

@@ -6,11 +6,11 @@ Only some numbers can be written in this way (``numerals.py``). But neither boar
 of its line exactly:
 
 - The front board computes the wheel's angle from the ratio of speed and turn rate.
-- The drive board computes the speed of the outer wheel from the root of the sum of their squares.
-  The sign is that of the speed.
+- The drive board computes the speed of the outer wheel. It is the root of the sum of the squares of
+  both numbers, with the sign of the speed.
 
-Some lines give the wanted angle or speed exactly enough. Of these, the module takes the one that is
-nearest to the command. It also avoids lines in which a lost line end or a lost digit of the
+Several lines give the wanted angle or speed exactly enough. Of these, the module takes the one that
+is nearest to the command. It also avoids lines in which a lost line end or a lost digit of the
 checksum could hide a lost character (``outbound.py``).
 """
 
@@ -27,7 +27,7 @@ LEAST_MPS: Final = 0.001
 SLOWEST_MPS: Final = 2e-4
 """Speed in m/s below which the front board's line contains the speed 0 and only a turn.
 
-Of the numbers that can be written, too few are near such small speeds.
+Only few numbers near such small speeds can be written.
 """
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
@@ -38,7 +38,7 @@ ANGLE_COST: Final = 1e4
 For comparison: the cost is 1 for a number that is e (2.718) times as large as commanded.
 """
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to the speed in the drive board's line, if not 0."""
+"""Largest ratio of the outer wheel's speed to a speed in the drive board's line that is not 0."""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """
@@ -102,8 +102,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the ``robust`` line of the least cost; if none is robust, the line of the least cost.
-    """
+    """Return the ``robust`` line of the least cost; if none is robust, the cheapest line."""
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

@@ -18,17 +18,19 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: limits of the power of ten that belongs to a number's first digit.
+"""``SMALLEST``, ``LARGEST``: limits of the numbers, as powers of ten.
 
-The power is at least ``SMALLEST`` and less than ``LARGEST``.
+The first digit of a number counts 10**p, where p is at least ``SMALLEST`` and less than
+``LARGEST``.
 """
 
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all such numbers between 0.0001 and 10000 in rising order, and their texts.
+    """Return all numbers from 0.0001 to 10000 that can be sent safely, in rising order.
 
-    ``negative``: whether the line has a minus sign. The numbers then contain no ``6``.
+    The texts of the numbers are returned too. ``negative``: whether the line has a minus sign. The
+    numbers then contain no ``6``.
     """
     digits = "024789" if negative else "0246789"
     mantissas = [

@@ -58,21 +58,24 @@ class Obedience:
         self.start_at = math.inf
 
     def pause(self) -> None:
-        """Record that the user requested a pause; do not send ``start`` after an e-stop any more.
+        """Record that the user requested a pause.
+
+        After an e-stop, ``start`` is then no longer due.
         """
         self.pause_said = True
         self.start_at = math.inf
 
     def release(self, now: float) -> None:
-        """Release the driver's e-stop. If the board obeyed before the e-stop, ``start`` is now due.
+        """Release the driver's e-stop; ``start`` becomes due if the board obeyed before the e-stop.
+
+        After a requested pause, ``start`` does not become due.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf
         self.estopped = False
 
     def stopped(self, now: float, *, was_paused: bool) -> bool:
-        """Return whether the drive board ignores commands, and not because of the driver's e-stop.
-        """
+        """Return whether the drive board is stopped, but not by the driver's e-stop."""
         if self.source != STOPPED:
             return False
         if self.pause_said or was_paused:

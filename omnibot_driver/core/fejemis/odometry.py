@@ -25,7 +25,7 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""How much of the difference between the pose and the speeds one displacement corrects: a fraction.
+"""Fraction of the difference between pose and wheel speeds that one displacement corrects.
 
 The fraction applies if rounding explains the difference.
 """
@@ -37,10 +37,9 @@ both axes.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""``SLACK_M``, ``SLACK_RAD``: distance in m and angle in rad that a pose may be off.
+"""``SLACK_M``, ``SLACK_RAD``: how far a pose may be from where the wheel speeds lead, in m and rad.
 
-The reference is the motion that the wheel speeds give. ``SPEED_UP_MPS2`` allows a further
-difference for acceleration.
+``SPEED_UP_MPS2`` allows more, for acceleration.
 """
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
@@ -52,7 +51,7 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""How many rejected poses in a row must agree with the pose before them to show a new frame."""
+"""How many rejected poses in a row show a new frame, if each agrees with the pose before it."""
 
 
 class PoseOdometry:

@@ -58,9 +58,9 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum detects a lost character if more is lost with it.
+    """Return whether the checksum detects a lost character even after a second loss.
 
-    With the character, a line end or a digit of the checksum may be lost.
+    The second loss is a line end or a digit of the checksum.
     """
     total = sum_of(text)
     tens, ones = divmod(total, 10)

@@ -22,7 +22,7 @@ def plain_front_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the drive board's line: the outer wheel's speed, forward or backward, and 0.
+    """Return the drive board's line: the outer wheel's speed with its sign, and a turn rate of 0.
 
     The board computes the turn from the angle of the front wheel.
     """

@@ -74,8 +74,7 @@ class TeensyClock:
         return self._fit.at(tick) + board_s - tick * TICK_S
 
     def board_s(self, host_s: float) -> float:
-        """Convert a time of the host to the board's time, in s; this is the inverse of ``host_s``.
-        """
+        """Convert a time of the host to the board's time, in s: the inverse of ``host_s``."""
         assert self._fit is not None
         near_s = host_s - self.host_s(self._last_s) + self._last_s
         return near_s + (host_s - self.host_s(near_s))
@@ -115,9 +114,10 @@ class TeensyClock:
 
 
 class StampedReadings:
-    """The readings that one call of the board returns, with their timestamps; a ``ReadingClock``.
+    """The readings that one call of the board returns, with their timestamps.
 
-    For each kind of reading, the timestamps increase. A timestamp is not later than the call.
+    The object is a ``ReadingClock``. For each kind of reading, the timestamps increase. A timestamp
+    is not later than the call.
     """
 
     skew_ppm = 0.0

@@ -76,8 +76,7 @@ class Translation:
         self._imu_at = self._imu_stamp_s = -math.inf
 
     def restarted(self) -> None:
-        """Forget the last pose and the IMU's sampling times, because the drive board has restarted.
-        """
+        """Forget the last pose and the IMU's sampling times, because the drive board restarted."""
         self.odometry.forget()
         self._begin_imu()
 

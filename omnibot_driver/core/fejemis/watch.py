@@ -46,8 +46,7 @@ class Watch:
         self._stalled = True
 
     def open(self, now: float) -> None:
-        """Record that the ports have been open since ``now``; later calls do not change this time.
-        """
+        """Record that the ports have been open since ``now``. Later calls have no effect."""
         self._begun_at = min(self._begun_at, now)
 
     def look(self, now: float, *, driving: bool) -> bool:

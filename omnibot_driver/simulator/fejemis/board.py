@@ -74,7 +74,7 @@ class SimulatedFejemis:
     def befall(self, half: str, what: str) -> None:
         """Apply the fault ``what`` to one Teensy now.
 
-        ``what`` is a name in ``FAULTS``; for the front Teensy, it may also be one in
+        ``what`` is a name in ``FAULTS``. For the front Teensy, it may also be one in
         ``SENSOR_FAULTS``. Raises KeyError for an unknown fault.
         """
         allowed(half)[what](self.half(half))

@@ -71,7 +71,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot()
 
     def started(self) -> None:
-        """Reset the pose at the end of a boot, so that wheel turns during the boot do not move it.
+        """Reset the pose at the end of a boot, because the wheels may have turned during the boot.
         """
         self._reset_pose()
 
@@ -212,8 +212,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the functions that execute the commands, by the command's name in the help text.
-        """
+        """Return the functions that execute the commands, by command name (see the help text)."""
         return super().commands_table() | {
             "rc": self._remote_control,
             "fwl": self._front_wheel,

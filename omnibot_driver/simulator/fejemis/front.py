@@ -63,7 +63,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         )
 
     def boot(self) -> None:
-        """Reset the state. The wheel stays where it is; brush and lift are off."""
+        """Reset the state: brush and lift are off, and the wheel stays where it is."""
         self.wanted_deg: float | None = None
         self._error_deg = self._lead_deg = 0.0
         self.vehicle.servo.command = 0.0
@@ -178,8 +178,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
-        """Return the functions that execute the commands, by the command's name in the help text.
-        """
+        """Return the functions that execute the commands, by command name (see the help text)."""
         return super().commands_table() | {
             "brush": self._set_brush,
             "ledb": self._set_band,

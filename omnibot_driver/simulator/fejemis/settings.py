@@ -87,7 +87,8 @@ class FejemisSettings:
 
     ``wheel_radius_scale``, ``track_scale``: true size divided by the configured size.
 
-    ``slip``: standard deviation, in m, of the distance that a wheel rolls in 1 m.
+    ``slip``: random error of the distance that a wheel rolls: its standard deviation in m after 1
+    m.
 
     ``motor_lag_s``: time constant of a driving wheel's speed.
 

@@ -51,8 +51,7 @@ def checked(text: str) -> tuple[Check, str, int]:
 
 
 def numbers(text: str) -> list[float]:
-    """Return the numbers at the beginning of the text, as repeated calls of ``strtof`` find them.
-    """
+    """Return the numbers at the beginning of the text, as repeated ``strtof`` finds them."""
     found, at = [], 0
     while match := _NUMBER.match(text, at):
         found.append(float(match[1]))
