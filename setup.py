@@ -28,9 +28,11 @@ COMPILED_OF_OMNIBOT = (
 )
 """``COMPILED``, ``COMPILED_OF_OMNIBOT``: the modules that mypyc compiles.
 
-They process received bytes. These modules are not compiled: those that decide whether a robot
-moves, so that they run as they were debugged; base classes; and frames, because they are created
-faster without mypyc's dataclasses.
+They process received bytes. Some modules are not compiled:
+
+- modules that decide whether a robot moves, so that they run as they were debugged
+- base classes
+- frames, because they are created faster without mypyc's dataclasses
 """
 
 

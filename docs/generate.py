@@ -43,8 +43,7 @@ TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 
 
 def parameter_file(board: str) -> str:
-    """Return config/<board>.yaml: each parameter with its default, and with a comment on its range.
-    """
+    """Return config/<board>.yaml: each parameter with its default, and its range as a comment."""
     lines = [
         f"# All parameters of the board {board}, with their defaults. Load the file with",
         f"#   ros2 run omnibot_driver driver --ros-args --params-file {board}.yaml",

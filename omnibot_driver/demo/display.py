@@ -113,8 +113,7 @@ class Drive:
 
 
 def report(drive: Drive) -> None:
-    """Print the results and the error of the pose; on a terminal, print also a picture of the path.
-    """
+    """Print the results and the error of the pose; on a terminal, print also the path."""
     pose, true_pose = drive.pose, drive.true_pose
     error_mm = 1000 * math.dist((pose.x_m, pose.y_m), (true_pose.x_m, true_pose.y_m))
     error_deg = abs(_degrees(pose.yaw_rad - true_pose.yaw_rad))

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot, as a ROS program uses it. It must not know who started the robot, or how it is shown.
+"""The robot, as a ROS program uses it.
+
+The module must not know who started the robot, or how the robot is shown.
 """
 
 import math
@@ -30,13 +32,14 @@ ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
 
 
 class Robot:
-    """The robot, as a ROS program uses it: through its topics.
+    """The robot, as a ROS program uses it.
 
     After every second odometry message, the object publishes a velocity on ``cmd_vel``.
 
     ``driving``: whether this velocity drives the square. Otherwise it is zero.
 
-    ``imu``: in the constructor, whether the robot has an IMU; afterwards, the rate of its messages.
+    ``imu``: in the constructor, whether the robot has an IMU. Afterwards, the rate of the IMU's
+    messages, or None.
 
     ``sideways``: whether the robot can drive along its y axis.
 

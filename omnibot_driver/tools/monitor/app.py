@@ -67,8 +67,7 @@ class Robot(Protocol):
 
 
 class Release(ModalScreen[bool]):
-    """The question whether to release the e-stop: y releases the e-stop, every other key does not.
-    """
+    """The question whether to release the e-stop: y releases it, every other key does not."""
 
     def compose(self) -> ComposeResult:
         """Build the question."""

@@ -56,7 +56,7 @@ class Feed:
     """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
 
     ``dead_man``: the dead man's switch. With it, the monitor publishes ``cmd_vel`` while a key is
-    held; without it, never.
+    held. Without it, the monitor never publishes ``cmd_vel``.
 
     Any thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``. Their
     result appears in the view. Raises ToolError for invalid names.
@@ -119,8 +119,7 @@ class Feed:
         return running_drivers(self._node)
 
     def namesakes(self) -> str:
-        """Return a warning if several drivers have this driver's name; otherwise an empty string.
-        """
+        """Return a warning if several drivers have this driver's name, otherwise an empty text."""
         count = self._node.count_publishers(f"{self.driver}/state")
         if count < 2:
             return ""

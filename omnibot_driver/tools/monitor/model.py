@@ -95,18 +95,16 @@ class View:
 
     @property
     def link(self) -> str:
-        """The status of the link to the board, with the port; empty while there are no diagnostics.
-        """
+        """The status of the link to the board, with the port; empty without diagnostics."""
         for status in self.statuses:
             if status.name == "Link":
                 return f"{status.message}, {status.values.get('Port', '')}".rstrip(", ")
         return ""
 
     def missing(self, diagnostics: bool) -> list[str]:
-        """Return the topics on which messages are missing: the driver should publish there.
+        """Return the topics that the driver should publish in its present state, but does not.
 
-        It should publish a topic if its present state requires the topic. ``diagnostics``: whether
-        it should publish /diagnostics.
+        ``diagnostics``: whether the driver should publish /diagnostics.
         """
         wanted = {
             "state": bool(self.state),

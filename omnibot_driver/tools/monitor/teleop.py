@@ -85,8 +85,7 @@ class DeadMan:
         self._held = NOTHING
 
     def change_speed(self, steps: int) -> None:
-        """Change the speed level by ``steps``; level 10 is full speed, and level 1 a tenth of it.
-        """
+        """Change the speed level by ``steps``; level 10 is full speed, level 1 a tenth of it."""
         self.level = min(max(self.level + steps, 1), LEVELS)
 
     @property

@@ -98,8 +98,7 @@ def verdicts(view: View) -> list[tuple[Level, str]]:
 
 
 def counts(view: View) -> str:
-    """Return how many faults the driver has counted since its start, as text without zero counts.
-    """
+    """Return the driver's counts of faults since its start, as text without zero counts."""
     values = {(s.name, key): value for s in view.statuses for key, value in s.values.items()}
     happened = [
         f"{word} {values[name, key]}"

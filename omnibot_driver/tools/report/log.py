@@ -93,7 +93,7 @@ class Status:
 class Log:
     """The messages of one robot. All values are in SI units.
 
-    ``start_ns``: the time of day at which the log begins.
+    ``start_ns``: the time of day at the beginning of the log.
 
     ``imu``: angular velocity and specific force, 6 columns.
 
@@ -105,7 +105,7 @@ class Log:
 
     ``wheels``: names of the wheels' joints.
 
-    ``states``, ``estops``: the states of the driver and of the e-stop, each as a span of time.
+    ``states``, ``estops``: the successive states of the driver and of the e-stop.
 
     ``absent``: topics without a message.
 
@@ -146,7 +146,7 @@ class Log:
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
         """Return whether the driver's state explains a gap between messages of a topic.
 
-        ``begin_s``, ``end_s``: begin and end of the gap.
+        ``begin_s``, ``end_s``: beginning and end of the gap.
 
         ``running``: the states in which the driver publishes the topic.
         """

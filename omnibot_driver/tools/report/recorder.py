@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Converts messages to columns. Messages may come from a bag or from rclpy, with the same fields.
-"""
+"""Converts messages to columns. Messages from a bag and from rclpy have the same fields."""
 
 import math
 from array import array
@@ -127,7 +126,7 @@ class Recorder:
     def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
         """Record a message that arrived on a topic.
 
-        ``role``: name of the topic without the robot's namespace, such as ``odom``.
+        ``role``: which topic in ``SERIES`` or ``EVENTS`` this is.
 
         ``kind``: message type of the topic.
         """
@@ -149,8 +148,7 @@ class Recorder:
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)
 
     def log(self, troubles: tuple[str, ...] = (), *, alone: bool = True) -> Log:
-        """Return a log of all messages, in the order of arrival. At least one message must exist.
-        """
+        """Return a log of all messages, in the order of arrival; there must be at least one."""
         times = [
             *(time for column in self._columns.values() for time in column.arrived_ns),
             *(time for events in self._events.values() for time, _ in events),

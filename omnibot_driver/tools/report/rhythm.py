@@ -56,8 +56,7 @@ class Stream:
     rates: tuple[str, ...]
 
     def promised(self, log: Log) -> "Stream":
-        """Return this stream with the expected rate from the driver's diagnostics, if there is one.
-        """
+        """Return this stream with the expected rate from the driver's diagnostics, if any."""
         if not log.alone:
             return self
         for key in self.rates:
@@ -92,19 +91,23 @@ If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 class FrameSchedule:
     """The measured timing of a topic.
 
-    ``steps_s``: steps between successive timestamps. ``at_s``: the timestamp before each step.
+    ``steps_s``: steps between successive timestamps.
+
+    ``at_s``: the timestamp before each step.
 
     ``period_s``: the median step.
 
-    ``gap_at_s``, ``gap_s``: begin and length of each gap, without gaps that the driver's state
+    ``gap_at_s``, ``gap_s``: beginning and length of each gap, without gaps that the driver's state
     explains. The last gap may be the time from the last message to the end of the log.
 
     ``missing``: how many messages are missing in each gap.
 
-    ``leap_at_s``, ``leap_s``: begin and length of each long step that short steps compensate. No
-    message is missing there.
+    ``leap_at_s``, ``leap_s``: beginning and length of each long step that short steps compensate.
+    No message is missing there.
 
-    ``late_s``: time from the timestamp to the arrival of each message. ``arrived_s``: the arrival.
+    ``arrived_s``: when each message arrived.
+
+    ``late_s``: time from the timestamp of each message to its arrival.
     """
 
     at_s: Array
@@ -167,7 +170,7 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return for each long step where the steps end that may compensate it.
+    """Return, for each long step, the end of the steps that may compensate it.
 
     They end before the next long step, and after at most ``most`` steps. ``wide``: indices of the
     long steps.

@@ -13,7 +13,7 @@ PROOF: Final = ("imu/data_raw", "odom", "state")
 """Topics that identify a robot. A namespace with at least one of them belongs to a robot."""
 
 Topics = dict[str, str]
-"""For each topic of a robot: its role, which is the topic's name without namespace."""
+"""For each topic of a robot: its role, such as ``odom`` or ``state``."""
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
@@ -36,7 +36,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that a topic may have by its name.
+    """Return the roles that the name of a topic allows.
 
     For each role, the first value is the namespace of the robot. The second value is whether the
     topic fits the role. It fits if ``kind`` is the right message type. A topic below the name of a

@@ -83,8 +83,7 @@ def at_rest(log: Log, imu: Series) -> Mask:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Amplitude spectral densities per √Hz at n frequencies. Columns 0 to 2 are gyro, 3 to 5 force.
-    """
+    """Amplitude spectral densities per √Hz. Columns 0 to 2 are the gyro, 3 to 5 the force."""
 
     frequency_hz: Array
     density: Array
