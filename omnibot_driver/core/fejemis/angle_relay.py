@@ -30,8 +30,8 @@ MOST_OWED: Final = 0.5
 ACROSS: Final = 10.0
 """Limit, in degrees, of an angle to the left that a board may read after undetected damage.
 
-If damage could turn a text into a larger angle to the left, or into any other angle to the right,
-this text is avoided.
+A text is avoided if undetected damage could give a larger angle to the left. It is also avoided if
+the damage could give an angle to the right.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

@@ -3,13 +3,13 @@
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
 **Writing.** After a write, the driver reads the values back. It repeats the write until the board
-reports the wanted values, at most ``TRIES`` times. It writes at least once to each new or restarted
-board, and after each change by the user, even if the board already reports the values. The board
-may report rounded numbers, and rounding could hide a small difference.
+reports the wanted values, at most ``TRIES`` times. Even if the board already reports the wanted
+values, the driver writes them once to each new or restarted board, and once after each change by
+the user. The board may report rounded numbers, and rounding could hide a small difference.
 
 **Reading.** A number is accepted after two equal readings in a row. A single reading is not enough,
-because 1 in 99 damaged lines has a correct checksum, and the driver computes the robot's geometry
-from these numbers.
+because 1 in 99 damaged lines has a correct checksum. The driver computes the robot's geometry from
+these numbers.
 
 The module knows which line requests which numbers; it does not know when the robot stands still.
 """

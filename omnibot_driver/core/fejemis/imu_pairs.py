@@ -101,8 +101,9 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """Evidence for the order of the lines, in s: positive for gyro first, negative for
-        acceleration.
+        """Evidence for the order of the lines, in s.
+
+        It is positive if gyro lines come first, and negative if acceleration lines do.
         """
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None

@@ -71,8 +71,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         self.imu.boot()
 
     def started(self) -> None:
-        """Reset the pose at the end of a boot, because the wheels may have turned during the boot.
-        """
+        """Reset the pose at the end of a boot, because the wheels may have turned meanwhile."""
         self._reset_pose()
 
     # Each cycle
