@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU as a ``Board`` of the driver: an adapter around ``LoisConversation``.
+"""Adapter that makes a LOIS ECU a ``Board`` of the driver; ``LoisConversation`` does the work.
 
-``LoisEcuBoard`` computes odometry and returns it ``odom_rate_hz`` times a second; between two
-groups of ticks the odometry is predicted. Displacement readings show whether the robot obeys its
-commands, and whether it is at rest. A displacement is marked as not measured if the board did not
-report the motion.
+Odometry is returned ``odom_rate_hz`` times a second. Between two groups of ticks, it is predicted.
+
+Displacement readings show whether the robot obeys its commands, and whether it is at rest. Such a
+reading is marked as not measured if the board's ticks did not show the motion.
 """
 
 import math
@@ -44,10 +44,10 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Pause in s before a reset is repeated: longer than wheels roll on after a stop, and longer than
-four usual periods of the ticks."""
+"""Time in s from one reset to its repetition. In this time, the wheels have come to rest after a
+stop, and at the usual period at least four groups of ticks have arrived."""
 STEADY_S: Final = 0.3
-"""Time in s without a change of the tick counts, after which the driver treats the counts as
+"""Time in s. After this time without a change of the tick counts, the driver treats the counts as
 steady. It is longer than the usual period of the ticks."""
 
 
@@ -89,17 +89,17 @@ class LoisEcuBoard(Board):
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters and rates for diagnostics, over all connections."""
+        """Counters and rates for diagnostics. The counters continue after a reconnection."""
         return self._ecu.figures
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that are missing or contradict the received data; otherwise None."""
+        """Advice on settings that are missing or contradict the received data, or None."""
         return self._ecu.advice
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether the board now counts both wheels' ticks, so unchanged ticks prove a standstill.
+        """Whether unchanged ticks prove a standstill now: the board counts both wheels' ticks.
 
         The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
@@ -108,7 +108,7 @@ class LoisEcuBoard(Board):
     # Inbound
 
     def connect(self) -> None:
-        """Begin a new connection; the settings are written again."""
+        """Begin a new connection. The settings are then written to the board again."""
         self._ecu.connect()
         self._once = NO_PACKETS
         self._connect()
@@ -125,7 +125,7 @@ class LoisEcuBoard(Board):
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the readings that were held back until now; called when the port closes."""
+        """Return the readings that were held back until now. Called when the port closes."""
         return self._read(self._ecu.flush(now))
 
     def silence(self) -> None:
@@ -184,7 +184,7 @@ class LoisEcuBoard(Board):
         return [ResetReading(proof.remark)]
 
     def _tangent(self, fused: FusedOdometry) -> Pose:
-        """Return the robot's motion since the last estimate, from the distances of both wheels."""
+        """Return how far the robot moved forward and turned since the last estimate."""
         left_m, right_m = fused.wheel_ways_m
         sign = -1.0 if self.settings.inverted else 1.0
         return Pose((left_m + right_m) / 2, 0.0, sign * (right_m - left_m) / self.settings.track_m)
@@ -211,11 +211,17 @@ class LoisEcuBoard(Board):
         return min(self._ecu.wake_at, self._odometry_due_at, once_at, self._reset_at_s)
 
     def leave(self) -> None:
-        """Make ``due`` return nothing from now on, so that Stop is the last line that is sent."""
+        """Make ``due`` return nothing from now on.
+
+        So the driver's last Stop is the last line that is sent.
+        """
         self._leaving = True
 
     def due(self, now: float) -> Packets:
-        """Return the lines to write now: settings, repeated resets, and RPM 0/0 after a Stop."""
+        """Return the lines to write now.
+
+        They are settings, repeated resets, the ball command, and RPM 0/0 after a Stop.
+        """
         if self._leaving:
             return NO_PACKETS
         once, self._once = self._once, NO_PACKETS
@@ -256,7 +262,7 @@ class LoisEcuBoard(Board):
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:
-        """Return Stop, whose ``:`` makes the board discard a partial line that came before."""
+        """Return Stop. Its ``:`` makes the board discard a partial line that came before."""
         return self.stop()
 
     def stop(self) -> Packets:
@@ -264,11 +270,18 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """Return RPM 0/0, because the board has no e-stop command. Empty in a terminal mode."""
+        """Return RPM 0/0, because the board has no e-stop command.
+
+        In a terminal mode, return nothing.
+        """
         return packed(self._ecu.emergency_stop())
 
     def reset(self) -> Packets:
-        """Return Stop and the reset command; ``due`` repeats both until ticks confirm the reset."""
+        """Return Stop and the reset command.
+
+        ``due`` repeats both until the ticks show the reset, until the robot is driven again, or
+        until they were sent ``RESETS`` times.
+        """
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own
         self._resets_left, self._reset_shown = RESETS, False
@@ -290,11 +303,14 @@ class LoisEcuBoard(Board):
     # Functions that only this board has
 
     def set_led(self, on: bool, now: float) -> None:
-        """Switch the board's LED on or off; send the line several times: lines may be lost."""
+        """Switch the board's LED on or off.
+
+        The line is sent several times, because lines may be lost.
+        """
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Start a record; a RecordReading or RecordFailed follows.
+        """Request a record from the board. Later, a RecordReading or a RecordFailed is returned.
 
         Raises RequestRefused if the board could not complete the record.
         """

@@ -1,10 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of the kind of board: with the public firmware, or as the manual describes it.
+"""Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-The public firmware sends odometry after each group of ticks, with the same command byte. On a board
-as in the manual, ticks count in both directions; a negative count proves this kind. This module
-works on counts and on the order of groups.
+The two kinds differ in two ways. The public firmware sends odometry directly after each group of
+ticks, with the command byte of the ticks (0x12). A board as in the manual sends odometry with its
+own command byte (0x20), and its ticks count in both directions. So if a count falls, the ticks
+count in both directions.
+
+This module works on changes of the counts and on the order of groups.
 """
 
 from typing import Final
@@ -14,18 +17,18 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of groups of ticks without appended odometry after which a group of odometry with its own
-command byte (0x20) proves that the board behaves as the manual says."""
+"""Smallest number of groups of ticks that must arrive without odometry directly after them. Then a
+group of odometry with its own command byte (0x20) shows a board as in the manual."""
 UNCOUNTED_M: Final = 0.06
-"""Distance in m that wheels roll backward without a negative count, after which the driver
-concludes that ticks do not count backward."""
+"""Distance in m, of both wheels together. If wheels roll backward this far and no count falls, the
+driver concludes that ticks do not count backward."""
 
 
 class BoardKind:
-    """Kind of the board; it selects how ``motion`` models the board.
+    """Kind of the board. It selects how the motion filter ``motion`` models the board.
 
-    ``appends``: whether the board sends odometry after each group of ticks, with the same command
-    byte, as the public firmware does.
+    ``appends``: whether the board sends odometry directly after its ticks, with their command byte.
+    The public firmware does so.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -35,7 +38,7 @@ class BoardKind:
         self._lone_ticks, self._uncounted_m = 0, 0.0
 
     def took_ticks(self, counts: tuple[int, int]) -> None:
-        """Record a group of ticks; ``counts``: ticks of each wheel since the group before."""
+        """Record a group of ticks. ``counts``: new ticks of each wheel since the group before."""
         self._lone_ticks += 1
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
@@ -43,7 +46,8 @@ class BoardKind:
     def took_odometry(self, *, appended: bool) -> None:
         """Record a group of odometry.
 
-        ``appended``: whether the group has the command byte of the ticks.
+        ``appended``: whether the group has the command byte of the ticks, as in the public
+        firmware.
         """
         motion = self._motion
         if appended and not self.appends:

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes from one odometry group (0x20) to the next: turn, distance and wheel speeds.
+"""Changes from one group of odometry (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware integrates the speeds of both wheels as whole RPM. The position in 0x20 does not
-change while both wheel speeds are equal, and the velocity in 0x20 is that of the last tick. This
-module works on groups, without their times.
+The public firmware computes its odometry from the speeds of both wheels, in whole RPM. While both
+speeds are equal, it does not change the position. The velocity in 0x20 is that of the last tick.
+
+This module works on groups of odometry, without their times.
 """
 
 import math
@@ -19,14 +20,19 @@ MOST_RPM: Final = 150.0
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """Changes that an odometry group (0x20) reports since the group before.
+    """Changes that a group of odometry (0x20) reports since the group before.
 
-    ``turned_m``: distance of the right rim minus that of the left rim. ``along_m``: distance of the
-    middle of the axle. ``still``: whether position and heading are unchanged. ``same_velocity``:
-    whether the velocity is unchanged. If ``still`` and ``same_velocity`` are both true, no wheel
-    has ticked, unless both wheel speeds are equal. ``speeds_mps``: speeds of the left and right rim
-    at the last tick, rounded down to whole RPM; None if no wheel speeds in whole RPM give this
-    velocity.
+    ``turned_m``: how much farther the right rim rolled than the left rim, in m.
+
+    ``along_m``: distance that the middle of the axle rolled, in m.
+
+    ``still``: whether position and heading are unchanged.
+
+    ``same_velocity``: whether the velocity is unchanged. If ``still`` is true too, neither wheel
+    has ticked, or both wheels have the same speed.
+
+    ``speeds_mps``: speeds of the left and right rim at the last tick, rounded down to whole RPM.
+    None if no wheel speeds in whole RPM give the reported velocity.
     """
 
     turned_m: float
@@ -37,7 +43,10 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each odometry group with the one before; ``rpm_mps``: rim speed at 1 RPM."""
+    """Comparison of each group of odometry with the one before.
+
+    ``rpm_mps``: speed of a wheel's rim at 1 RPM, in m/s.
+    """
 
     def __init__(self, track_m: float, rpm_mps: float) -> None:
         self._track_m, self._rpm_mps = track_m, rpm_mps

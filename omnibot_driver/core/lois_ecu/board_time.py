@@ -1,12 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Estimation of how late a group of ticks was read, from the board's time in the group.
+"""Estimation of the delay with which a group of ticks was read, from the board's time in the group.
 
-The clock of the public firmware stops while the board sends, so it falls behind by 4 to 36 %. The
-missing time can be added: the number of lines sent is known, and each takes about 1.2 ms. The clock
-of a board as in the manual does not stop. Both models of the clock are fitted to the last arrivals,
-and the better fit is used. The fit is a straight line below all arrivals, because a read may be
-late but never early. This module works on clock counts, numbers of lines and arrival times.
+The clock of the public firmware stops while the board sends. So it falls behind by 4 to 36 % of
+real time. The missing time can be added: the number of sent lines is known, and each line takes
+about 1.2 ms. The clock of a board as in the manual does not stop. Both models of the clock are
+fitted to the last arrivals, and the better fit is used.
+
+Each fit is a straight line below all arrivals, because a read may be late but never early.
+
+This module works on clock counts, numbers of lines and arrival times.
 """
 
 import math
@@ -20,37 +23,40 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored groups; the board sends them in five seconds. In this time, a clock with an
-error of 100 ppm drifts by 0.5 ms."""
+"""Number of stored groups. At the usual period, the board sends them in five seconds. In this time,
+a clock with an error of 100 ppm drifts by 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
-"""Longest plausible delay in s; a longer delay means that the board has restarted, or that its
+"""Longest plausible delay in s. A longer delay means that the board has restarted, or that its
 clock has another unit."""
 UNKNOWN_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, while the unit of the board's clock is
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Longest time in s between two groups that are assumed to be read together, after a pause of the
-reader. Only the last of such groups is stored, because its delay is the smallest."""
+"""If two groups arrive within this time in s, the reader had probably paused, and then read both at
+once. Only the last of such groups is stored, because its delay is the smallest."""
 Point = tuple[float, float]
-"""Arrival time in s, and how far the board's clock is behind the arrival time, in s."""
+"""Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
 
 
 class BoardTime:
-    """Estimator of the delay of each group of ticks, with its standard deviation ``stddev_s``."""
+    """Estimator of the delay of each group of ticks.
+
+    ``stddev_s``: standard deviation of the delay, in s.
+    """
 
     def __init__(self) -> None:
         self.stddev_s = UNKNOWN_S
         self.begin()
 
     def begin(self) -> None:
-        """Forget what is known of the clock, after a reconnection or a restart of the board."""
+        """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival time minus board time since the first group, in s, for two models: a clock that
-        always runs, and a clock that stops while lines are sent."""
+        """Arrival time minus board time, both counted from the first group, in s. The first value
+        is for a clock that always runs, the second for a clock that stops while lines are sent."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -101,8 +107,8 @@ class BoardTime:
 def _above_line(kept: Sequence[Point]) -> list[float]:
     """Return the height of each point above a straight line that touches the points from below.
 
-    The slope of the line is that from the lowest point of the first half to the lowest point of the
-    second half.
+    The slope of the line is taken from two points: the lowest point of the first half and the
+    lowest point of the second half.
     """
     half = len(kept) // 2
     points = list(kept)

@@ -2,8 +2,9 @@
 
 """Encoding of all messages as lines, and decoding of commands and of reports with only one line.
 
-Sources: the ECU's manual, and the public firmware for the order of words within a payload. Groups
-of several lines are parsed in ``groups``, records in ``record_lines``.
+Sources: the ECU's manual, and the public firmware for the order of words within a payload.
+
+``groups`` decodes reports with several lines, and ``record_lines`` decodes records.
 """
 
 from collections.abc import Callable
@@ -60,7 +61,12 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A command's byte and class, and functions that convert its fields to a payload and back."""
+    """One kind of command, with its command byte and its class.
+
+    ``payload``: function that converts the fields of a command to a payload.
+
+    ``command``: function that converts a payload to a command.
+    """
 
     code: Code
     kind: type
@@ -147,7 +153,10 @@ def decode_command(data: bytes, *, with_sum: bool = True) -> Command:
 
 
 def encode_report(report: Report) -> bytes:
-    """Return a board's lines for ``report``. Raises FrameError if a value is too big."""
+    """Return the lines with which a board sends ``report``.
+
+    Raises FrameError if a value is too big.
+    """
     match report:
         case EStopButton(pressed):
             return encode_line(Code.ESTOP_BUTTON, int(pressed))
@@ -194,7 +203,10 @@ def _encode_record(record: Record) -> bytes:
 
 
 def single_report(line: Line) -> Report | None:
-    """Decode a report that has only one line; None if ``line`` is not such a report."""
+    """Return the report that ``line`` contains.
+
+    None if ``line`` is not a report with only one line.
+    """
     payload = line.payload
     low = payload & 0xFFFF
     high, middle, last = payload >> 16, low >> 8, low & 0xFF

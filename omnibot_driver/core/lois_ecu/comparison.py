@@ -2,11 +2,17 @@
 
 """Correction of the motion filter: comparison of each report with the filter's expectation.
 
-The ticks of a wheel are exact while the board counts them. While the board does not count, the
-heading in 0x20 (odometry) is compared instead. The distance in 0x20 is compared only while the two
-wheel speeds differ: while these speeds are equal, the public firmware does not change the position.
-The speeds in 0x20 are compared only after a new tick, because the board keeps reporting the last
-speed of a wheel at rest. This module works on counts and changes of 0x20, without the robot's pose.
+While the board counts the ticks of a wheel, these ticks are exact, and the count is compared.
+
+While the board does not count, the heading in 0x20 (odometry) is compared instead.
+
+The distance in 0x20 is compared only while the two wheel speeds differ. While the speeds are equal,
+the public firmware does not change its position.
+
+The wheel speeds in 0x20 are compared only after a new tick, because the board keeps reporting the
+last speed of a wheel at rest.
+
+This module works on counts and on changes of 0x20, without the robot's pose.
 """
 
 import math
@@ -33,42 +39,45 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Assumed time in s from the board's reading of its counters until the last line of the ticks
-arrives. ``ODOMETRY_AGE_S`` is the corresponding time for odometry."""
+"""Assumed time in s from the board's reading of its counters until the last line of the ticks has
+arrived. For odometry, this time is ``ODOMETRY_AGE_S``."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""Error variances, in squared ticks: ``TICK_VARIANCE`` of a count, ``TURN_VARIANCE`` of the heading
-in 0x20 (odometry), and ``ALONG_VARIANCE`` of the distance in 0x20."""
+"""``TICK_VARIANCE``, ``TURN_VARIANCE``, ``ALONG_VARIANCE``: error variances of a count, of the
+heading in 0x20 (odometry) and of the distance in 0x20. All are in squared ticks."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual of a count, in ticks, above which the filter assumes that the wheel's speed has changed,
-although its set-point has not."""
+"""Largest usual difference between a reported and the expected count, in ticks. Above it, the
+filter assumes that the wheel's speed has changed although its set-point has not."""
 SAME_TICKS: Final = 0.6
-"""Residual in ticks from which the filter uses an unchanged count as a measurement. Below this
-residual, a count without a new tick shows nothing."""
+"""Smallest difference between an unchanged and the expected count, in ticks, that the filter uses.
+Below it, the missing tick shows nothing, because the tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP``, ``LEAP_M``: limits of the residual of a heading, in standard deviations and in m. A
-heading whose residual exceeds both limits is discarded: the board has integrated an old speed while
-the wheel was at rest."""
+"""``LEAP``, ``LEAP_M``: largest difference between a reported and the expected heading, in standard
+deviations and in m at the rims. A heading that exceeds both limits is discarded. The board has then
+added up an old speed while the wheel was at rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""``BLIND_M``, ``SWINGING_M``: additional standard deviation in m of a wheel's distance after 1 m
-without ticks. ``SWINGING_M`` is used while the speed oscillates, because the board then reports the
-speed too seldom."""
+"""``BLIND_M``, ``SWINGING_M``: standard deviation, in m, that is added to a wheel's distance after
+1 m without ticks. ``SWINGING_M`` is used while the wheel's speed oscillates, because the board
+reports an oscillating speed too seldom."""
 SWERVED_M: Final = 0.05
-"""Additional standard deviation in m of the position after 1 m at an oscillating speed, even if the
-distances of the wheels are known."""
+"""Standard deviation, in m, that is added to the position after 1 m at an oscillating speed. The
+position is then uncertain even if the distances of the wheels are known."""
 EQUAL_RPM: Final = 3.0
 """Assumed standard deviation, in RPM, of the difference between the true speeds of both wheels
 while the board reports equal speeds."""
 
 
 class Comparison:
-    """Comparison of reports with the estimate of ``motion``, and correction of the estimate."""
+    """Comparison of the board's reports with the estimate of the motion filter ``motion``.
+
+    Each comparison corrects the estimate.
+    """
 
     def __init__(self, motion: MotionFilter) -> None:
         self._motion = motion
@@ -81,14 +90,19 @@ class Comparison:
     # Ticks
 
     def begin_counts(self) -> None:
-        """Set both sums of each wheel's ticks to zero: the reported sum and the expected one."""
+        """Restart each wheel's count of ticks at zero.
+
+        Both the reported and the expected count are restarted.
+        """
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
-        """Correct the filter by the number of new ``ticks`` of a wheel in ``duration_s``.
+        """Correct the filter by a wheel's count.
+
+        ``ticks``: number of new ticks of the wheel in the last ``duration_s``.
 
         ``late_s``: how much later than usual the ticks arrived, in s.
         """
@@ -118,7 +132,10 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Set the sums of 0x20's changes (odometry) to zero: the reported and the expected ones."""
+        """Restart the sums of changes of heading and distance at zero.
+
+        Both the changes in 0x20 (odometry) and the expected changes are restarted.
+        """
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
         self._motion.filter.forget(TURN, 0.0, TURN_VARIANCE * tick2)
@@ -131,8 +148,9 @@ class Comparison:
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
         """Correct the filter by the changes of 0x20 (odometry) since the last group.
 
-        ``duration_s``: time since the last group. ``late_s``: how much later than usual the group
-        arrived, in s.
+        ``duration_s``: time since the last group, in s.
+
+        ``late_s``: how much later than usual the group arrived, in s.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
@@ -165,7 +183,10 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Subtract the distance that was estimated for a wheel while it was in fact at rest."""
+        """Subtract the distance that was estimated for a wheel while it was in fact at rest.
+
+        ``index``: 0 for the left wheel, 1 for the right wheel.
+        """
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:

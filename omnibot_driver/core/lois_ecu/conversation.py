@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The conversation with a LOIS ECU: decodes lines to readings, and encodes orders as lines.
+"""Conversation with a LOIS ECU: received lines become readings, and orders become lines.
 
-Call ``wrote`` with all bytes that are sent. The odometry depends on the commands, because the board
-reports little about the motion of its wheels. ``translation`` explains what the board sends,
-``opening`` how settings reach the board, and ``outbound`` which set-points are sent.
+Each time bytes are sent to the board, ``wrote`` must be called. The odometry depends on the
+commands, because the board reports little about the motion of its wheels.
+
+``translation`` explains what the board sends. ``opening`` explains how settings reach the board,
+and ``outbound`` which set-points are sent.
 """
 
 from collections.abc import Sequence
@@ -42,7 +44,7 @@ from omnibot_driver.core.lois_ecu.upkeep import Upkeep
 
 
 class LoisConversation:
-    """A conversation with one LOIS ECU on one port; ``settings`` may be replaced at any time."""
+    """A conversation with one LOIS ECU on one port. ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -77,19 +79,22 @@ class LoisConversation:
     # Inbound
 
     def connect(self) -> None:
-        """Begin a new connection; the settings are written again."""
+        """Begin a new connection. The settings are then written to the board again."""
         self.mode = Mode.UNKNOWN
         self._upkeep.connect()
         self._forget_line()
         self._translation.connect()
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
-        """Return the readings that ``data`` completes; also called, with b"", at ``held_until``."""
+        """Return the readings that ``data`` completes.
+
+        Called also with b"" at the time ``held_until``.
+        """
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
 
     def flush(self, now: float) -> list[LoisReading]:
-        """Return the readings of lines that were held back; called when the port closes."""
+        """Return the readings of lines that were held back. Called when the port closes."""
         return self._understood(self._decoder.flush(now), now)
 
     def _understood(self, reports: list[Report], now: float) -> list[LoisReading]:
@@ -165,10 +170,12 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether ticks show that the stopped robot is at rest; None if unknown.
+        """Return whether the ticks show that the robot is at rest after a Stop.
 
-        The result is None without recent ticks, and after a backward command or RPM 0/0: the public
-        firmware then does not count ticks.
+        None if they show nothing.
+
+        Ticks show nothing if none arrived recently. They also show nothing after a backward command
+        or RPM 0/0, because the public firmware then does not count ticks.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -183,7 +190,7 @@ class LoisConversation:
 
     @property
     def figures(self) -> BoardFigures:
-        """Counters and rates for diagnostics, over all connections."""
+        """Counters and rates for diagnostics. The counters continue after a reconnection."""
         ticks_ms = self._settings.periods_ms.get(Stream.TICKS, PERIOD_ONCE)
         gains = own_gains(self._settings)
         return BoardFigures(
@@ -197,14 +204,14 @@ class LoisConversation:
 
     @property
     def advice(self) -> str | None:
-        """Advice on settings that are missing or contradict the received data; otherwise None."""
+        """Advice on settings that are missing or contradict the received data, or None."""
         if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
             return OWN_GAINS.format(gains)
         return self._suspicion.advice
 
     @property
     def configured(self) -> bool:
-        """Whether the settings have been sent; until then the wheels do not turn in RPM mode."""
+        """Whether all settings have been sent. Before that, the wheels do not turn in RPM mode."""
         return self._upkeep.opened and self._upkeep.writer.done
 
     @property
@@ -215,9 +222,9 @@ class LoisConversation:
     # Outbound
 
     def due(self, now: float) -> bytes:
-        """Return the lines that are due: settings, modes, the request for a record, and RPM 0/0.
+        """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
 
-        Called at ``wake_at``.
+        Called at the time ``wake_at``.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)))
         self._decoder.terminal = self._upkeep.change.terminal
@@ -246,23 +253,29 @@ class LoisConversation:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return RPM 0/0; during an e-stop, the driver sends RPM 0/0 and Stop alternately.
+        """Return RPM 0/0. In a terminal mode, return nothing.
 
-        The board does not latch an e-stop, so both commands are repeated.
+        The board does not latch an e-stop. So during an e-stop, the driver sends RPM 0/0 and Stop
+        in turn.
 
-        In a terminal mode the result is empty, so only Stop is sent: the public firmware forwards
-        all received characters to the sensor, and then reads at most 480 characters a second.
+        In a terminal mode, only Stop is sent. The public firmware then forwards all received
+        characters to the sensor, and reads at most 480 characters a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
-        """Encode a velocity as RPM or duty (``drive_mode``); return Stop if it rounds to zero."""
+        """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
+
+        If the velocity rounds to zero, return Stop. Raises CommandRefused while a change of mode,
+        or a terminal mode, forbids motion.
+        """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
-        """Encode the rates of the left and right wheel in rad/s; Stop if both round to zero.
+        """Return the lines that command the rates of the left and right wheel, in rad/s.
 
-        Raises CommandRefused while a change of mode, or a terminal mode, forbids motion.
+        If both rates round to zero, return Stop. Raises CommandRefused while a change of mode, or a
+        terminal mode, forbids motion.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
@@ -275,17 +288,23 @@ class LoisConversation:
     # Other requests
 
     def reset(self) -> bytes:
-        """Return Stop and the reset command, after which the board's counters start at zero."""
+        """Return Stop and the reset command. After a reset, the board's counters start at zero."""
         self._decoder.forget_counters()
         self._translation.connect()
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again: the manual says a reset affects controllers and interfaces."""
+        """Write all settings again.
+
+        The manual says that a reset affects controllers and interfaces.
+        """
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send ``command`` several times: lines may be lost. A repetition must be harmless."""
+        """Send ``command`` several times, because lines may be lost.
+
+        A repetition must be harmless.
+        """
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
@@ -293,7 +312,7 @@ class LoisConversation:
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Start a record. Raises RequestRefused if the board could not complete the record."""
+        """Request a record. Raises RequestRefused if the board could not complete the record."""
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
         self._upkeep.request.begin(kind, samples, self._decoder)

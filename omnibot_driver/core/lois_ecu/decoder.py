@@ -2,11 +2,12 @@
 
 """Decoder that turns a stream of bytes into reports.
 
-A line ends with a line feed and begins at the last ``:`` before it. So if the end of a line is
-lost, the next line can still be decoded. Bytes outside of lines are counted and discarded. A line
-that lost or gained characters has a wrong length. Two lines can become one only if fourteen
-characters in a row are lost: the end of one and the beginning of the next. The checksum of the
-resulting line would have to be right too.
+A line ends with a line feed and begins at the last ``:`` before it. So a line can be decoded even
+if the end of the line before it is lost. Bytes outside of lines are counted and discarded.
+
+A line that lost or gained characters has a wrong length, so it is discarded. Two lines can become
+one valid line only if fourteen characters in a row are lost: the end of the first line and the
+beginning of the second. The checksum would have to be right too.
 
 This module does not read a clock, and no input raises an error. It holds less than ``LONGEST_LINE``
 bytes between calls, and looks at each byte a bounded number of times.
@@ -22,15 +23,18 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
 from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 
 LONGEST_LINE: Final = 256
-"""Largest accepted length of a line in bytes: longer than any line of a serial sensor."""
+"""Largest accepted length of a line in bytes. It is longer than any line of a serial sensor."""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counters of one decoder, or of several decoders that follow each other.
+    """Counters of a decoder. After a reconnection, the next decoder continues the same counters.
 
-    ``lines``: valid lines; ``faults``: pieces of input that were discarded, because they were not a
-    line; ``groups``: counters of groups of lines.
+    ``lines``: valid lines.
+
+    ``faults``: pieces of input that were discarded, because they were not a line.
+
+    ``groups``: counters of groups of lines.
     """
 
     lines: int = 0
@@ -42,10 +46,13 @@ class DecoderStatistics:
 class LoisDecoder:
     """Decoder of the bytes from one serial port.
 
-    If ``sum_required`` is false, lines without a checksum are accepted too. ``terminal``: whether
-    the board passes on a sensor's lines, so text is returned and not regarded as damage. ``times``:
-    for each report that the last call returned, the arrival time of the report's last line, which
-    may be earlier than the call.
+    ``sum_required``: whether lines without a checksum are discarded.
+
+    ``terminal``: whether the board passes on lines of a sensor. Text is then returned as a report,
+    and is not counted as damage.
+
+    ``times``: arrival times of the reports that the last call returned. The time of a report is
+    that of its last line, which may be earlier than the call.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:
@@ -59,7 +66,10 @@ class LoisDecoder:
 
     @property
     def statistics(self) -> DecoderStatistics:
-        """Counters; to continue those of an earlier decoder, assign them before the first data."""
+        """Counters.
+
+        To continue the counters of an earlier decoder, assign them before the first data.
+        """
         return self._statistics
 
     @statistics.setter
@@ -88,15 +98,15 @@ class LoisDecoder:
         return self._assembler.in_record
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with ``left`` and ``right`` samples; discard every other record."""
+        """Expect a record with ``left`` and ``right`` samples. Every other record is discarded."""
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
-        """Accept any counts in the next group: a reset may set the board's counters to zero."""
+        """Accept any counts in the next group, because a reset may have cleared the counters."""
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:
-        """Return the reports that ``data`` completes, in the order in which they were sent.
+        """Return the reports that ``data`` completes, in the order in which the board sent them.
 
         If ``data`` is empty, return the report that was held back, if it has waited long enough.
         """
@@ -115,7 +125,7 @@ class LoisDecoder:
         return self._untimed(found)
 
     def flush(self, now: float) -> list[Report]:
-        """Return the report that was held back, if it is complete; called when the port closes."""
+        """Return the report that was held back, if it is complete. Called when the port closes."""
         if self._held or self._cut_bytes:
             self._damaged(len(self._held) + self._cut_bytes)
         self._held, self._cut_bytes = b"", 0

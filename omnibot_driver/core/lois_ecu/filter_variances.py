@@ -10,7 +10,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 def pose_covariance(motion: SparseFilter, turn: float) -> Covariance:
     """Return the covariance of x, y and yaw.
 
-    ``turn``: rad of yaw for each m that the right wheel rolls further than the left one.
+    ``turn``: change of the yaw, in rad, if the right wheel rolls 1 m farther than the left wheel.
     """
     matrix = motion.covariance
     left, right = WAY, PER_WHEEL + WAY

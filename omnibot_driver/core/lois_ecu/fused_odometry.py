@@ -10,17 +10,24 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
-"""Source of the motion since the last estimate; "standing" means that the robot is at rest."""
+"""Data from which the motion since the last estimate is known. "standing" means that the robot is
+at rest."""
 
 
 @dataclass(frozen=True, slots=True)
 class FusedOdometry:
-    """Odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in the body frame.
+    """Estimated odometry of the robot at the time ``stamp_s``.
+
+    ``pose``, ``covariance``: in the odometry frame.
+
+    ``twist``: in the body frame.
 
     ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
-    ``displacement``: motion since the previous estimate, in the robot's axes. ``wheel_ways_m``:
-    distances of the board's left and right wheel since the previous estimate, for wheels of nominal
-    size. ``blind``: whether the motion is known only from commands, because ticks do not show it.
+
+    ``displacement``: motion since the previous estimate, in the robot's axes.
+
+    ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate, in
+    m. They are computed for wheels of nominal size.
     """
 
     stamp_s: float

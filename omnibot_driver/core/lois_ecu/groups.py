@@ -1,22 +1,27 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assembly of reports that take several lines: each is a group of lines after a marker line.
+"""Assembly of reports that take several lines.
 
-A group is returned complete or not at all. A lost line makes the group too short; a repeated line,
-or a line of another group, makes it too long or interrupts it. So a group is known to be complete
-when something else follows. The group is returned earlier, with its last line, on two conditions:
-no line equals the one before it (so none was received twice), and the values can follow those of
-the last group. Otherwise the group is held until the next line comes, or until no line has come for
-``QUIET_S``.
+Each is a group: a marker line, then lines with values.
 
-Silence completes a held group of a valid length. A shorter group continues to wait, because its
-other lines may be read late. But lines that come almost a period later may belong to the next
-group, if all lines between them were lost. In this case the shorter group is discarded.
+A group is returned complete or not at all. A lost line makes a group too short. A repeated line
+makes it too long, and a line of another group interrupts it. So only what follows a group shows
+whether the group is complete.
 
-The command byte 0x12 has two kinds of groups, distinguished by their length: 3 lines of ticks, and
-in the public firmware 6 lines of odometry directly after the ticks. A count of -1 looks like a
-marker; the length of the group also shows whether a line is a count or a marker. Records are
-assembled in ``record_lines``. This module works on lines and arrival times.
+A group need not wait for that on two conditions: no line equals the one before it, so none was
+received twice, and the values can follow those of the last group. It is then returned with its last
+line. Any other group is held until the next line comes, or until no line has come for ``QUIET_S``.
+
+After such a silence, a held group of a valid length is returned. A shorter group continues to wait,
+because its other lines may be read late. But lines that come almost a period later may belong to
+the next group, if all lines between them were lost. The shorter group is then discarded.
+
+The command byte 0x12 has two kinds of groups. A group of ticks has 3 lines after the marker. The
+public firmware also sends a group of odometry directly after the ticks, with 6 lines after the
+marker. A count of -1 looks like a marker. The number of lines shows whether a line is a count or a
+marker.
+
+Records are assembled in ``record_lines``. This module works on lines and arrival times.
 """
 
 import math
@@ -48,13 +53,12 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group of a valid length is regarded as complete: the board sends the
-lines of a group 1.2 ms apart, and a reader usually delivers them within ``QUIET_S``."""
+"""Silence in s after which a group of a valid length is regarded as complete. The board sends the
+lines of a group 1.2 ms apart, and a reader usually delivers them within this time."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest allowed pause within a group, as a fraction of the time from the previous group's marker
-to this group's marker. The pause is also limited to ``LATE_S``, but at least ``QUIET_S`` is
-allowed."""
+"""Longest allowed pause within a group, as a fraction of the time from the marker of the previous
+group to the marker of this group. The pause may be at least ``QUIET_S`` and at most ``LATE_S``."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
@@ -65,15 +69,17 @@ _LONGEST: Final = 10
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
-"""Arrival time of a report's last line in s, and the report. The report may be returned after its
-arrival, when it is known to be complete."""
+"""Arrival time of a report's last line in s, and the report. A report that was held is returned
+later than it arrived."""
 
 
 class Assembler:
     """Assembler of reports from lines.
 
     Call ``add`` for each line, ``damage`` for characters that are not a line, and ``rest`` while
-    nothing arrives. ``statistics``: the counters to increase.
+    nothing arrives.
+
+    ``statistics``: the counters to increase.
     """
 
     def __init__(self, statistics: GroupStatistics) -> None:
@@ -106,7 +112,7 @@ class Assembler:
     def resolves_at(self) -> float:
         """Time at which a held group is returned if nothing follows it.
 
-        Infinity if no group is held, or if the held group may be unfinished.
+        The time is infinity if no group is held, or if the held group may be unfinished.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -116,11 +122,11 @@ class Assembler:
         return self._record.begun
 
     def expect_record(self, kind: RecordKind, left: int, right: int = 0) -> None:
-        """Expect a record with ``left`` and ``right`` samples; discard every other record."""
+        """Expect a record with ``left`` and ``right`` samples. Every other record is discarded."""
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """Forget the last counts and poses, because a reset of the board may set them to zero."""
+        """Forget the last counts and poses, because a reset of the board may have cleared them."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()
@@ -149,17 +155,17 @@ class Assembler:
         return [*found, (now, report)]
 
     def damage(self) -> None:
-        """Record that characters were received that are not a line."""
+        """Record that characters were received that do not form a line."""
         if self._code is not None and not self._done:
             self._drop()
         self._record.damage()
 
     def rest(self, now: float) -> list[Timed]:
-        """Return the held group if it has a valid length and nothing follows it for ``QUIET_S``."""
+        """Return the held group if its length is valid and nothing has come for ``QUIET_S``."""
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
-        """Return the held group if it is complete; called when the port closes."""
+        """Return the held group if it is complete. Called when the port closes."""
         found = self._end(now)
         self._record.cut_off()
         return found
@@ -167,7 +173,10 @@ class Assembler:
     # Groups
 
     def _begin(self, code: int, now: float) -> None:
-        """Begin a group. Its longest allowed pause depends on the time since the previous group."""
+        """Begin a group.
+
+        Its longest allowed pause depends on the time since the previous group began.
+        """
         since_s = now - self._begun_at.get(code, -math.inf)
         if since_s > QUIET_S and not self._after_ticks:  # neither read nor sent together
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))
@@ -175,7 +184,7 @@ class Assembler:
         self._code, self._payloads, self._done, self._astray = code, [], False, False
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Return whether a line with the payload of a marker may be a count of -1 in this group."""
+        """Return whether the next line, which looks like a marker, may be a count of -1 instead."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _may_be_complete(self) -> bool:
@@ -210,7 +219,7 @@ class Assembler:
         return self._believed(group, now)
 
     def _end(self, now: float) -> list[Timed]:
-        """End the present group; return the group if it is complete and plausible."""
+        """End the present group. Return it if it is complete and plausible."""
         code = self._code
         if code is None:
             return []

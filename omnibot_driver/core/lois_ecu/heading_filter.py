@@ -2,12 +2,15 @@
 
 """Filter of compass headings that rejects the false headings of the public firmware near north.
 
-The firmware averages three headings of 0 to 359 degrees as plain numbers: for 359, 1 and 1 it
-reports 120, and for 359, 359 and 1 it reports -121. A heading is accepted if it differs from the
-last accepted one by about the angle that the odometry has turned since then. Any other heading is
-accepted only when ``SURE_AFTER`` further headings agree with it. A false heading (about 120 or -120
-degrees while the robot faces north) is rejected even then. This module works on degrees and the
-odometry's yaw.
+The firmware averages three headings of 0 to 359 degrees as plain numbers. For 359, 1 and 1 it
+reports 120, and for 359, 359 and 1 it reports -121.
+
+The filter compares each heading with the last accepted heading. The heading is accepted if it has
+turned by about the same angle as the odometry. Any other heading is accepted only when
+``SURE_AFTER`` further headings agree with it. Even then, a heading of about 120 or -120 degrees is
+rejected if the robot should face north.
+
+This module works on degrees and the odometry's yaw.
 """
 
 import math
@@ -15,8 +18,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""Allowed error of a heading: ``NEAR_DEG`` degrees, plus this fraction of the angle by which the
-odometry has turned."""
+"""``NEAR_DEG``, ``NEAR_PART``: allowed error of a heading. It is ``NEAR_DEG`` degrees, plus the
+fraction ``NEAR_PART`` of the angle by which the odometry has turned."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -24,20 +27,26 @@ MISTAKEN_WITHIN_DEG: Final = 12.0
 
 
 class HeadingFilter:
-    """Filter of compass headings; ``refused``: number of headings that were rejected."""
+    """Filter of compass headings. ``refused``: number of headings that were rejected."""
 
     def __init__(self) -> None:
         self.refused = 0
         self.forget()
 
     def forget(self) -> None:
-        """Forget all headings; accept a heading only when two in a row agree."""
+        """Forget all headings.
+
+        The next heading is rejected; the one after it is accepted if both agree.
+        """
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
         self._agreed = 0
 
     def begin_frame(self, yaw_rad: float) -> None:
-        """Change to a new odometry frame, whose yaw in the present frame is ``yaw_rad``."""
+        """Continue in a new odometry frame.
+
+        ``yaw_rad``: yaw of the new frame in the present frame.
+        """
         if self._last is not None:
             self._last = self._last[0], self._last[1] - yaw_rad
         if self._other is not None:
@@ -46,8 +55,9 @@ class HeadingFilter:
     def believes(self, heading_deg: float, yaw_rad: float) -> bool:
         """Return whether a heading is accepted.
 
-        ``heading_deg``: heading clockwise from north. ``yaw_rad``: yaw of the odometry when the
-        heading arrived.
+        ``heading_deg``: heading clockwise from north.
+
+        ``yaw_rad``: yaw of the odometry when the heading arrived.
         """
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0
@@ -78,7 +88,10 @@ class HeadingFilter:
 
 
 def _expected(before: tuple[float, float], yaw_rad: float) -> float:
-    """Return the heading, -180..180 degrees, that follows from ``before`` and the yaw since."""
+    """Return the heading, -180..180 degrees, that is expected after the yaw has changed.
+
+    ``before``: the last heading, and the yaw at that time.
+    """
     return _difference(before[0] - math.degrees(yaw_rad - before[1]), 0.0)
 
 

@@ -2,9 +2,11 @@
 
 """One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
 
-``:<command><payload><checksum>\\n``, 14 characters. The checksum is the XOR of the first eleven
-characters. The board can be set to accept lines without a checksum (12 characters), but always
-sends a checksum. This module knows the layout only, not what a command means.
+A line is ``:<command><payload><checksum>\\n``, with 14 characters. The checksum is the XOR of the
+first eleven characters. The board can be set to accept lines without a checksum (12 characters),
+but it always sends a checksum.
+
+This module knows the layout only, not what a command means.
 """
 
 import re
@@ -51,10 +53,10 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 
 
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
-    """Parse the characters from ``:`` to the line feed; None if they are not a valid line.
+    """Return the line that the characters from ``:`` to the line feed form; None if not valid.
 
     A carriage return before the line feed is accepted. If ``sum_required`` is false, the line may
-    lack the checksum; if the line has a checksum, it must be right in any case.
+    lack the checksum. A checksum that the line has must be right in any case.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END
@@ -69,9 +71,9 @@ def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
 
 
 def from_pair(left: int, right: int) -> int:
-    """Return the 32-bit payload of two 16-bit words, each signed or unsigned.
+    """Return the payload that contains two 16-bit words, the left one first.
 
-    Raises FrameError if a number does not fit into 16 bits.
+    Each word may be signed or unsigned. Raises FrameError if a number does not fit into 16 bits.
     """
     if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
         raise FrameError(f"{left} and {right} do not fit into two 16-bit words")
@@ -103,6 +105,6 @@ def from_float(number: float) -> int:
 
 
 def to_float(payload: int) -> float:
-    """Return the float32 number that a payload encodes; the number may be NaN or infinite."""
+    """Return the float32 number that a payload encodes. The number may be NaN or infinite."""
     (number,) = _FLOAT.unpack(_WORD.pack(payload))
     return float(number)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speeds that the public firmware measures and keeps, and their effect on 0x20 (odometry).
+"""Prediction of the wheel speeds that the public firmware keeps, and of their effect on 0x20.
 
 The motion filter calls this module in each of its steps. The module works on the states of the
 filter, without reports.
@@ -25,21 +25,23 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
-that 0x20 (odometry) misses when a wheel starts."""
+"""``START_TICKS``, ``START_STDDEV_TICKS``: how many ticks of a starting wheel 0x20 (odometry)
+misses, as mean and standard deviation."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of a wheel's motion that 0x20 (odometry) misses above
-``FAST_RPM``. The firmware gives no speed to a tick that comes soon after a delayed one, and ticks
-are delayed while the board sends."""
+"""Variance, in squared ticks per s, of the motion that 0x20 (odometry) misses while a wheel turns
+faster than ``FAST_RPM``. The firmware delays ticks while it sends. It gives no speed to a tick that
+comes soon after a delayed one."""
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
     """Predict the speeds that the firmware keeps, and the resulting changes of 0x20 (odometry).
 
-    The firmware updates 0x20 at each tick of either wheel, with the speed that it measured last for
-    each wheel. So if only one wheel rolls, 0x20 uses the present speed of this wheel, and an old
-    speed of the wheel at rest.
+    The firmware updates 0x20 at each tick of either wheel. It uses the speed that it measured last
+    for each wheel. So while only one wheel rolls, 0x20 combines the present speed of this wheel
+    with an old speed of the wheel at rest.
+
+    ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
     """
     dt, new = step.dt, step.new
     turn: Terms = [(TURN, 1.0)]

@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""All messages of the manual's table as values; ``codec`` turns them into lines and back.
+"""All messages of the manual's table as values. ``codec`` turns them into lines and back.
 
-Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23. A message from
-the host is a ``Command``, and one from the ECU a ``Report``; some command bytes are used for both.
-Units are in the names. Counts are converted to SI units where they are used.
+A message from the host is a ``Command``, and a message from the ECU is a ``Report``. Some command
+bytes are used for both. Units are in the names. Counts are converted to SI units where they are
+used.
+
+Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23.
 """
 
 from dataclasses import dataclass
@@ -12,10 +14,10 @@ from enum import Enum, IntEnum
 from typing import Final
 
 PERIOD_ONCE: Final = 0xFFFE
-"""Value in place of a period in ms: the board sends the message once, and not periodically."""
+"""Value that is sent instead of a period in ms, so that the board sends the message only once."""
 PERIOD_OFF: Final = 0xFFFF
 MOST_SAMPLES: Final = 1024
-"""Largest number of samples in a record; the board never completes a longer record."""
+"""Largest number of samples in a record. The board never completes a longer record."""
 
 RECORD_END: Final = 0x00000000
 HEADING_END: Final = 0x016A016A
@@ -45,7 +47,10 @@ class Code(IntEnum):
 
 
 class Setting(IntEnum):
-    """A float32 setting that can be written but not read back; identified by its command byte."""
+    """A float32 setting of the board, with its command byte.
+
+    It can be written but not read back.
+    """
 
     LEFT_KP = 0x06
     LEFT_TN = 0x07
@@ -63,7 +68,7 @@ class Setting(IntEnum):
 
 
 class Stream(IntEnum):
-    """A message that the ECU can send periodically; identified by its command byte."""
+    """A message that the ECU can send periodically, with its command byte."""
 
     GPS_POSITION = 0x0D
     GPS_TIME = 0x0E
@@ -76,8 +81,11 @@ class Stream(IntEnum):
 class TerminalMode(IntEnum):
     """What the serial line between the board and the host carries.
 
-    ``HOST``: the protocol. ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no
-    checksum. In all other modes the board forwards a serial input and sends no messages of its own.
+    ``HOST``: the protocol.
+
+    ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no checksum.
+
+    In all other modes, the board forwards a serial input and sends no messages of its own.
     """
 
     HOST = 0
@@ -88,7 +96,7 @@ class TerminalMode(IntEnum):
 
 
 class RecordKind(Enum):
-    """What the board can record: tick times (RPM), torques or compass headings."""
+    """What the board records: the times between ticks (RPM), torques or compass headings."""
 
     RPM = "rpm"
     TORQUE = "torque"
@@ -100,7 +108,10 @@ class RecordKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SetDuty:
-    """A command that sets each motor's duty, open loop, in percent of the supply: -100..100."""
+    """A command that sets the duty of each motor, in percent of the supply voltage: -100..100.
+
+    The duty is not controlled by speed (open loop).
+    """
 
     left_percent: int
     right_percent: int
@@ -108,7 +119,10 @@ class SetDuty:
 
 @dataclass(frozen=True, slots=True)
 class SetRpm:
-    """A command that sets each wheel's speed, closed loop, in revolutions per minute."""
+    """A command that sets the speed of each wheel in revolutions per minute.
+
+    The board controls the speed (closed loop).
+    """
 
     left_rpm: int
     right_rpm: int
@@ -123,7 +137,7 @@ class SetLed:
 
 @dataclass(frozen=True, slots=True)
 class RecordRpm:
-    """A command to record tick times of both wheels, and then to send the samples."""
+    """A command to record the times between each wheel's ticks, and then to send the record."""
 
     left_samples: int
     right_samples: int
@@ -131,7 +145,7 @@ class RecordRpm:
 
 @dataclass(frozen=True, slots=True)
 class RecordTorque:
-    """A command to record torque readings of both motors, and then to send the samples."""
+    """A command to record the torque of each motor, and then to send the record."""
 
     left_samples: int
     right_samples: int
@@ -139,7 +153,7 @@ class RecordTorque:
 
 @dataclass(frozen=True, slots=True)
 class RecordHeading:
-    """A command to record compass headings, and then to send the samples."""
+    """A command to record compass headings, and then to send the record."""
 
     samples: int
 
@@ -174,14 +188,14 @@ class SetTerminalMode:
 class Reset:
     """A command that resets the board.
 
-    The manual says that the reset affects controllers, interfaces and counters; the firmware resets
-    only the ticks.
+    According to the manual, a reset affects controllers, interfaces and counters. The public
+    firmware resets only the ticks.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class DistributeBall:
-    """A command to use the ball distribution device once."""
+    """A command that makes the ball distribution device drop one ball."""
 
 
 Command = (
@@ -204,14 +218,17 @@ Command = (
 
 @dataclass(frozen=True, slots=True)
 class EStopButton:
-    """A press or release of the e-stop button; at both events the board zeroes its set-points."""
+    """A press or release of the e-stop button.
+
+    At both events, the board sets its set-points to zero.
+    """
 
     pressed: bool
 
 
 @dataclass(frozen=True, slots=True)
 class GpsPosition:
-    """The GPS position in degrees, north and east positive; 0/0 without a fix."""
+    """The GPS position in degrees, north and east positive. Without a fix, both values are 0."""
 
     latitude_deg: float
     longitude_deg: float
@@ -228,7 +245,10 @@ class GpsTime:
 
 @dataclass(frozen=True, slots=True)
 class GpsDate:
-    """The GPS date in UTC, with a year of two digits; zeros while unknown."""
+    """The GPS date in UTC, with a year of two digits.
+
+    While the date is unknown, all values are 0.
+    """
 
     year: int
     month: int
@@ -244,10 +264,10 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """Encoder ticks since the board started or was reset, and the board's time of sending them.
+    """Encoder ticks of both wheels since the board started or was reset. They are signed.
 
-    ``time_counts``: the board's time, in ns according to the manual, but in ms in the public
-    firmware; wraps at 2³². Ticks are signed.
+    ``time_counts``: time of sending by the board's clock, in ns according to the manual, but in ms
+    in the public firmware. It wraps at 2³².
     """
 
     time_counts: int
@@ -257,7 +277,9 @@ class Ticks:
 
 @dataclass(frozen=True, slots=True)
 class BoardOdometry:
-    """The board's own dead reckoning, in its earth frame; velocities may be NaN or infinite.
+    """The robot's pose and velocity in the earth frame, as the board computes them.
+
+    The velocities may be NaN or infinite.
 
     ``appended``: whether the group came directly after a group of ticks, with the command byte of
     the ticks.
@@ -274,11 +296,14 @@ class BoardOdometry:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """A complete record; ``left`` and ``right`` have as many samples as requested.
+    """A complete record with as many samples as were requested.
 
-    A record of headings has only ``left``. An RPM sample is the time from one tick to the next in
-    the board's unit (``COUNT_S`` in ``record_request``). A torque sample is a 12-bit value of an
-    ADC. A heading sample is in degrees.
+    ``left``, ``right``: samples of the left and the right wheel. A record of headings has only
+    ``left``.
+
+    An RPM sample is the time from one tick to the next, in the board's unit (``COUNT_S`` in
+    ``record_request``). A torque sample is a 12-bit value of an analogue-digital converter. A
+    heading sample is in degrees.
     """
 
     kind: RecordKind
@@ -288,7 +313,7 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class TerminalLine:
-    """A sensor's line of text, which the board passes through in a terminal mode."""
+    """A line of text from a sensor, which the board passes on in a terminal mode."""
 
     text: str
 

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on a misconfiguration, found in the settings or in bytes that are not valid lines.
+"""Advice on a misconfiguration, found in the settings or in received bytes that form no valid line.
 
-There is at most one piece of advice at a time. Advice from bytes (another board, a wrong setting)
-is given only while valid lines do not arrive. This module works on bytes and settings, without
-times.
+Received bytes can show another board or a wrong setting. Advice from bytes is given only while
+valid lines do not arrive. At any time, there is at most one piece of advice.
+
+This module works on bytes and settings, without times.
 """
 
 import re
@@ -28,10 +29,10 @@ OWN_GAINS: Final = (
     " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run calibrate step, or set these"
     " parameters"
 )
-"""Advice if the user has not set all gains. The figures in the text are from 150 forward drives
+"""Advice if the user has not set all gains. The numbers in the text are from 150 forward drives
 with the compiled firmware and correct wheel sizes."""
 LOOK_AT: Final = 600
-"""Number of bytes without a valid line after which advice is given; the board sends at least 70
+"""Number of bytes without a valid line after which advice is given. The board sends at least 70
 bytes per second."""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
@@ -54,7 +55,10 @@ class Suspicion:
         self._seen, self.advice = b"", None
 
     def look(self, data: bytes) -> None:
-        """Examine more received bytes; set ``advice`` once ``LOOK_AT`` bytes gave no report."""
+        """Examine more received bytes.
+
+        Set ``advice`` when ``LOOK_AT`` bytes have given no report.
+        """
         if not data:
             return
         self._seen = (self._seen + data)[-2 * LOOK_AT :]
@@ -63,7 +67,7 @@ class Suspicion:
 
 
 def own_gains(settings: LoisEcuSettings) -> str:
-    """Return the names of the gains that the user has not set; empty if not in RPM mode."""
+    """Return the names of the gains that the user has not set, or "" if not in RPM mode."""
     if settings.drive_mode != "rpm":
         return ""
     return ", ".join(gain.name.lower() for gain in GAINS if gain not in settings.written)

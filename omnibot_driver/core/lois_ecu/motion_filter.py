@@ -1,14 +1,29 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kalman filter of both wheels' motion, and of the board's counters that report this motion.
+"""Kalman filter of the motion of both wheels, and of the values by which the board reports it.
 
-States of each wheel: distance, speed, acceleration, the ticks that the board should have counted,
-the speed that the firmware measured last, a bias, and the fraction by which the wheel rolls
-backward faster than its set-point. States of the body: position, and the changes of the heading and
-the distance in 0x20 (odometry). The errors of all these states are correlated with the error of the
-position, so each report of the board also corrects the position.
+The filter has these states for each wheel:
 
-Left and right are those of the board; distances and speeds are for wheels of nominal size. This
+``WAY``, ``SPEED``, ``PUSH``: distance, speed and acceleration.
+
+``COUNT``: ticks that the board should have counted.
+
+``HELD``: speed that the firmware measured last.
+
+``BIAS``: systematic error of the speed.
+
+``EXCESS``: fraction by which the wheel rolls backward faster than its set-point.
+
+The filter has these states for the body:
+
+``X``, ``Y``: position.
+
+``TURN``, ``ALONG``: expected changes of heading and distance in 0x20 (odometry).
+
+The errors of all states are correlated with the error of the position. So each report of the board
+also corrects the position.
+
+Left and right are those of the board. Distances and speeds are for wheels of nominal size. This
 module works on commands and the firmware's counters, without messages.
 """
 
@@ -43,24 +58,30 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts; of a longer time, it predicts only the
-last part."""
+"""Longest time in s that one call of ``advance`` predicts. If more time has passed, only the last
+part of it is predicted."""
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
-"""Assumed standard deviation of the time at which a command takes effect, in controller periods."""
+"""Assumed standard deviation of the time at which a command takes effect, in periods of the speed
+controller."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
-"""``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the fraction of an RPM that the
-firmware drops."""
+"""``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the fraction of an RPM by which
+the firmware rounds a measured speed down."""
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""Fraction by which a wheel that rolls backward is faster than its set-point: mean ``EXCESS_MEAN``,
-standard deviation ``EXCESS_STDDEV``, and additional standard deviation ``EXCESS_CHANGE`` after a
-change of the set-point. Each constant has two values: for the board's own gains, and for gains that
-the user set. The wheel is faster because the firmware lowers the target with each tick until the
-controller's next step. A feed-forward may make the wheel much faster still."""
+"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: fraction by which a wheel that rolls backward is faster than
+its set-point, as mean and standard deviation.
+
+``EXCESS_CHANGE``: standard deviation that is added after a change of the set-point.
+
+Each constant has two values: for the board's own gains, and for gains that the user set.
+
+The wheel is faster because the firmware lowers the target with each tick until the controller's
+next step. A feed-forward may make the wheel much faster still.
+"""
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
 
@@ -68,16 +89,21 @@ ROLLING_MPS: Final = 1e-6
 class MotionFilter:
     """Estimate of the wheels' motion and the body's pose.
 
-    ``tick_m``, ``rpm_mps``: distance that the rim of a wheel moves in one tick, and the speed of
-    the rim at one RPM. ``turn_sign``: -1 if the board's left wheel is the robot's right one.
-    ``signed``: whether ticks always count in both directions. ``holds``: whether the board keeps
-    the last measured speed of a wheel at rest.
+    ``tick_m``: distance that a wheel rolls in one tick, in m.
 
-    ``tuned``: whether the controllers have gains that the user set.
+    ``rpm_mps``: speed of a wheel's rim at one RPM, in m/s.
 
-    A wheel that is halted soon after a change of its set-point did not roll at the speed of the
-    model, and perhaps rolled in the other direction. The filter then adds an error to the wheel's
-    distance. The standard deviation of this error is the change of speed times
+    ``turn_sign``: -1 if the board's left wheel is the robot's right wheel, otherwise 1.
+
+    ``signed``: whether ticks always count in both directions.
+
+    ``holds``: whether the board keeps the last measured speed of a wheel at rest.
+
+    ``tuned``: whether the speed controllers have gains that the user set.
+
+    Some wheels are halted soon after a change of their set-point. Such a wheel did not yet roll at
+    the modelled speed, and perhaps rolled in the other direction. The filter then adds an error to
+    the wheel's distance. Its standard deviation is the change of speed times
     ``UNSETTLED_S[tuned]``.
     """
 
@@ -88,8 +114,8 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference between both measured speeds since the attribute was last reset, in
-        m/s."""
+        """Smallest difference between the measured speeds of both wheels since the last reset of
+        this attribute, in m/s."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 
@@ -108,7 +134,7 @@ class MotionFilter:
         return self.filter.mean[PER_WHEEL * wheel + WAY]
 
     def rounded_mps(self, wheel: int) -> float:
-        """Return the fraction of an RPM that the firmware drops from a measured speed, in m/s."""
+        """Return by how much the firmware rounds down a wheel's measured speed, in m/s."""
         if self.wheels[wheel].course.kind == "rpm":
             return self.filter.mean[BIAS + wheel]
         return ROUNDED * self.rpm_mps
@@ -148,12 +174,11 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """Restore the state at ``then_s``, the time of the board's restart, and add the coasting.
+        """Restore the state at ``then_s``, when the board restarted. Later estimates are discarded.
 
-        Estimates after ``then_s`` are discarded. The restarted board does not drive its wheels, so
-        they coast. If ticks count in both directions, they have restarted at zero and report how
-        far the wheels coasted. Otherwise the distance of the coasting is estimated, and the
-        set-points are forgotten.
+        A restarted board does not drive its wheels, so the wheels coast. If ticks count in both
+        directions, the counts have restarted at zero and show how far the wheels coasted. Otherwise
+        this distance is estimated, and the set-points are forgotten.
         """
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
@@ -179,8 +204,10 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Add an error to a wheel's distance, and to all states that depend on that distance.
 
-        ``stddev_m``: standard deviation of the error. ``counted``: whether the board counted the
-        wheel's ticks when the error arose, even if it does not count them now.
+        ``stddev_m``: standard deviation of the error.
+
+        ``counted``: whether the board counted the wheel's ticks when the error arose. It may have
+        stopped counting since then.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -189,7 +216,7 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return the states that an unmeasured distance of a wheel changes, with their factors."""
+        """Return which states are wrong, and by how much, if a wheel's distance is wrong by 1 m."""
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
@@ -198,7 +225,7 @@ class MotionFilter:
         return terms
 
     def _way_terms(self, index: int) -> Terms:
-        """Return the states that a distance of a wheel changes, each with its factor."""
+        """Return which states change, and by how much, if a wheel rolls 1 m."""
         base, yaw = PER_WHEEL * index, self.yaw_rad
         terms = [(base + WAY, 1.0), (X, math.cos(yaw) / 2), (Y, math.sin(yaw) / 2)]
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
@@ -241,8 +268,8 @@ class MotionFilter:
     def _begin_biases(self) -> None:
         """Reset the biases.
 
-        The bias of a wheel that a duty drives is a relative error of its speed. Otherwise the bias
-        is the dropped fraction of an RPM, in m/s.
+        For a wheel that is driven by a duty, the bias is a relative error of its speed. For other
+        wheels, the bias is the rounding of the measured speed, in m/s.
         """
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:

@@ -3,10 +3,13 @@
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
 Counts of ticks are exact, but the public firmware counts only while a wheel is commanded forward.
-At other times the commands show how the wheels should move (``motion_filter``), and 0x20 (the
-board's odometry) shows how the wheels moved (``comparison``). The reports do not show errors of the
-wheels' sizes, nor slip, so the effect of both errors is estimated separately (``size_errors``).
-Time is an argument; all times are arrival times in s.
+At other times, ``motion_filter`` computes from the commands how the wheels should move.
+``comparison`` corrects this by 0x20 (the board's odometry).
+
+The reports do not show wrong wheel sizes or slip. ``size_errors`` estimates how much these change
+the pose.
+
+Time is an argument. All times are arrival times in s.
 """
 
 import math
@@ -34,17 +37,17 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 WHEEL_DRIFT: Final = 0.0035
 """Assumed standard deviation, in m, of the random error of a wheel's distance after 1 m."""
 LATE_S: Final = 0.012
-"""Assumed standard deviation of an arrival time in s, while no better value is known."""
+"""Assumed standard deviation of an arrival time in s, until a better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""Number of tick periods after the last report for which the pose is predicted, or ``UNHEARD_S`` s
-if that is longer. A longer silence can mean that the board is off."""
+"""After the last report, the pose is predicted for this number of tick periods, or for
+``UNHEARD_S`` s if that is longer. After a longer silence, the board may be off."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
 
 class LoisOdometry:
-    """Odometry of a robot with a LOIS ECU and the given ``settings``; wheel order: left, right."""
+    """Odometry of a robot with a LOIS ECU. Pairs of values are for the left and the right wheel."""
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._motion = MotionFilter()
@@ -103,8 +106,10 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """For each wheel: whether it is assumed to be at rest, although it is commanded to turn
-        backward."""
+        """Which wheels are assumed to be at rest although they are commanded to turn backward.
+
+        The first value is for the left wheel, the second for the right one.
+        """
         left, right = self._motion.wheels
         return left.rests, right.rests
 
@@ -121,7 +126,10 @@ class LoisOdometry:
         self._motion.history.forget()
 
     def connect(self) -> None:
-        """Begin a new connection: the counters may have restarted, but the pose continues."""
+        """Begin a new connection.
+
+        The board's counters may have restarted, but the pose continues.
+        """
         self._lost_s = max(self._heard_at_s, self._lost_s)
         self._ticks = None
         self._board.begin()
@@ -129,7 +137,10 @@ class LoisOdometry:
         self._heading_compared = False
 
     def restarted(self, now: float, age_s: float | None) -> None:
-        """Record that the board restarted ``age_s`` ago (None: unknown), and lost its set-point."""
+        """Record that the board has restarted, and so has lost its set-point.
+
+        ``age_s``: time since the restart in s, None if unknown.
+        """
         self._motion.restart(self._heard_at_s if age_s is None else now - age_s)
         self.connect()
         self._lost_s = self._advanced_s = -math.inf
@@ -152,11 +163,14 @@ class LoisOdometry:
             self._may_roll_mps[index] = max(self._may_roll_mps[index], abs(speed_mps))
 
     def halted(self, now: float) -> None:
-        """Record that the board set both set-points to zero by itself, due to its e-stop button."""
+        """Record that the board has set both set-points to zero, because of its e-stop button."""
         self.wrote(SetRpm(0, 0), now)
 
     def stalled(self, wheels: tuple[bool, bool]) -> None:
-        """Assume that stalled ``wheels`` have rested since their reported speeds last changed."""
+        """Record which wheels have stalled.
+
+        They are assumed to have rested since their reported speeds last changed.
+        """
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
                 self._comparison.came_to_rest(index)
@@ -164,9 +178,11 @@ class LoisOdometry:
     # Inbound
 
     def heard_ticks(self, ticks: Ticks, now: float, late_s: float = 0.0) -> list[FusedOdometry]:
-        """Process ticks (0x12) that came ``late_s`` later than usual; return the new estimate.
+        """Process ticks (0x12).
 
-        The first ticks of a connection give an empty list.
+        Return the new estimate, or nothing for the first ticks of a connection.
+
+        ``late_s``: how much later than usual the ticks arrived, in s.
         """
         before, from_s = self._ticks, self._at_s
         if now > max(self._heard_at_s, self._lost_s) + self._unheard_s > -math.inf:
@@ -192,9 +208,11 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """Process odometry (0x20, or odometry that was appended to the ticks, 0x12).
+        """Process odometry: 0x20, or odometry that the board sent directly after ticks (0x12).
 
         The odometry corrects the next predictions and the next estimate.
+
+        ``late_s``: how much later than usual the odometry arrived, in s.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
@@ -221,7 +239,7 @@ class LoisOdometry:
         return self._fused(max(now, self._at_s))
 
     def _keep(self, now: float) -> None:
-        """Store the state after a report, because later predictions may have to be discarded."""
+        """Store the state after a report. It is restored if later predictions prove wrong."""
         self._heard_at_s, self._lost_s = now, -math.inf
         for index, wheel in enumerate(self._motion.wheels):
             speed_mps = abs(self._motion.speed_mps(index))
@@ -231,9 +249,9 @@ class LoisOdometry:
     def _after_silence(self, now: float) -> None:
         """Add the errors that arise during a long silence.
 
-        The present values of 0x20 (odometry) become the reference for later values.
-
-        A stop may not have reached the board, so each wheel may have continued at its speed.
+        A Stop may not have reached the board, so each wheel may have continued at its speed. The
+        next values of 0x20 (odometry) are compared with the present ones, not with those before the
+        silence.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:

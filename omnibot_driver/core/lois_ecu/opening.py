@@ -5,23 +5,23 @@
 All settings are sent in ``ROUNDS`` rounds. The pause between two rounds is longer than the time for
 which the board cannot receive. Two things confirm the settings: the ticks arrive with the requested
 period, and a date arrives. Each round requests one date, because the board sends no dates after a
-boot. The rounds continue until both have arrived. Writing a gain resets the firmware's controller,
-so rounds after the first ``ROUNDS`` wait while the robot drives.
+boot. The rounds continue until both have arrived. Writing a gain resets the firmware's controller.
+So while the robot drives, rounds after the first ``ROUNDS`` wait.
 
-Later, ``ask_date`` requests the date while the GPS works but the date is unknown: the GPS had no
+Later, ``ask_date`` requests the date while the GPS works but the date is unknown. The GPS had no
 date before, or midnight has passed.
 
-On the board, a request for one date ends the periodic sending of dates. So if a period of the date
-is set, the requests end with the first answer, and the following rounds restore the period.
+A request for one date ends the board's periodic sending of dates. So if the user has set a period
+of the date, the requests end with the first answer. The following rounds restore the period.
 
 Other commands (``write``) are also sent while the robot drives. They remain queued after a restart
 of the board and after a change of settings. They are sent at least ``AFTER_MOTION_S`` after a
 motion command.
 
-A board in an unexpected terminal mode, or with an unexpected checksum setting, is silent or seems
-to ignore everything. The driver then sends the line that restores the setting, both with and
-without a checksum. After this line, the driver writes the setting "left short correction", because
-any write of the terminal mode overwrites it.
+A board in an unexpected terminal mode, or with an unexpected checksum setting, is silent or ignores
+commands. The driver then sends the line that restores the mode, once with and once without a
+checksum. Each write of the terminal mode overwrites the setting "left short correction", so the
+driver writes this setting again afterwards.
 """
 
 import math
@@ -54,28 +54,30 @@ AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting.
 
 The board may receive nothing for 13 ms. If it missed the end of a motion command and the beginning
-of the next line, the remaining parts could form another motion command. The reverse order is
-harmless. The value is less than the time between two set-points, so that the other command is sent
-even if motion commands are sent at the highest rate.
+of the next line, the remaining parts could form another motion command. If the motion command comes
+second, such a mixture is harmless.
+
+The time is shorter than the time between two set-points. So the other command is sent even while
+set-points are sent at the highest rate.
 """
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group to the next round of settings, or to the next request for the date. The
-times are used in turn, because after a fixed time the board might always be sending another group,
-and would then receive nothing."""
+"""Times in s from a group to the next round of settings, or to the next request for the date. They
+are used in turn. With a fixed time, the board might be sending another group at each attempt, and
+would then receive nothing."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Fraction of the requested period. The ticks confirm the settings if their period differs from the
-requested one by at most this fraction."""
+"""Largest allowed difference between the measured and the requested period of the ticks, as a
+fraction of the requested period. A larger difference does not confirm the settings."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two requests for an unknown date."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
-"""Time in s without an answer before a recovery; longer than the two seconds of a boot."""
+"""Time in s without an answer before a recovery. It is longer than the two seconds of a boot."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the left short correction in the public firmware after a boot."""
 
 
 class SettingsWriter:
-    """Queue of setting commands; ``due`` returns the lines to write now.
+    """Queue of setting commands. ``due`` returns the lines to write now.
 
     ``points``: the set-points that were sent.
     """
@@ -86,14 +88,14 @@ class SettingsWriter:
         self._in_period = self._answered = False
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
-        """Commands that are not settings, with the time from which each may be sent."""
+        """Commands that are not settings, each with the earliest time at which it may be sent."""
         self._rounds_left = 0
         self._round_at_s = math.inf
         self._date_asked_at_s, self._dates_asked = -math.inf, 0
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
-        """Whether the terminal mode was written, which overwrites the setting "left short
+        """Whether the terminal mode was written. This overwrites the setting "left short
         correction"."""
 
     @property
@@ -113,7 +115,7 @@ class SettingsWriter:
 
     @property
     def wake_at(self) -> float:
-        """Time at which to call ``due`` next; infinity while nothing can be sent."""
+        """Time at which to call ``due`` next. It is infinity while nothing can be sent."""
         return min(self._settings_at, self._others_at)
 
     @property
@@ -153,7 +155,7 @@ class SettingsWriter:
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ask_date(self, now: float) -> None:
-        """Request the date, unless dates come periodically or a request was sent recently."""
+        """Request the date once, unless dates come periodically or a request was sent recently."""
         if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now
@@ -162,7 +164,7 @@ class SettingsWriter:
         self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
     def ticks_came(self, now: float) -> None:
-        """Record that ticks arrived, and compare their measured period with the requested one."""
+        """Record the arrival of ticks, and check whether they arrive with the requested period."""
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
         if len(self._arrivals) < 4:
@@ -175,7 +177,7 @@ class SettingsWriter:
             self._rounds_left, self._round_at_s = 1, now + away_s
 
     def date_came(self) -> None:
-        """Record that a GPS date arrived, which shows that the board obeys requests."""
+        """Record that a date arrived. It shows that the board obeys requests."""
         if self._rounds and not self._answered:
             self._answered = True
             if self._dates_come_periodically:
@@ -202,9 +204,9 @@ class SettingsWriter:
             self._queue.append((now + index * LINE_S, command))
 
     def _turned(self, rounds: int) -> list[Command]:
-        """Return all commands, beginning with a different command in each round.
+        """Return all commands. Each round begins with another command.
 
-        A round may last as long as the board's period from one group to the next. In a fixed order
+        A round may last exactly as long as the time from one group to the next. In a fixed order,
         the board would then miss the same line in each round.
         """
         found = list(self.commands())
@@ -230,7 +232,7 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether a period of the date is set. A request for one date ends the periodic sending."""
+        """Whether the user has set a period of the date, which a request for one date would end."""
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:
@@ -250,6 +252,6 @@ class SettingsWriter:
 
 
 def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
-    """Remove from the queue all commands that are due, and yield them."""
+    """Remove the commands that are due from the queue, and yield them."""
     while queue and now >= queue[0][0]:
         yield queue.popleft()[1]

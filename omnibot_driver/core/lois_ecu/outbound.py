@@ -2,22 +2,26 @@
 
 """Lines that make the robot move and stop, for a board that loses characters and complete lines.
 
-Damage. A line is accepted if it has 14 characters (12 without checksum) from its ``:`` to its line
-feed, and if its checksum is right. The public firmware counts characters from the last ``:``, and
-restarts after the fourteenth. So a line that lost characters is too short. Two lines become one
-only if fourteen characters in a row are lost (twelve without checksum), among them the end of one
-and the beginning of the next. A loss of up to two characters never turns a line into another valid
-line. While the board sends a group, it receives nothing for 13 ms. Set-points are at least 18 ms
-apart, so such a gap does not remove both the end of one line and the beginning of the next.
+Damage does not change a line into another valid line. The firmware accepts a line if it has 14
+characters (12 without checksum) from its ``:`` to its line feed, and if its checksum is right. It
+counts characters from the last ``:``, and restarts after the fourteenth. So a line that lost
+characters is too short. Two lines become one only if fourteen characters in a row are lost (twelve
+without checksum): the end of the first line and the beginning of the second. A loss of up to two
+characters never makes another valid line. While the board sends a group, it receives nothing for 13
+ms. Set-points are at least 18 ms apart, so such a gap does not remove both the end of a line and
+the beginning of the next.
 
-Duty 0/0 and RPM 0/0. In the firmware, both commands remove the power with the controller's next
-step. Duty 0/0 does not change the firmware's RPM target. So after driving forward, the board
+Stop is duty 0/0. In the firmware, duty 0/0 and RPM 0/0 both remove the power with the controller's
+next step. But duty 0/0 keeps the firmware's RPM target. So after a drive forward, the board
 continues to count ticks while the robot rolls out, and the counts can prove the standstill. RPM 0/0
-ends the counting and clears the measured speed. RPM 0/0 must be sent before the wheels turn again:
-the controller still uses the last speed of a wheel at rest, and with a slower set-point in the same
-direction the wheel would never start. So Stop is duty 0/0. The emergency stop is RPM 0/0; while the
-emergency stop is latched, RPM 0/0 and Stop are sent in turn. RPM 0/0 also precedes the first
-set-points after a Stop.
+ends the counting and clears the measured speed.
+
+RPM 0/0 precedes the first set-points after a Stop. The firmware's controller still uses the last
+measured speed of a wheel at rest. Without RPM 0/0, a slower set-point in the same direction would
+never start the wheel.
+
+The emergency stop is RPM 0/0. While the emergency stop is latched, RPM 0/0 and Stop are sent in
+turn.
 """
 
 from typing import Final
@@ -33,17 +37,17 @@ from omnibot_driver.core.lois_ecu.messages import (
 STOP: Final = SetDuty(0, 0)
 EMERGENCY_STOP: Final = SetRpm(0, 0)
 MOST_RPM: Final = 50
-"""Largest allowed set-point in RPM; the firmware does not drive faster."""
+"""Largest allowed set-point in RPM. The firmware does not drive faster."""
 MOST_PERCENT: Final = 100
 CLEARED_TIMES: Final = 3
-"""Number of set-points after a Stop before each of which RPM 0/0 is sent. One RPM 0/0 would be
+"""After a Stop, RPM 0/0 is sent before each of this number of set-points. One RPM 0/0 would be
 enough, but lines may be lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
-    """Return the pair, rounded and limited to ±``most``, and whether it had to be limited.
+    """Return the pair, rounded and limited to ±``most``, and whether a value was beyond this limit.
 
-    If a value exceeds the limit, both values are multiplied by the same factor.
+    If a value is beyond the limit, both values are multiplied by the same factor.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0

@@ -2,9 +2,10 @@
 
 """Plausibility of a complete group of lines: its values, and their change since the last group.
 
-A group that cannot follow the last accepted group is not accepted, but stored. If the next group
-can follow the stored one, the board was restarted or reset, and the next group is accepted. This
-module works on values and arrival times.
+A group that cannot follow the last accepted group is set aside. If the next group can follow the
+group that was set aside, the board was restarted or reset. The next group is then accepted.
+
+This module works on values and arrival times.
 """
 
 import math
@@ -14,8 +15,8 @@ from typing import Final, Generic, Literal, TypeVar
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
 
 FASTEST_TICKS_PER_S: Final = 300.0
-"""Largest plausible rate of ticks: that of a wheel with 60 ticks at five turns per second, six
-times the highest speed of the firmware."""
+"""Largest plausible rate of ticks: that of a wheel with 60 ticks per turn at five turns per second.
+This is six times the highest speed of the firmware."""
 TICKS_MARGIN: Final = 30
 FASTEST_MPS: Final = 5.0
 FASTEST_RADPS: Final = 20.0
@@ -26,14 +27,14 @@ FARTHEST: Final = 1e5
 LATEST_S: Final = 0.3
 """Longest plausible time in s from the sending of a group to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
-"""Lowest plausible rate of the board's clock, as a fraction of real time; the clock stops while the
+"""Lowest plausible rate of the board's clock, as a fraction of real time. The clock stops while the
 board sends."""
 SURE_AFTER: Final = 2
-"""Number of further pairs of ticks in a row that must show the same unit of the clock as a first
-pair, before the driver accepts this unit."""
+"""Number of comparisons that must confirm the unit of the board's clock, after a first comparison
+has shown it. Each comparison is between two successive groups of ticks."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest time in s between two groups of ticks that show the clock's unit. For shorter times,
-arrival times are too inexact."""
+"""Shortest time in s between two groups of ticks that can show the unit of the board's clock. Over
+a shorter time, arrival times are too inexact."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -44,15 +45,15 @@ Group = TypeVar("Group")
 
 
 def wrapped(difference: int) -> int:
-    """Return the difference of two 32-bit counters, wrapped to -2³¹..2³¹-1."""
+    """Return the difference of two 32-bit counters as a signed number, -2³¹..2³¹-1."""
     return (difference + _HALF) % _WRAP - _HALF
 
 
 class Gate(Generic[Group]):
     """Check of each group against the last accepted group.
 
-    ``reachable(before, after, duration_s)`` returns whether the values of ``before`` can have
-    changed to those of ``after`` in this time.
+    ``reachable(before, after, duration_s)``: function that returns whether the values of ``before``
+    can become those of ``after`` within ``duration_s``.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
@@ -61,7 +62,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Return whether to accept ``group``; store it for the comparison with the next group."""
+        """Return whether to accept ``group``. Store it for the comparison with the next group."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):
@@ -77,7 +78,7 @@ class Gate(Generic[Group]):
         return last is not None and self._reachable(last[0], group, now - last[1])
 
     def forget(self) -> None:
-        """Accept the next group without a check, as the first one."""
+        """Forget the last groups, so that the next group is accepted without a check."""
         self._last = self._aside = None
         self._begins_anew()
 
@@ -86,7 +87,7 @@ class Gate(Generic[Group]):
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of ticks, which also learns the unit of the board's clock and then requires it."""
+    """Check of ticks. It also learns the unit of the board's clock, and then requires this unit."""
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)
@@ -94,7 +95,7 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Return whether to accept the ticks; store them, and learn the clock's unit."""
+        """Return whether to accept the ticks. Store them, and learn the clock's unit."""
         last = self._last
         passed = super().passes(group, now)
         if passed and last is not None and now - last[1] > LEARNT_FROM_S:
@@ -142,7 +143,7 @@ def _unit_of(before: Ticks, after: Ticks, duration_s: float) -> ClockUnit | None
 
 
 def odometry_gate() -> Gate[BoardOdometry]:
-    """Return a gate that checks the pose of the board's odometry, but not its velocities."""
+    """Return a gate that checks the pose in the board's odometry, but not the velocities."""
     return Gate(_odometry_follows)
 
 

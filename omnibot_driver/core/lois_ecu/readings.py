@@ -16,7 +16,8 @@ from omnibot_driver.core.readings import DisplacementReading
 class FixReading:
     """GPS position in degrees, north and east positive.
 
-    ``valid``: whether the position is not 0/0, and the GPS has a date.
+    ``valid``: whether the GPS knows its position and the date. It sends 0/0 while it does not know
+    its position.
     """
 
     latitude_deg: float
@@ -26,21 +27,24 @@ class FixReading:
 
 @dataclass(frozen=True, slots=True)
 class TimeReading:
-    """Time of the GPS, in s of UTC since 1970; None while the date is unknown."""
+    """Time of the GPS, in s of UTC since 1970. None while the date is unknown."""
 
     utc_s: int | None
 
 
 @dataclass(frozen=True, slots=True)
 class HeadingReading:
-    """Yaw in ENU, in rad: counter-clockwise from east, -pi..pi."""
+    """Heading of the robot as a yaw in ENU, in rad: counter-clockwise from east, -pi..pi."""
 
     yaw_rad: float
 
 
 @dataclass(frozen=True, slots=True)
 class RecordReading:
-    """A requested record. ``count_s``: time unit of an RPM record in s, None while unknown."""
+    """A record that was requested.
+
+    ``count_s``: time unit of an RPM record in s, None while unknown.
+    """
 
     record: Record
     count_s: float | None
@@ -49,12 +53,15 @@ class RecordReading:
 
 @dataclass(frozen=True, slots=True)
 class RecordComes:
-    """Notice that lines of a requested record are arriving; a complete record takes up to 1.3 s."""
+    """Notice that the first lines of a requested record have arrived.
+
+    The board takes up to 1.3 s to send a record.
+    """
 
 
 @dataclass(frozen=True, slots=True)
 class RecordFailed:
-    """Notice that a requested record will not come; ``reason``: the cause, and what to do."""
+    """Notice that a requested record will not come. ``reason``: the cause, and what to do."""
 
     reason: str
 
@@ -63,7 +70,7 @@ class RecordFailed:
 class TerminalLeft:
     """Notice that a terminal mode has ended.
 
-    During a terminal mode, the driver does not receive presses of the e-stop button.
+    During a terminal mode, the driver does not learn whether the e-stop button is pressed.
     """
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assembly of a requested record from its lines; an incomplete record is discarded.
+"""Assembly of a requested record from its lines. An incomplete record is discarded.
 
 This module works on lines, without characters and times.
 """
@@ -23,11 +23,15 @@ RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 
 @dataclass(slots=True)
 class GroupStatistics:
-    """Counters of groups and records since their creation.
+    """Counters of groups and records since this object was created.
 
-    ``damaged_groups``: discarded groups and records; ``damaged_records``: the records among them;
-    ``implausible``: complete groups whose values are not plausible; ``unknown_lines``: valid lines
-    that are not a report.
+    ``damaged_groups``: discarded groups and records.
+
+    ``damaged_records``: the records among them.
+
+    ``implausible``: complete groups with values that are not plausible.
+
+    ``unknown_lines``: valid lines that are not a report.
     """
 
     damaged_groups: int = 0
@@ -39,8 +43,8 @@ class GroupStatistics:
 class RecordAssembler:
     """Assembler of the lines of a record.
 
-    Call ``add`` for the lines of the record, ``cut_off`` when another message comes, and ``damage``
-    when characters come that are not a line.
+    Call ``add`` for each line of the record, ``cut_off`` when another message comes, and ``damage``
+    when characters come that do not form a line.
     """
 
     def __init__(self, statistics: GroupStatistics) -> None:
@@ -58,12 +62,12 @@ class RecordAssembler:
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
-        """Expect a record with ``left`` and ``right`` samples; discard every other record."""
+        """Expect a record with ``left`` and ``right`` samples. Every other record is discarded."""
         self._expected = kind, left, right
         self._begin(None)
 
     def damage(self) -> None:
-        """Take note that a line of the requested record may have been lost."""
+        """Record that a line of the present record may have been lost."""
         self._damaged = self.begun
 
     def cut_off(self) -> None:
@@ -72,7 +76,7 @@ class RecordAssembler:
             self._drop()
 
     def add(self, code: int, payload: int) -> list[Record]:
-        """Return the record that a line completes, or an empty list."""
+        """Add a line. Return a list with the record that the line completes, or an empty list."""
         if not self.begun:
             self._begin(code)
         self._damaged |= code != self._code
@@ -91,9 +95,9 @@ class RecordAssembler:
         return [record]
 
     def _ends(self, code: int, payload: int) -> bool:
-        """Return whether a line with ``code`` and ``payload`` ends the record.
+        """Return whether this line ends the record.
 
-        The end of a torque record looks like a sample of two motors without current, so such a line
+        The end of a torque record looks like a sample of two motors without current. So such a line
         is accepted as the end only after all samples.
         """
         if code == Code.RECORD_HEADING:

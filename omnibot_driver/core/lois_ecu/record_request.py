@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Request for a record, sent up to three times, because the board may lose lines.
+"""Request for a record. It is sent up to three times, because the board may lose lines.
 
-The repetitions end when the record begins to arrive. Each repetition makes the board restart the
-record, so all repetitions are sent within a short time. This module also detects whether the record
-arrives or fails.
+The repetitions end when the record begins to arrive. Each request makes the board start the record
+again, so all repetitions are sent within a short time.
+
+This module also detects whether the record arrives or fails.
 """
 
 import math
@@ -31,16 +32,18 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which the driver sends the request, counted from the first request. The intervals
-are longer than the longest time in which the board receives nothing, and are not multiples of its
-usual periods."""
+"""Times in s at which the request is sent, counted from the first request. The intervals are longer
+than the time in which the board receives nothing. They are not multiples of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Time unit, in s, of the samples of an RPM record, by the unit of the board's time in 0x12
+"""Time unit, in s, of the samples of an RPM record. The key is the unit of the board's time in 0x12
 (ticks). In the public firmware, both units differ from those in the manual."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
-    """Return a record's command. Raises RequestRefused if the board cannot complete the record."""
+    """Return the command that requests a record.
+
+    Raises RequestRefused if the board cannot complete the record.
+    """
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
             f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
@@ -55,7 +58,7 @@ def command_of(kind: RecordKind, samples: int) -> Command:
 
 
 class RecordRequest:
-    """Request for one record; ``kind``: the kind of the awaited record, or None."""
+    """Request for one record. ``kind``: kind of the expected record, None if none is expected."""
 
     def __init__(self) -> None:
         self.kind: RecordKind | None = None
@@ -64,7 +67,10 @@ class RecordRequest:
         self._said = self._damaged = 0
 
     def begin(self, kind: RecordKind, samples: int, decoder: LoisDecoder) -> None:
-        """Make the next ``due`` return the request for a record; abandon an earlier request."""
+        """Make the next ``due`` return the request for a record.
+
+        An earlier request is abandoned.
+        """
         self._command, self.kind = command_of(kind, samples), kind
         self._begun_s, self._said = math.inf, 0
         decoder.expect_record(kind, samples, 0 if kind is RecordKind.HEADING else samples)
@@ -77,9 +83,12 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings and, if known, the record or the reason why the record will not come.
+        """Return the readings, with the result of the request if it is known now.
 
-        ``prevented``: why the board will not send the record, as a sentence; empty if the record
+        The result is the record, or the reason why the record will not come. While the record
+        arrives, the result is a notice of that.
+
+        ``prevented``: why the board will not send the record, as a sentence. Empty if the record
         may still come.
         """
         if self.kind is None:
@@ -105,7 +114,7 @@ class RecordRequest:
 
     @property
     def wake_at(self) -> float:
-        """Time at which to call ``due`` next; infinity while nothing is left to send."""
+        """Time at which to call ``due`` next. It is infinity while nothing is left to send."""
         if self._command is None or self._said == len(SAID_AFTER_S):
             return math.inf
         if self._begun_s == math.inf:

@@ -2,10 +2,11 @@
 
 """Corrections of one wheel by the speeds that a LOIS ECU reports for it.
 
-A reported speed is that of the wheel's last tick, and the board keeps it until the next tick. It is
-a new measurement only if the wheel has ticked since the last report, if this tick was not delayed
-while the board sent, and if the wheel is not at rest. This module works on reported speeds and the
-motion filter, without messages.
+A reported speed is that of the wheel's last tick, and the board keeps it until the next tick. So it
+is a new measurement only on three conditions: the wheel has ticked since the last report, this tick
+was not delayed while the board sent, and the wheel is not at rest.
+
+This module works on reported speeds and the motion filter, without messages.
 """
 
 import math
@@ -16,42 +17,46 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Assumed age in s of odometry when its last line arrives: a line of 14 characters takes 1.2 ms,
-and the values are from the time at which the first line began."""
+"""Assumed age in s of odometry when its last line arrives. The values are from the time at which
+the first line began, and a line of 14 characters takes 1.2 ms."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, above which the filter assumes that its own estimate is wrong,
-because noise is rarely that large."""
+"""Residual, in standard deviations, above which the filter assumes that its own estimate is wrong.
+Noise is rarely that large."""
 FASTER_RPM: Final = 2.5
-"""Lowest reported speed in RPM that is used: at a lower speed the wheel may have been at rest
+"""Lowest reported speed in RPM that is used. At a lower speed, the wheel may have been at rest
 between the last two ticks."""
 LONGEST_PAUSE_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""Largest plausible change of a wheel's speed: ``JUMP_RPM``, plus ``JUMP_RPM_PER_S`` for each s
-between two reports. A larger change shows a tick that was delayed while the board sent something
-else."""
+"""Largest plausible change of a wheel's speed between two reports: ``JUMP_RPM``, plus
+``JUMP_RPM_PER_S`` for each s between them. A larger change shows a tick that was delayed while the
+board sent something else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""Largest plausible difference from the expected speed, for a wheel with a constant set-point and
-gains that the user set: ``STRAY_RPM``, plus the fraction ``STRAY_PART`` of the expected speed. A
-single speed that differs by more comes from a delayed tick, or from the tick after it."""
+"""Largest plausible difference between a reported and the expected speed: ``STRAY_RPM``, plus the
+fraction ``STRAY_PART`` of the expected speed. It is for a wheel with a constant set-point and gains
+that the user set. A single larger difference comes from a delayed tick, or from the tick after
+it."""
 COASTED_TICKS: Final = 1.0
-"""Number of ticks that are subtracted from the distance of a wheel that has come to rest, in
-addition to the distance since its reported speed last changed. The wheel rolls less far than its
-last reported speed suggests."""
+"""Number of ticks to subtract from the distance of a wheel that has come to rest. The distance
+since its reported speed last changed is subtracted too. The wheel rolls less far than its last
+reported speed suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
 """Fraction of the time between two reports for which an unexpected change of speed is assumed to
 have lasted."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a wheel's controller, as a fraction of ``WINDUP_M``, while the
-reports show no tick of the wheel."""
+"""Largest assumed integral of a wheel's controller while the reports show no tick of the wheel, as
+a fraction of ``WINDUP_M``."""
 
 
 class ReportedSpeed:
-    """Correction of ``motion`` by the reported speed of the wheel with the given index."""
+    """Correction of the motion filter ``motion`` by the reported speed of one wheel.
+
+    ``index``: 0 for the left wheel, 1 for the right wheel.
+    """
 
     def __init__(self, motion: MotionFilter, index: int) -> None:
         self._motion, self._index = motion, index
@@ -62,16 +67,16 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Record the estimated speed for a time ``duration_s`` in which no speed was reported."""
+        """Record the estimated speed, because no speed was reported in the last ``duration_s``."""
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Subtract the distance since the reported speed last changed: the wheel was at rest.
+        """Record that the wheel has come to rest, and subtract the distance that it did not roll.
 
-        If the wheel has not turned since it was commanded to start, subtract the distance since the
-        start.
+        The wheel was at rest since its reported speed last changed. If it has not turned since it
+        was commanded to start, it was at rest since that command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -87,7 +92,10 @@ class ReportedSpeed:
         motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
     def take(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel by a reported speed, which is that of its last tick."""
+        """Correct the wheel by a reported speed, which is that of its last tick.
+
+        ``duration_s``: time since the last report, in s.
+        """
         motion, estimate = self._motion, self._motion.filter
         wheel, base = self._wheel, self._wheel.base
         rpm_mps, tick_m = motion.rpm_mps, motion.tick_m
@@ -124,7 +132,7 @@ class ReportedSpeed:
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
     def _jumps(self, told_rpm: float, duration_s: float) -> bool:
-        """Return whether a speed differs too much from the last one, or from a constant speed."""
+        """Return whether a reported speed is implausible, because a delayed tick caused it."""
         motion, wheel = self._motion, self._wheel
         change_rpm = abs(told_rpm - abs(self._told) / motion.rpm_mps)
         if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:
@@ -155,7 +163,7 @@ class ReportedSpeed:
             motion.doubt(self._index, resting.chance * abs(speed) * duration_s)
 
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel's estimate by ``speed_mps``, its mean speed over the last tick."""
+        """Correct the wheel's estimate by its mean speed between the last two ticks."""
         motion, estimate, base = self._motion, self._motion.filter, self._wheel.base
         push = estimate.mean[base + PUSH]
         lag_s = min(motion.tick_m / (2 * abs(speed_mps)) + ODOMETRY_AGE_S, LONGEST_LAG_S)

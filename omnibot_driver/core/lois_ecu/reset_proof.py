@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Proof, by the tick counters, that the board has obeyed a reset, and the limits of this proof.
+"""Proof, by the tick counts, that the board has obeyed a reset.
 
-A count near zero proves nothing by itself: the count may have been near zero before, or a wheel may
-have rolled back. This module works on counts and times.
+A count near zero proves nothing by itself. The count may have been near zero before the reset, or a
+wheel may have rolled back.
+
+This module works on counts and times.
 """
 
 import math
@@ -14,20 +16,24 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Largest assumed number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""Smallest number of ticks that no wheel can roll between a reset and the next counts. A fall of
-the counts by this number proves the reset."""
+"""Number of ticks that no wheel can roll between a reset and the next counts. If the counts fall by
+this number, the board has obeyed the reset."""
 STEADY_TICKS: Final = 3
-"""Smallest count of a resting wheel that backlash of the gears cannot change to zero."""
+"""Smallest count that proves a reset by changing to zero while the wheels are at rest. Backlash of
+the gears can change only smaller counts to zero."""
 UNPROVED_S: Final = 2.5
-"""Longest time in s to wait for a proof, because there may never be one; meanwhile the reset is
-repeated."""
+"""Longest time in s to wait for a proof. There may never be one, for example if the counts were
+zero before. Meanwhile the reset is repeated."""
 
 
 class ResetProof:
     """Search for a proof that the board has obeyed a reset.
 
-    ``before``: counts when the reset was sent, or None if unknown. ``steady``: whether the counts
-    had not changed for some time. ``remark``: what was not proved, as a sentence.
+    ``before``: counts when the reset was sent, None if unknown.
+
+    ``steady``: whether these counts had not changed for some time.
+
+    ``remark``: sentence on what was not proved.
     """
 
     def __init__(self, before: Ticks | None, *, steady: bool) -> None:
@@ -36,10 +42,12 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Record that the reset is repeated; replace ``before`` if the present counts prove more.
+        """Record that the reset is repeated.
 
-        Counts of wheels at rest prove more than counts of rolling wheels. If the wheels still roll,
-        the present counts prove no more than the first counts.
+        Replace ``before`` if the present counts can prove more.
+
+        Counts of wheels at rest can prove more than counts of rolling wheels. While the wheels
+        still roll, the present counts can prove no more than the first counts.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
@@ -48,8 +56,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the reset now.
 
-        The reset can be reported if the counts are near zero and prove the reset, or if they are
-        near zero and ``UNPROVED_S`` has passed.
+        The counts must be near zero. In addition, they must prove the reset, or ``UNPROVED_S`` must
+        have passed.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks
@@ -68,7 +76,7 @@ class ResetProof:
 
     @property
     def remark(self) -> str:
-        """Sentence on what was not proved; empty if the counts prove the reset."""
+        """Sentence on what was not proved. Empty if the counts prove the reset."""
         if self._proved:
             return ""
         if self._before is None:

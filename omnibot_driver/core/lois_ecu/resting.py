@@ -3,9 +3,11 @@
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
 For a wheel at rest, the public firmware keeps reporting the speed of the last tick. A wheel slows
-down before it comes to rest, so this speed is usually 5 to 17 RPM, and is then repeated. The speed
-of a wheel that rolls steadily is repeated too, but has not fallen just before. This module works on
-the speeds that the board reports, one for each group, and on the time between them.
+down before it comes to rest, so this speed is usually 5 to 17 RPM. The speed of a wheel that rolls
+steadily is repeated too. But it has not fallen just before.
+
+This module works on the speeds that the board reports, one for each group, and on the time between
+them.
 """
 
 from collections import deque
@@ -15,7 +17,7 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
 """The last reported speed of a wheel that came to rest lies between ``SLOWEST_RPM`` and
-``FASTEST_RPM``. A lower speed is that of a starting wheel, and a faster wheel ticks once more
+``FASTEST_RPM``. A wheel with a lower speed is starting. A wheel with a higher speed ticks once more
 before it is at rest."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
@@ -23,28 +25,40 @@ FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""Rate of this module's clock, as a fraction of real time, while the board reports no speeds."""
+"""While the board reports no speeds, this module counts only this fraction of the time."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that the wheel is at rest, by the number of repetitions of its speed. ``FAST``:
-after a fall to a speed above ``FAST_RPM``. ``FAR``: after a fall by ``FELL_FAR_RPM``. ``LONE``:
-after a fall by ``FELL_FAR_RPM`` from a speed that was reported only once. ``NEAR``: after a smaller
-fall. ``TUNED``: after any of these falls, with gains that the user set. With such gains a wheel
-rarely comes to rest without a Stop, and often rolls at a steady speed after an overshoot. The
-probabilities were counted on the public firmware."""
+"""Probabilities that the wheel is at rest. The index is how often its speed was repeated.
+
+``FAST``: after a fall to a speed above ``FAST_RPM``.
+
+``FAR``: after a fall by ``FELL_FAR_RPM``.
+
+``LONE``: after a fall by ``FELL_FAR_RPM`` from a speed that was reported only once.
+
+``NEAR``: after a smaller fall.
+
+``TUNED``: after any of these falls, with gains that the user set. With such gains, a wheel rarely
+comes to rest without a Stop, and often rolls at a steady speed after an overshoot.
+
+The probabilities were counted on the public firmware.
+"""
 
 
 class RestingWheel:
-    """Estimator of the probability ``chance`` (0..1) that a wheel is at rest."""
+    """Estimator of the probability that a wheel is at rest.
+
+    ``chance``: the probability, 0..1.
+    """
 
     def __init__(self) -> None:
         self.forget()
 
     def forget(self) -> None:
-        """Forget all speeds; treat the next speed as the first."""
+        """Forget all speeds. The next speed is treated as the first."""
         self._lately: deque[tuple[float, float]] = deque(maxlen=64)
         self._told_rpm = 0.0
         self._fell_at_s = -SWINGS_S
@@ -60,12 +74,14 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Record an estimated speed for the last ``since_s``, in which no speed was reported."""
+        """Record an estimated speed, because no speed was reported in the last ``since_s``."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
     def tell(self, rpm: float, since_s: float, *, tuned: bool = False) -> None:
-        """Process a reported speed, without its sign, that came ``since_s`` after the one before.
+        """Process a reported speed, without its sign.
+
+        ``since_s``: time since the speed before was reported, in s.
 
         ``tuned``: whether the controller has gains that the user set.
         """
@@ -88,7 +104,7 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the probabilities of rest by number of repetitions; empty if the wheel rolls."""
+        """Return the probabilities of rest that apply now. Empty if the wheel surely rolls."""
         if not SLOWEST_RPM < rpm < FASTEST_RPM:
             return ()
         if rpm > FAST_RPM:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Set-points for a LOIS ECU: the encoding of motions, and a memory of what was sent last.
+"""Set-points for a LOIS ECU: how motions are encoded, and what was sent last.
 
 ``outbound`` explains the choice of set-points. This module works on commands, times and written
 bytes.
@@ -17,17 +17,20 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop to RPM 0/0, which ends the counting of ticks."""
+"""Time in s from a Stop to RPM 0/0. RPM 0/0 ends the counting of ticks."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
 class SetPoints:
-    """Encoder of set-points, with a memory of the set-points that were sent.
+    """Encoder of set-points. It also remembers which set-points were sent.
 
-    ``saturated``: number of commands that were slowed because they were too fast. ``stopped_at_s``:
-    time since which only zeros were sent, infinite while the robot is driven. ``stood``: whether
-    the robot was seen at rest since ``stopped_at_s``. ``moved_at_s``: time at which a motion
-    command was last sent.
+    ``saturated``: number of commands that were slowed because they were too fast.
+
+    ``stopped_at_s``: time since which only zeros were sent; infinite while the robot is driven.
+
+    ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
+
+    ``moved_at_s``: time at which a motion command was last sent.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -36,7 +39,7 @@ class SetPoints:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection: forget the set-points that were sent."""
+        """Begin a new connection, and forget the set-points that were sent."""
         self._said: SetRpm | SetDuty | None = None
         self.stopped_at_s = math.inf
         self.moved_at_s = -math.inf
@@ -49,7 +52,7 @@ class SetPoints:
         return self._said is not None and _moves(self._said)
 
     def wrote(self, data: bytes, now: float) -> list[SetRpm | SetDuty]:
-        """Record that ``data`` was sent to the board; return its set-points."""
+        """Record that ``data`` was sent to the board. Return the set-points in it."""
         said = outbound.set_points(data, with_sum=self.settings.with_sum)
         for command in said:
             if _moves(command):
@@ -70,16 +73,16 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` put RPM 0/0 before the next set-points once more."""
+        """Make ``wheels`` put RPM 0/0 before the next set-points again."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
     def clears_at(self) -> float:
-        """Time at which to send RPM 0/0 after a Stop; infinity if RPM 0/0 is not needed."""
+        """Time at which to send RPM 0/0 after a Stop. It is infinity if RPM 0/0 is not needed."""
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now; if so, treat it as sent."""
+        """Return whether to send RPM 0/0 now. If so, RPM 0/0 is treated as sent."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
@@ -88,7 +91,10 @@ class SetPoints:
     # Motions
 
     def wheels(self, rates_radps: Sequence[float]) -> list[SetRpm | SetDuty]:
-        """Encode the rates of the left and right wheel in rad/s; Stop if both round to zero."""
+        """Return the set-points that command the rates of the left and right wheel, in rad/s.
+
+        If both rates round to zero, return Stop.
+        """
         settings = self.settings
         left, right = rates_radps
         if settings.drive_mode == "duty":
@@ -125,14 +131,17 @@ class SetPoints:
 
     @property
     def kinematics(self) -> DifferentialKinematics:
-        """Kinematics of the robot's own left and right wheel."""
+        """Kinematics of the robot, with its own left and right wheel."""
         settings = self.settings
         return DifferentialKinematics(
             wheel_radius_m=settings.wheel_radius_m, track_m=settings.track_m
         )
 
     def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
-        """Convert a pair to or from the board's order: swap its values if the board is inverted."""
+        """Swap the two values if the board is inverted.
+
+        This converts a pair to or from the board's order.
+        """
         return (pair[1], pair[0]) if self.settings.inverted else pair
 
 

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of a LOIS ECU and its robot that the user must give: the board does not report them."""
+"""Settings of a LOIS ECU and its robot.
+
+The user must give them, because the board does not report them.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,8 +17,8 @@ DriveMode = Literal["rpm", "duty"]
 USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
     {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 )
-"""Periods in ms that the odometry needs. With shorter periods the board would send for a larger
-part of the time, and it cannot receive while it sends."""
+"""Periods in ms that the odometry needs. With shorter periods, the board would send for a larger
+part of the time. While it sends, it cannot receive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,15 +26,27 @@ class LoisEcuSettings:
     """Settings of a LOIS ECU and its robot.
 
     ``inverted``: whether the board's left wheel is the robot's right wheel, and vice versa.
-    ``drive_mode``: whether ``cmd_vel`` is sent as RPM or as duty. ``duty_scale``: percent of duty
-    for each m/s of a rim; ``max_duty``: largest percentage for a motor. ``low_pass``: 0..1, the
-    fraction of a change of the set-point that each step of the speed controller applies; until
-    ``low_pass`` is written to the board, the wheels never turn in RPM mode. ``written``: further
-    settings that the user wants on the board. ``periods_ms``: periods of the messages that the
-    board sends periodically; the periods of other messages are not changed. ``with_sum``: whether
-    lines to the board have a checksum. ``declination_rad``: declination of magnetic north, east
-    positive. ``odom_rate_hz``: rate at which the odometry is published; between two groups it is
-    predicted.
+
+    ``drive_mode``: whether ``cmd_vel`` is sent as RPM or as duty.
+
+    ``max_duty``: largest duty of a motor, in percent.
+
+    ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
+
+    ``low_pass``: 0..1, the fraction of a change of the set-point that each step of the speed
+    controller applies. Until it is written to the board, the wheels never turn in RPM mode.
+
+    ``written``: further settings that the user wants on the board.
+
+    ``periods_ms``: periods of the messages that the board sends periodically. The periods of other
+    messages are not changed.
+
+    ``with_sum``: whether lines to the board have a checksum.
+
+    ``declination_rad``: declination of magnetic north, east positive.
+
+    ``odom_rate_hz``: rate at which the odometry is published. It is predicted between two groups of
+    ticks.
     """
 
     wheel_radius_m: float = 0.13

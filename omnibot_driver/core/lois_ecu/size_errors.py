@@ -2,10 +2,11 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-Each of these errors is constant during a drive, so the yaw error grows, and soon the pose error is
-not proportional to its cause. Therefore the drive is computed again with each error, once positive
-and once negative. The spread of the resulting poses is the covariance. This module works on
-distances of the wheels.
+Each of these errors is constant during a drive. So the yaw error grows, and the pose error is soon
+not proportional to its cause. Therefore the same drive is computed with each error, once positive
+and once negative. The spread of the resulting poses is the covariance.
+
+This module works on distances of the wheels.
 """
 
 import math
@@ -24,7 +25,7 @@ fraction of both wheels' distances that is lost by slip."""
 
 
 class SizeErrors:
-    """Copies of one drive, each computed with an error of a wheel's size or with slip."""
+    """Copies of one drive. Each is computed with another error: of a wheel's size, or by slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)
@@ -41,7 +42,11 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Continue all drives by the given distances; a negative ``track_m`` reverses the turns."""
+        """Continue all copies of the drive by the given distances of the wheels.
+
+        ``track_m``: track width; negative if the wheels are swapped, so that the robot turns the
+        other way.
+        """
         self._believed = _moved(self._believed, left_m, right_m, track_m)
         self._places = [
             _moved(place, left * left_m, right * right_m, track_m)
@@ -51,7 +56,7 @@ class SizeErrors:
     def covariance(self, yaw_rad: float) -> Covariance:
         """Return the covariance for a pose with the yaw ``yaw_rad``.
 
-        The frame of the pose may be rotated relative to the frame of the drives.
+        The pose may be in another frame than the drives, rotated by a constant angle.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

@@ -2,22 +2,22 @@
 
 """Kalman filter of a few states, in plain numbers, without a matrix library.
 
-Most rows of the transition matrix are those of the identity matrix, and a measurement depends on
-one to three states. Rows and measurements are given as their non-zero terms, so that a step takes
-little time.
+Most rows of the transition matrix are those of the identity matrix. A measurement depends on one to
+three states. Rows and measurements are given as their non-zero terms, so that a step takes little
+time.
 """
 
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 Terms = Sequence[tuple[int, float]]
-"""Pairs of numbers: the index of a state, and the factor by which this state is multiplied."""
+"""Terms of a weighted sum of states: the index of each state and its factor."""
 
 LEAST_VARIANCE: Final = 1e-12
 
 
 class SparseFilter:
-    """Kalman filter; ``mean`` and the symmetric ``covariance`` of all states begin at zero."""
+    """Kalman filter. ``mean`` and the symmetric ``covariance`` of all states begin at zero."""
 
     def __init__(self, states: int) -> None:
         self.mean = [0.0] * states
@@ -35,7 +35,11 @@ class SparseFilter:
         self.covariance = whole
 
     def disturb(self, terms: Terms, variance: float) -> None:
-        """Add an error with the given variance; ``terms``: effect of the error on the states."""
+        """Add an error with the given variance.
+
+        ``terms``: the states that the error changes, each with the factor by which the error acts
+        on it.
+        """
         covariance = self.covariance
         for i, a in terms:
             row = covariance[i]
@@ -43,7 +47,7 @@ class SparseFilter:
                 row[j] += variance * a * b
 
     def forget(self, state: int, mean: float, variance: float) -> None:
-        """Set a state to the given mean and variance, uncorrelated with all other states."""
+        """Set a state to the given mean and variance, independent of all other states."""
         covariance = self.covariance
         for row in covariance:
             row[state] = 0.0
@@ -52,14 +56,16 @@ class SparseFilter:
         self.mean[state] = mean
 
     def variance_of(self, terms: Terms) -> float:
-        """Return the variance of the sum of states, weighted by ``terms``."""
+        """Return the variance of a weighted sum of states."""
         covariance = self.covariance
         return max(sum(a * b * covariance[i][j] for i, a in terms for j, b in terms), 0.0)
 
     def measure(self, terms: Terms, residual: float, variance: float) -> None:
-        """Correct all states by a measurement of the sum of states, weighted by ``terms``.
+        """Correct all states by a measurement of a weighted sum of states.
 
-        ``residual``: measured minus expected value. ``variance``: variance of the measurement.
+        ``residual``: measured minus expected value.
+
+        ``variance``: variance of the measurement.
         """
         covariance = self.covariance
         along = [sum(factor * row[state] for state, factor in terms) for row in covariance]

@@ -5,14 +5,16 @@
 The public firmware's controller continues to use the last measured speed of a wheel at rest. If
 this speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
 
-Ticks show whether a wheel turns forward, and 0x20 (odometry) shows whether it turns backward. If a
-wheel that should turn backward is at rest, there are two cases. While the other wheel is also at
-rest, the pose in 0x20 does not change. While the other wheel turns, 0x20 repeats the same speed for
-the wheel at rest. A wheel that rolls steadily also repeats a speed, but this speed is not far above
-its set-point: far above it the controller gives no power, so the wheel would slow down. There are
-two exceptions. A feed-forward gives power at any speed. A saturated controller may keep full power
-until RPM 0/0 restarts it; the wheel is then faster than any wheel that comes to rest. This module
-works on set-points, reports and times.
+Ticks show whether a wheel turns forward. For a wheel that should turn backward, 0x20 (odometry)
+shows whether it is at rest. While the other wheel is at rest too, the pose in 0x20 does not change.
+While the other wheel turns, 0x20 repeats the same speed for the wheel at rest.
+
+A wheel that rolls steadily also repeats a speed. But this speed is not far above its set-point: far
+above it, the controller gives no power, so the wheel would slow down. There are two exceptions. A
+feed-forward gives power at any speed. A saturated controller may keep full power until RPM 0/0
+restarts it; the wheel is then faster than any wheel that comes to rest.
+
+This module works on set-points, reports and times.
 """
 
 import math
@@ -24,18 +26,18 @@ from omnibot_driver.core.lois_ecu.resting import FASTEST_RPM
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 STALLED_S: Final = 2.0
-"""Time in s without a sign of motion after which a wheel is regarded as stalled; with the
-firmware's own gains a wheel starts in half of this time."""
+"""Time in s without a sign of motion after which a wheel is regarded as stalled. With the
+firmware's own gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
 """``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. A repeated
-speed beyond both limits is the last speed of a wheel at rest, because a wheel that rolls backward
-exceeds its set-point by at most 10 % and one RPM."""
+speed beyond both limits is the last speed of a wheel at rest. A wheel that rolls backward exceeds
+its set-point by at most 10 % and one RPM."""
 UNLIKE: Final = 1.15
-"""Factor by which two wheels that roll backward may differ. The ratio of speed to set-point of one
-wheel is assumed to be at most this factor times that of the other wheel."""
+"""Largest assumed difference between two wheels that roll backward, as a factor. It compares the
+ratio of speed to set-point of one wheel with that of the other."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 """Smallest number of groups without a sign of motion after which a wheel is regarded as stalled. On
@@ -43,10 +45,12 @@ a bad line few groups arrive, so the time ``STALLED_S`` alone is not enough."""
 
 
 class StallWatch:
-    """Detector of stalled wheels; ``stalled`` reports such a wheel once in each ``STALLED_S``.
+    """Detector of stalled wheels. ``stalled`` reports a stalled wheel once in each ``STALLED_S``.
 
-    ``settings`` may be replaced at any time. ``saturated``: for each wheel, whether its controller
-    may give full power; the wheel then rolls, although its reported speed does not change.
+    ``settings`` may be replaced at any time.
+
+    ``saturated``: for each wheel, whether its controller may give full power. The wheel then rolls,
+    although its reported speed does not change.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -80,7 +84,12 @@ class StallWatch:
         now: float,
         resting: tuple[bool, bool] = (False, False),
     ) -> None:
-        """Process a report: ticks show a wheel's forward motion, odometry its backward motion."""
+        """Process a report.
+
+        Ticks show a wheel's forward motion, and odometry shows its backward motion.
+
+        ``resting``: which wheels the motion filter assumes to be at rest.
+        """
         if isinstance(report, BoardOdometry):
             pose = (report.x_m, report.y_m, report.yaw_rad)
             told = rim_speeds(report, self.settings.track_m)
@@ -103,7 +112,7 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return which commanded wheels have not turned for ``STALLED_S``.
 
-        If there are any, the timing of both wheels is restarted.
+        If a wheel is reported, the timing of both wheels begins again.
         """
         left, right = (
             now - seen_at >= STALLED_S and quiet >= AT_LEAST
@@ -117,8 +126,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        The speed is old if it repeats, and if the other wheel's speed has changed or the repeated
-        speed is far above the set-point.
+        A repeated speed is old if the other wheel's speed has changed, or if the repeated speed is
+        far above the set-point.
         """
         if told is None or self._told is None:
             return False
@@ -142,7 +151,7 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether a wheel gets no power because its reported speed reaches its set-point."""
+        """Return whether a wheel has no power, as its reported speed reaches its set-point."""
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 

@@ -2,11 +2,14 @@
 
 """Changes of the terminal mode, and the standstill that is needed before a change of any mode.
 
-In a terminal mode the board forwards a sensor's lines and sends no messages of its own. It still
-obeys set-points, but does not report motion, and the public firmware does not report presses of the
-e-stop button. So the robot is stopped first, and is not driven until the board's own messages
-arrive again. A mode is written repeatedly until the received data shows that the board obeys. This
-module works on modes and times.
+In a terminal mode, the board forwards a sensor's lines and sends no messages of its own. It still
+obeys set-points, but does not report motion. The public firmware does not report presses of the
+e-stop button either. So the robot is stopped first, and is not driven until the board's own
+messages arrive again.
+
+A mode is written repeatedly until the received data shows that the board obeys.
+
+This module works on modes and times.
 """
 
 import math
@@ -24,36 +27,38 @@ arrive."""
 
 
 class ModeChange:
-    """Changes of the terminal mode.
+    """Changes of the terminal mode. ``want`` and ``stop_first`` may be called at any time.
 
-    ``reason``: why the robot may not be driven now, as a sentence; empty if the robot may be
-    driven. ``wanted``: the requested mode. ``want`` and ``stop_first`` may be called at any time.
+    ``wanted``: the requested mode.
     """
 
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The sensor's mode that was written to the board; None once the board's own messages
-        arrive again."""
+        """The sensor's mode that was written to the board. None after the board's own messages have
+        arrived again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None
         self.left = False
-        """Whether a terminal mode has ended; the code that reads this attribute clears it."""
+        """Whether a terminal mode has ended. The code that reads this attribute clears it."""
 
     def connect(self) -> None:
-        """Begin a new connection: the board may be in any mode."""
+        """Begin a new connection. The board may be in any mode."""
         self._told = None
 
     def want(self, mode: TerminalMode) -> None:
-        """Request a mode; a sensor's mode begins when the robot is at rest."""
+        """Request a mode. A sensor's mode begins when the robot is at rest."""
         if mode in SENSORS and mode is not self.wanted:
             self.stop_first(f"terminal_mode is changing to {mode.name.lower()}")
         self.wanted = mode
         self._again_at_s = -math.inf
 
     def stop_first(self, why: str) -> None:
-        """Stop the robot, and refuse motion until it is at rest; ``reason`` begins with ``why``."""
+        """Stop the robot, and refuse motion until it is at rest.
+
+        ``reason`` then begins with ``why``.
+        """
         self._stopping, self._stopping_since_s = why, None
 
     @property
@@ -63,12 +68,15 @@ class ModeChange:
 
     @property
     def sensor_wanted(self) -> bool:
-        """Whether a sensor's mode is wanted, in which the board sends none of its own messages."""
+        """Whether a sensor's mode is requested.
+
+        In such a mode, the board sends none of its own messages.
+        """
         return self.wanted in SENSORS
 
     @property
     def reason(self) -> str:
-        """Reason why motion is refused; empty if motion is allowed."""
+        """Reason why motion is refused, as a sentence. Empty if motion is allowed."""
         if self.sensor_wanted:
             return (
                 f"terminal_mode is {self.wanted.name.lower()}, and the board reports no motion;"
@@ -80,14 +88,17 @@ class ModeChange:
 
     @property
     def wake_at(self) -> float:
-        """The time at which ``due`` must be called again."""
+        """Time at which to call ``stops`` and ``due`` next."""
         if self._stopping:
             return -math.inf if self._stopping_since_s is None else self._again_at_s
         waits = self.sensor_wanted or self._told is not None
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool) -> bool:
-        """Return whether to send Stop now, because the robot must be at rest before a change."""
+        """Return whether to send Stop now. The robot must be at rest before a mode is changed.
+
+        ``stands``: whether the robot is seen at rest.
+        """
         if not self._stopping:
             return False
         if self._stopping_since_s is None:
@@ -100,7 +111,10 @@ class ModeChange:
         return True
 
     def due(self, now: float, *, settled: bool) -> TerminalMode | None:
-        """Return the mode to write now, or None. ``settled``: whether all settings were sent."""
+        """Return the mode to write now, or None.
+
+        ``settled``: whether all settings were sent.
+        """
         if self._stopping or now < self._again_at_s:
             return None
         if self.sensor_wanted:
@@ -115,7 +129,10 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """Note that the board sent its own message: its terminal mode has ended or not begun."""
+        """Record that the board sent a message of its own.
+
+        So its terminal mode has ended or not begun.
+        """
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:

@@ -3,7 +3,9 @@
 """Translation of a LOIS ECU's reports to readings in SI units.
 
 This module also detects a restart of the board: the ticks are near zero again, or the board's clock
-has gone back. The module works on reports, without lines.
+has gone back.
+
+This module works on reports, without lines.
 """
 
 import math
@@ -36,20 +38,21 @@ from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
 UNKNOWN_FROM_YEAR: Final = 38
-"""Year of the century from which the date of the GPS receiver is regarded as unknown."""
+"""Year of the century. A date in this year or later shows that the GPS receiver does not know the
+date."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """``RESTARTED_TICKS``, ``RESTARTED_TICKS_PER_S``: largest number of ticks by which wheels can roll
-back between two groups, as a constant plus a number for each s. If the counts fall towards zero by
-more, the board has restarted."""
+back between two groups. It is a constant plus a number for each s between the groups. If the counts
+fall towards zero by more, the board has restarted."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which the wheels are assumed to have rolled back, if the board's clock does
-not confirm the time since the last ticks. (The decoder has then forgotten the clock's unit.)"""
+"""Longest time in s for which the wheels are assumed to have rolled back if the board's clock does
+not confirm the time since the last ticks. The decoder has then forgotten the unit of this clock."""
 
 
 class Translation:
-    """Translation of reports; ``settings`` may be replaced at any time.
+    """Translation of reports. ``settings`` may be replaced at any time.
 
     ``restarts``: number of restarts of the board that the driver has noticed.
     """
@@ -61,7 +64,7 @@ class Translation:
         self.restarts = 0
         self.last_ticks_at_s = -math.inf
         self.ticked_at_s = -math.inf
-        """Time in s at which ticks were last seen to change."""
+        """Time in s at which the counts of ticks were last seen to change."""
         self._connect()
 
     @property
@@ -82,7 +85,7 @@ class Translation:
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._dated = False
-        """Whether the GPS has a date; this stays True when midnight makes ``_date`` unknown."""
+        """Whether the GPS knows the date. It stays True when midnight makes ``_date`` unknown."""
         self._clock = (0, 0, 0)
         self._gps_works = False
 
@@ -99,7 +102,7 @@ class Translation:
         clock_unit: ClockUnit | None,
         now: float,
     ) -> list[LoisReading]:
-        """Return the readings of the reports, in order; ``times``: when each report arrived."""
+        """Return the readings of the reports, in order. ``times``: when each report arrived."""
         self._gps_works = False
         found: list[LoisReading] = []
         for at, report in zip(times, reports, strict=True):
@@ -176,12 +179,12 @@ class Translation:
 
     @property
     def needs_date(self) -> bool:
-        """Whether the GPS sends a position or time while the date is unknown."""
+        """Whether the date is unknown although the GPS sends a position or a time."""
         return self._gps_works and self._date is None
 
     @property
     def ticks(self) -> Ticks | None:
-        """Last ticks; None before the first ticks of a connection."""
+        """Last ticks. None before the first ticks of a connection."""
         return self._ticks
 
     def _displaced(self, estimates: list[FusedOdometry]) -> list[LoisReading]:
@@ -222,14 +225,15 @@ class Translation:
 def _is_date(date: GpsDate) -> bool:
     """Return whether the GPS receiver knows the date.
 
-    Until the receiver knows the date, it sends zeros, or the beginning of its calendar, such as
-    1980. Seconds from 2038 on do not fit into a ROS time.
+    While the receiver does not know the date, it sends zeros, or the beginning of its calendar,
+    such as 1980. Dates from 2038 on are not accepted, because their seconds do not fit into a ROS
+    time.
     """
     return bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
 
 
 def _days_since_1970(year: int, month: int, day: int) -> int:
-    """Return the days since 1970 in the Gregorian calendar.
+    """Return the number of days since 1970 in the Gregorian calendar.
 
     The computation uses years that begin in March, so that the leap day is the last day of a year.
     """

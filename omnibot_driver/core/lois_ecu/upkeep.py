@@ -2,9 +2,10 @@
 
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-The schedule covers settings, the terminal mode, requests for records, RPM 0/0 after a Stop, and the
-recovery of a board that is silent or ignores commands. This module combines the classes for these
-tasks. It must not know what the board sends.
+The schedule covers settings, the terminal mode, requests for records, and RPM 0/0 after a Stop. It
+also covers the recovery of a board that is silent or ignores commands.
+
+This module combines the classes for these tasks. It does not know what the board sends.
 """
 
 import math
@@ -19,7 +20,9 @@ from omnibot_driver.core.lois_ecu.terminal import ModeChange
 
 
 class Upkeep:
-    """Scheduler of settings, modes, records and recovery; ``due`` returns what to write now.
+    """Scheduler of settings, modes, records and recovery. ``due`` returns what to write now.
+
+    ``opened``: whether the writing of the present settings has begun.
 
     ``heard_at_s``: when valid lines of the board last arrived.
     """
@@ -32,14 +35,17 @@ class Upkeep:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection; the settings are written again."""
+        """Begin a new connection. The settings are then written to the board again."""
         self.opened = False
         self.change.connect()
         self.request = RecordRequest()
         self.heard_at_s = self._recovered_at_s = -math.inf
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Use new settings: write the changed ones; a change of mode first stops the robot."""
+        """Use new settings. Changed settings are written to the board.
+
+        A change of a mode first stops the robot.
+        """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
             self.change.stop_first(f"drive_mode is changing to {settings.drive_mode}")
@@ -51,7 +57,7 @@ class Upkeep:
             self.opened = False
 
     def due(self, now: float, *, stands: bool) -> bytes:
-        """Return the bytes to write now; called at ``wake_at``.
+        """Return the bytes to write now. Called at the time ``wake_at``.
 
         ``stands``: whether the robot is seen at rest.
         """
@@ -74,7 +80,7 @@ class Upkeep:
 
     @property
     def wake_at(self) -> float:
-        """Time at which ``due`` must be called again."""
+        """Time at which to call ``due`` next."""
         if not self.opened:
             return -math.inf
         return min(

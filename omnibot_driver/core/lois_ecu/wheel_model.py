@@ -3,7 +3,9 @@
 """Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
 The public firmware stores an RPM target for each wheel. The sign of the target decides whether
-ticks are counted, and is the sign of the measured speed. This module works on set-points and times.
+ticks are counted. The measured speed has the same sign.
+
+This module works on set-points and times.
 """
 
 import math
@@ -15,8 +17,8 @@ HEARD_S: Final = 0.008
 """Assumed time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""Period of the speed controller in s: ``STEP_S`` in the manual, ``FIRMWARE_STEP_S`` in the public
-firmware."""
+"""``STEP_S``, ``FIRMWARE_STEP_S``: period of the speed controller in s, according to the manual and
+in the public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
@@ -25,7 +27,7 @@ CommandKind = Literal["rpm", "duty"]
 class _Effect:
     """Effect that a command has on a wheel at the time ``at_s``.
 
-    ``halts``: whether the firmware sets its RPM target to zero; if not, it carries out the command
+    ``halts``: whether the firmware sets its RPM target to zero. If not, it carries out the command
     with ``kind`` and ``speed_mps``.
     """
 
@@ -36,10 +38,12 @@ class _Effect:
 
 
 class WheelModel:
-    """The commands of one wheel; ``carry_out`` makes them take effect. Speeds are rim speeds.
+    """The commands of one wheel. Speeds are those of the wheel's rim.
 
-    ``kind``, ``target_mps``: the motor's command. ``hidden_mps``: the firmware's RPM target; a duty
-    command does not change this target, but each tick at a negative duty lowers it.
+    ``kind``, ``target_mps``: the command that the motor follows now.
+
+    ``hidden_mps``: the firmware's RPM target. A duty command does not change it at once, but each
+    tick at a negative duty lowers it.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -47,8 +51,8 @@ class WheelModel:
         self.target_mps = 0.0
         self.hidden_mps = 0.0
         self.step_s = step_s
-        """Period of the controller in s. A command takes effect with the controller's next step,
-        which comes after half a period on average."""
+        """Period of the speed controller in s. A command takes effect with the controller's next
+        step, which comes after half a period on average."""
         self._effects: deque[_Effect] = deque(maxlen=128)
         self._heard: tuple[CommandKind, float] = ("rpm", 0.0)
         self._rpm_mps = 0.0
@@ -60,7 +64,10 @@ class WheelModel:
 
     @property
     def measured_sign(self) -> int:
-        """Sign that the public firmware gives this wheel's speed; 0 if no speed is measured."""
+        """Sign of the speed that the public firmware measures for this wheel.
+
+        0 if it measures none.
+        """
         return (self.hidden_mps > 0.0) - (self.hidden_mps < 0.0)
 
     @property
@@ -83,11 +90,11 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """Return when the next effect is due; infinity if none is due."""
+        """Return when the next effect is due, or infinity."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:
-        """Make the commands take effect whose time has come at ``now``.
+        """Make all commands take effect that are due at ``now``.
 
         Return whether the measured speed was cleared, and whether the motor's command changed.
         """

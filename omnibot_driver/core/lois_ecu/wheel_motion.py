@@ -4,8 +4,11 @@
 
 A wheel coasts without power, follows a duty, or is driven by the board's speed controller. The
 controller uses the last measured speed. The public firmware does not set this speed to zero when
-the wheel stops, so a wheel at rest may get little power, or none. The user's gains and motors are
-unknown, so the assumed noise is large. This module works on commands and the states of one wheel.
+the wheel stops, so a wheel at rest may get little power, or none.
+
+The user's gains and motors are unknown, so the assumed noise is large.
+
+This module works on commands and the states of one wheel.
 """
 
 import math
@@ -20,16 +23,19 @@ PER_WHEEL: Final = 5
 m, and the speed in m/s that was measured last."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 """States of the body: position, and the turn and distance that 0x20 (odometry) should show.
-``BIAS`` and ``EXCESS`` are the first of two states each, one for each wheel: a bias, and the
-fraction by which the wheel rolls backward faster than its set-point."""
+
+``BIAS`` and ``EXCESS`` are indices of two states each, one for each wheel. ``BIAS`` is a systematic
+error of the speed. ``EXCESS`` is the fraction by which the wheel rolls backward faster than its
+set-point.
+"""
 STATES: Final = 18
 
 CONTROL_RATE: Final = 2.0
 """Assumed rate in 1/s at which the controller brings a wheel to its target speed, without overshoot
 (critically damped)."""
 PUSH_PER_SPEED: Final = 2.2
-"""Assumed standard deviation of a wheel's acceleration, in m/s² for each m/s by which target and
-speed have recently differed."""
+"""Assumed standard deviation of a wheel's acceleration. The unit is m/s² for each m/s by which
+target and speed have recently differed."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that the ground adds to a speed, in (m/s)² per s."""
@@ -39,8 +45,8 @@ DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""``COASTING_S``, ``DRY_MPS2``: time constant in s, and dry friction in m/s², of a wheel without
-power."""
+"""``COASTING_S``, ``DRY_MPS2``: time constant in s, and deceleration by dry friction in m/s², of a
+wheel without power."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
@@ -48,8 +54,8 @@ ROLLED_OUT_S: Final = 1.0
 changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
 """Assumed time in s for which a wheel's speed differed from the model before the wheel was halted.
-The first value is for the board's own gains, the second for gains that the user set. With the
-public firmware's own gains the speed oscillates."""
+The first value is for the board's own gains, with which the speed oscillates. The second value is
+for gains that the user set."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -61,11 +67,14 @@ Terms = list[tuple[int, float]]
 class Step:
     """One step of the filter over ``dt`` s.
 
-    ``new``: means of the states after the step. ``rows``: changed rows of the transition matrix.
-    ``noises``: errors to add, each with its effect on the states and its variance.
+    ``new``: means of the states after the step.
 
     ``unsure_mps``: for each wheel, the standard deviation of the measured speed that its controller
-    uses.
+    uses. The key is the index of the wheel's first state.
+
+    ``rows``: changed rows of the transition matrix.
+
+    ``noises``: errors to add, each with its effect on the states and its variance.
     """
 
     dt: float
@@ -76,7 +85,9 @@ class Step:
 
 
 class Wheel:
-    """State of one wheel in addition to its states in the filter, which begin at index ``base``.
+    """What is known of one wheel in addition to its states in the motion filter.
+
+    ``base``: index of the wheel's first state in the filter.
 
     ``blind``: whether the wheel has moved, or has had a target, while the board did not count its
     ticks. The user of this class clears the flag.
@@ -86,18 +97,18 @@ class Wheel:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m that the wheel had rolled when it last certainly turned, or began to follow
-        a command. Motion that was estimated since then may have to be subtracted."""
+        """Distance in m that the wheel had rolled when it last certainly turned, or when it began
+        to follow a command. Motion that was estimated since then may have to be subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:
         """Forget all commands and history, because the board has just started."""
         self.course = WheelModel(self.course.step_s)
         self.restless_mps = 0.0
-        """Largest recent difference of target and speed, in m/s; decays with time."""
+        """Largest recent difference between target and speed, in m/s. It decays with time."""
         self.unsettled_mps = 0.0
-        """Difference of target and speed when the set-point last changed, in m/s; decays with
-        time."""
+        """Difference between target and speed when the set-point last changed, in m/s. It decays
+        with time."""
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
@@ -107,13 +118,13 @@ class Wheel:
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """``rolled_mps``, ``rolled_s``: speed in m/s when the controller was reset, and time in s
-        since the reset."""
+        """``rolled_mps``, ``rolled_s``: speed in m/s when the controller was last reset, and time
+        in s since then."""
         self.locked = False
         """Whether the wheel is at rest without power, because the last measured speed exceeds its
         target."""
         self.rests = False
-        """Whether the wheel is at rest, as shown by a repeated measured speed."""
+        """Whether the wheel is at rest. A repeated measured speed has shown this."""
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
@@ -130,7 +141,12 @@ class Wheel:
         return self.restless_mps < STEADY_PART * abs(self.course.target_mps)
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
-        """Return the effect of forward motion on the count: 1 if it rises, -1 if it falls, or 0."""
+        """Return the factor by which forward motion changes the count: 1, -1, or 0.
+
+        It is 0 while the board does not count.
+
+        ``signed``: whether ticks count in both directions.
+        """
         if signed:
             return 1.0
         if not self.course.counting:
@@ -141,8 +157,9 @@ class Wheel:
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
         """Add the motion of the wheel in one step to ``step``.
 
-        ``holds``: whether the board keeps the last measured speed of a wheel at rest. ``signed``:
-        whether ticks count in both directions.
+        ``holds``: whether the board keeps the last measured speed of a wheel at rest.
+
+        ``signed``: whether ticks count in both directions.
         """
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]
