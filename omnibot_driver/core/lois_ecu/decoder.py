@@ -136,7 +136,6 @@ class LoisDecoder:
         return [report for _, report in found]
 
     def _take(self, text: bytes, now: float) -> list[Timed]:
-        """Decode the characters between two line feeds."""
         before, self._cut_bytes = self._cut_bytes, 0
         at = text.rfind(BEGIN)
         line = None

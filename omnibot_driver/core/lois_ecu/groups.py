@@ -173,10 +173,7 @@ class Assembler:
     # Groups
 
     def _begin(self, code: int, now: float) -> None:
-        """Begin a group.
-
-        Its longest allowed pause depends on the time since the previous group began.
-        """
+        """Begin a group, and set the longest pause that is allowed within it."""
         since_s = now - self._begun_at.get(code, -math.inf)
         if since_s > QUIET_S and not self._after_ticks:  # neither read nor sent together
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))

@@ -78,7 +78,6 @@ class HeadingFilter:
         return True
 
     def _mistaken(self, heading_deg: float, yaw_rad: float) -> bool:
-        """Return whether ``heading_deg`` is one of the firmware's false headings near north."""
         if self._last is None or abs(_expected(self._last, yaw_rad)) > NORTH_DEG:
             return False
         return any(

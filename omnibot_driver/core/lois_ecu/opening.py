@@ -252,6 +252,5 @@ class SettingsWriter:
 
 
 def _taken(queue: deque[tuple[float, Command]], now: float) -> Iterable[Command]:
-    """Remove the commands that are due from the queue, and yield them."""
     while queue and now >= queue[0][0]:
         yield queue.popleft()[1]

@@ -109,7 +109,6 @@ class SetPoints:
         return [outbound.EMERGENCY_STOP, command] if self._clears_left else [command]
 
     def _duty(self, left: float, right: float) -> SetDuty:
-        """Encode left and right duty in percent, open loop."""
         most = min(self.settings.max_duty, outbound.MOST_PERCENT)
         pair, was_saturated = outbound.saturated((left, right), most)
         self.saturated += was_saturated

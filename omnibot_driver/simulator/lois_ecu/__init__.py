@@ -2,8 +2,8 @@
 
 """The LOIS ECU in software, as its manual describes it or as its public firmware behaves.
 
-This package shares no code with the driver: an error in shared code would affect both, and tests
-would not find it. ``SimulatedLois`` is pure: it reads no clock and no port.
+This package shares no code with the driver. An error in shared code would affect both, and tests
+would not find it. ``SimulatedLois`` reads no clock and no port.
 """
 
 from omnibot_driver.simulator.lois_ecu.board import CHANNELS, SimulatedLois

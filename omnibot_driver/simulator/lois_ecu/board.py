@@ -2,12 +2,15 @@
 
 """The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
-The module is pure: it takes bytes, advances by ``tick_s``, and returns bytes; the same settings and
-input give the same output. It knows the manual's table of messages and, through ``Quirks``, the
-public firmware. It must not know ports or real time.
+The simulation takes bytes, advances by ``tick_s``, and returns bytes. The same settings and input
+give the same output.
 
-Assumptions where the manual says nothing: set points never expire; encoder ticks are signed and
-wrap at 2³²; the button is reported on press and on release, and both set the set points to zero.
+Where the manual says nothing, these assumptions are made. Set-points never expire. Encoder ticks
+are signed and wrap at 2³². The e-stop button is reported on press and on release, and both set the
+set-points to zero.
+
+This module knows the manual's table of messages and, through ``Quirks``, the public firmware. It
+does not know ports or real time.
 """
 
 from collections import deque
@@ -39,8 +42,9 @@ class SimulatedLois:
 
     tick: number of ticks of 10 ms since construction.
     commands: valid lines that the board processed, newest last.
-    pressed: whether the emergency stop button is pressed.
-    motors, wheels: left and right; the true motors, and the wheels as the board measures them.
+    pressed: whether the e-stop button is pressed.
+    motors: the true left and right motor.
+    wheels: the left and right wheel as the board measures them.
     """
 
     channels = CHANNELS
@@ -62,7 +66,7 @@ class SimulatedLois:
             self._boots_until_s = self._compass_at_s = 0.0
 
     def reboot(self) -> None:
-        """Power-cycle the board; the robot keeps its true pose."""
+        """Switch the board off and on. The robot keeps its true pose."""
         self._boot()
 
     def _boot(self) -> None:
@@ -119,7 +123,7 @@ class SimulatedLois:
     def terminal_mode(self) -> int:
         """Terminal mode that the last command 0x11 set.
 
-        The board sends lines of its own only in modes 0 and 4.
+        The board sends messages of its own only in modes 0 and 4.
         """
         return self._terminal.mode
 
@@ -144,7 +148,7 @@ class SimulatedLois:
         return self._vehicle.standing
 
     def press(self, pressed: bool) -> None:
-        """Press or release the emergency stop button."""
+        """Press or release the e-stop button."""
         self.pressed = pressed
         self._button_pressed = True
         if not (self._uart.deaf and self.settings.quirks.button_waits_while_sending):
@@ -158,15 +162,15 @@ class SimulatedLois:
             channel.release()
 
     def hold(self, *, left: bool = False, right: bool = False) -> None:
-        """Block each wheel whose argument is true; release each wheel whose argument is false."""
+        """Block each wheel whose argument is true, and release the others."""
         self.motors[0].held, self.motors[1].held = left, right
 
     def receive(self, data: bytes, now: float | None = None, channel: int = 0) -> None:
-        """Begin to receive ``data`` at 115200 baud; ignore ``now`` and ``channel``."""
+        """Begin to receive ``data`` at 115200 baud. ``now`` and ``channel`` are ignored."""
         self._uart.receive(data)
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick; return the bytes sent as one packet, or an empty list."""
+        """Advance by one tick. Return the bytes sent in it as one packet, or an empty list."""
         data = self.step()
         return [(0, data)] if data else []
 
@@ -190,7 +194,7 @@ class SimulatedLois:
         }
 
     def step(self) -> bytes:
-        """Advance by one tick of 10 ms; return the bytes sent in this tick."""
+        """Advance by one tick of 10 ms. Return the bytes sent in this tick."""
         self.tick += 1
         sent = bytearray()
         for _ in range(STEPS_PER_TICK):
@@ -263,7 +267,7 @@ class SimulatedLois:
             self._uart.say(data, deaf=False)
 
     def _catch_up(self) -> None:
-        """Serve the interrupts that were pending while interrupts were off."""
+        """Serve the interrupts that came while interrupts were off."""
         pending, self._pending = self._pending, {}
         for index, (is_long, direction) in pending.items():
             self._edge(index, self.now_s, is_long, direction)
@@ -276,7 +280,10 @@ class SimulatedLois:
     # The main loop
 
     def _main_loop(self) -> None:
-        """Run the main loop for 1 ms: finish the pass over the timers and make another."""
+        """Run the main loop for 1 ms.
+
+        In this time, it completes one pass over the timers and makes another one.
+        """
         for _ in range(2):
             if not self._scan:
                 self._read_input()
@@ -310,7 +317,7 @@ class SimulatedLois:
             self._say(self._sayings.group(code, self._clock_ms, self.now_s))
 
     def _say_record(self, data: bytes) -> None:
-        """Send a complete record and restart the periods of the periodic messages."""
+        """Send a complete record, and restart the periods of the periodic messages."""
         if data:
             self._say(data)
             self._timers.restart(self._clock_ms)

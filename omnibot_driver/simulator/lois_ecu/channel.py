@@ -2,8 +2,8 @@
 
 """One wheel as the board sees it: encoder edges in; ticks, speed and motor duty out.
 
-This module contains the firmware's quirks of counting and measuring. It knows neither the protocol
-nor the other wheel.
+This module knows the firmware's quirks of counting and measuring. It does not know the protocol or
+the other wheel.
 """
 
 from math import copysign
@@ -26,11 +26,13 @@ class WheelChannel:
 
     ``corrections``: factors for the durations of the short and the long level of the encoder.
     ``steps``: encoder edges per turn.
-
-    ``ticks``: encoder ticks, as 0x12 reports them. ``rpm``: measured speed in RPM, an integer.
-    ``exact_rpm``: measured speed in RPM, with fraction. ``duty_percent``: duty of the motor,
-    -100..100. ``open_loop``: whether a duty is commanded, not a speed. ``record``: the samples
-    taken. ``record_left``: number of samples still to take.
+    ``ticks``: encoder ticks, as 0x12 reports them.
+    ``rpm``: measured speed in RPM, an integer.
+    ``exact_rpm``: measured speed in RPM, with fraction.
+    ``duty_percent``: duty of the motor, -100..100.
+    ``open_loop``: whether a duty is commanded, not a speed.
+    ``record``: the samples taken.
+    ``record_left``: number of samples still to take.
     """
 
     def __init__(
@@ -58,9 +60,11 @@ class WheelChannel:
     # Encoder input
 
     def edge(self, at_s: float, is_long: bool, direction: int) -> None:
-        """Process one edge of the encoder, when its interrupt is served at ``at_s``.
+        """Process one edge of the encoder. Its interrupt is served at ``at_s``.
 
-        is_long: whether a long level ended. direction: 1 forward, -1 backward.
+        ``is_long``: whether a long level ended.
+
+        ``direction``: 1 forward, -1 backward.
         """
         quirks = self._quirks
         if not quirks.ticks_of_forward_targets:
@@ -91,7 +95,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this rule; the quirk ``keeps_speed_of_stalled_wheel`` disables it.
+        The manual implies this rule. The quirk ``keeps_speed_of_stalled_wheel`` disables it.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0
@@ -117,22 +121,22 @@ class WheelChannel:
     # Commands
 
     def command_rpm(self, rpm: int) -> None:
-        """Set the speed target in RPM (closed loop); zero or a reversal stops the motor."""
+        """Set the speed target in RPM (closed loop). Zero or a reversal stops the motor."""
         self.open_loop = False
         if rpm == 0 or rpm * self._next_target < 0:
             self._halt()
         self._next_target = rpm
 
     def command_duty(self, percent: int) -> None:
-        """Set the duty in percent and open the control loop; the speed target is kept."""
+        """Set the duty in percent (open loop). The speed target is kept."""
         self.open_loop = True
         self.controller.restart()
         self.duty_percent = max(-LIMIT_PERCENT, min(LIMIT_PERCENT, percent))
 
     def release(self) -> None:
-        """Stop the motor because of the emergency stop button.
+        """Stop the motor because the e-stop button was pressed or released.
 
-        The button acts like a command of zero in the current mode.
+        The button acts like a command of zero in the current mode, open or closed loop.
         """
         if self.open_loop:
             self.duty_percent = 0
@@ -141,7 +145,10 @@ class WheelChannel:
             self._next_target = 0
 
     def reset(self) -> None:
-        """Set the ticks to zero and, without ``reset_clears_ticks_only``, stop the motor."""
+        """Set the ticks to zero.
+
+        Without the quirk ``reset_clears_ticks_only``, also stop the motor.
+        """
         self.ticks = 0
         if not self._quirks.reset_clears_ticks_only:
             self.command_duty(0)
@@ -149,7 +156,7 @@ class WheelChannel:
             self._next_target = 0
 
     def control(self) -> None:
-        """Run one step of the speed controller; do nothing in open loop."""
+        """Run one step of the speed controller. In open loop, nothing happens."""
         if self.open_loop:
             return
         target = self._next_target if not self._quirks.reverse_runs_fast else self._target

@@ -2,7 +2,7 @@
 
 """The effect of each command on the board.
 
-This module knows commands and payloads. It must not know characters, nor how replies are sent.
+This module knows commands and payloads. It does not know characters, nor how replies are sent.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,10 @@ BALL_S = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Obeyed:
-    """A valid line processed in tick number ``tick``; its command may be unknown."""
+    """A valid line that the board has processed. Its command may be unknown.
+
+    ``tick``: number of the tick in which the line was processed.
+    """
 
     tick: int
     command: int
@@ -30,7 +33,7 @@ class Obeyed:
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """The parts of the board on which commands act; a boot makes new ones."""
+    """The parts of the board on which commands act. Each boot makes new parts."""
 
     wheels: tuple[WheelChannel, ...]
     odometry: DocumentedOdometry
@@ -43,7 +46,8 @@ class Parts:
 class Commands:
     """Executes commands.
 
-    led: whether the LED is on. balls: number of balls dropped; a reboot does not reset it.
+    led: whether the LED is on.
+    balls: number of balls dropped. A reboot does not reset it.
     """
 
     def __init__(self, quirks: Quirks) -> None:
@@ -57,7 +61,7 @@ class Commands:
         self._ball_at_s = -BALL_S
 
     def obey(self, parts: Parts, command: int, payload: int, now_s: float, clock_ms: int) -> None:
-        """Execute one command; ignore an unknown command."""
+        """Execute one command. An unknown command is ignored."""
         quirks, (left, right) = self._quirks, parts.wheels
         high, low = payload >> 16, payload & 0xFFFF
         signed = [word - 0x10000 if word & 0x8000 else word for word in (high, low)]

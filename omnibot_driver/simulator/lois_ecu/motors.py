@@ -2,7 +2,7 @@
 
 """A motor with its wheel and encoder, and the board's speed controller for it.
 
-Speeds are in RPM, efforts in percent of duty. This module knows time steps. It must not know
+Speeds are in RPM, efforts in percent of duty. This module knows time steps. It does not know
 commands or the protocol.
 """
 
@@ -18,7 +18,7 @@ NOMINAL_STEP_S = 0.2
 
 
 class Motor:
-    """A motor with its wheel; while ``held``, the wheel does not turn."""
+    """A motor with its wheel. While ``held`` is true, the wheel does not turn."""
 
     def __init__(self, settings: MotorSettings, load_percent: float, random: Random) -> None:
         self.rpm = 0.0
@@ -32,7 +32,7 @@ class Motor:
         self._gap = 0.0
 
     def advance(self, duty_percent: float, dt_s: float) -> float:
-        """Advance by ``dt_s``; return the turns of the wheel in this time, with sign."""
+        """Advance by ``dt_s``. Return how far the wheel turns in this time, in turns, with sign."""
         if self.held:
             self.rpm = 0.0
             return 0.0
@@ -67,14 +67,14 @@ class Motor:
         return self._through_gap((before + self.rpm) / 2 * dt_s / 60)
 
     def _late(self, duty_percent: float, dt_s: float) -> float:
-        """Return the duty that was applied one dead time ago, in percent."""
+        """Return the duty in percent that was commanded one dead time ago."""
         self._on_the_way.append(duty_percent)
         if len(self._on_the_way) <= round(self._settings.dead_time_s / dt_s):
             return 0.0
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Return the turns of the wheel, after backlash, for the given turns of the motor."""
+        """Return how far the wheel turns, after the backlash, if the motor makes ``turns``."""
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns
@@ -86,8 +86,13 @@ class Motor:
 class Encoder:
     """An encoder disc, on which short and long levels alternate.
 
-    ``short``: fraction of a period that is the short level. ``steps``: edges per turn. ``noise``:
-    standard deviation of the length of a level, as a fraction of half a period.
+    A period is one short and one long level.
+
+    ``steps``: edges per turn.
+
+    ``short``: length of the short level, as a fraction of a period.
+
+    ``noise``: standard deviation of the length of a level, as a fraction of half a period.
     """
 
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
@@ -100,10 +105,10 @@ class Encoder:
         ]
 
     def turn(self, turns: float) -> tuple[float, bool, int] | None:
-        """Turn the disc; return the edge that passed the sensor, or None.
+        """Turn the disc. Return the edge that passed the sensor, or None.
 
-        An edge has a time (as a fraction of the step), whether a long level ended, and a direction
-        (1 forward, -1 backward).
+        The edge is given by three values: its time as a fraction of the step, whether a long level
+        ended, and the direction (1 forward, -1 backward).
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
@@ -129,7 +134,11 @@ class Encoder:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Gains of the manual's controller; feed_forward in percent per RPM, low_pass 0..1 per step."""
+    """Gains of the manual's speed controller.
+
+    feed_forward: in percent of duty per RPM.
+    low_pass: fraction of a change of the target that is applied in each step, 0..1.
+    """
 
     kp: float
     tn: float
@@ -139,11 +148,14 @@ class Gains:
 
 
 class SpeedController:
-    """G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised with the trapezoidal rule.
+    """The board's speed controller, with measured and target RPM as input and a duty as output.
 
-    The coefficients are for steps of ``NOMINAL_STEP_S``, even if the true step differs. An output
-    beyond 100 % does not enter the state (anti-windup). An output whose sign differs from that of
-    the target becomes zero. The firmware adds a low-pass of the target and a feed-forward.
+    Its transfer function is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised with the
+    trapezoidal rule. The coefficients are for steps of ``NOMINAL_STEP_S``, even if the true step
+    differs. An output beyond 100 % does not enter the state (anti-windup). If the signs of output
+    and target differ, the output becomes zero.
+
+    The firmware adds a low-pass filter of the target, and a feed-forward.
     """
 
     def __init__(self, gains: Gains) -> None:
@@ -156,12 +168,12 @@ class SpeedController:
         self.restart()
 
     def restart(self) -> None:
-        """Reset the controller's state; the gains remain."""
+        """Reset the controller's state. The gains remain."""
         self._errors = self._outputs = (0.0, 0.0)
         self._target = 0.0
 
     def step(self, measured_rpm: float, target_rpm: float) -> float:
-        """Return the duty in percent, -100..100; zero if the target is zero."""
+        """Return the duty in percent, -100..100. It is zero if the target is zero."""
         if not target_rpm:
             self.restart()
             return 0.0

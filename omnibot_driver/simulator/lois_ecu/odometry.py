@@ -2,7 +2,7 @@
 
 """The board's own odometry, as the manual describes it and as the firmware computes it.
 
-This module knows wheels and their nominal geometry. It must not know the true pose of the robot.
+This module knows wheels and their nominal geometry. It does not know the true pose of the robot.
 """
 
 from math import cos, inf, nan, pi, sin
@@ -17,8 +17,8 @@ SLOW_COUNT_S = 7251 / 72e6
 class DocumentedOdometry:
     """Odometry from signed ticks and measured speeds, as the manual describes it.
 
-    pose: x, y in m and yaw in rad. velocity: dx, dy in m/s, in the frame of the pose, and dyaw in
-    rad/s.
+    pose: x and y in m, and yaw in rad.
+    velocity: dx and dy in m/s along the axes of the pose, and dyaw in rad/s.
     """
 
     def __init__(self, steps: int, radius_m: float, track_m: float) -> None:
@@ -33,7 +33,7 @@ class DocumentedOdometry:
         self.velocity = (0.0, 0.0, 0.0)
 
     def move(self, left_ticks: int, right_ticks: int) -> None:
-        """Move the pose by the given increments of the ticks."""
+        """Move the pose by the given numbers of new ticks."""
         way = (left_ticks + right_ticks) * self._tick_m / 2
         turn = (right_ticks - left_ticks) * self._tick_m / self._track_m
         x, y, yaw = self.pose
@@ -51,10 +51,12 @@ class DocumentedOdometry:
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
 
-    The RPMs are integers. ``stands``: whether the position does not change while both RPMs are
-    equal. ``divides``: whether the velocity is the displacement divided by the time since the last
-    tick; a time of zero then gives NaN or infinity. ``slow``: whether each count of the timer takes
-    0.7 % too long.
+    The RPMs are integers.
+
+    ``stands``: whether the position does not change while both RPMs are equal.
+    ``divides``: whether the velocity is the displacement divided by the time since the last tick. A
+        time of zero then gives NaN or infinity.
+    ``slow``: whether each count of the timer takes 0.7 % too long.
     """
 
     def __init__(

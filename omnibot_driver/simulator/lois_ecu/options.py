@@ -2,7 +2,8 @@
 
 """Options of a simulated LOIS ECU, except its seed and the faults of its line.
 
-This module knows the names, values and effects of options. It must not know what runs the board.
+This module knows the names, values and effects of options. It does not know which program runs the
+board.
 """
 
 import argparse

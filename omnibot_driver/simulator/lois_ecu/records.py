@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Records of tick times, torque and headings: sampled, and encoded as lines when complete.
+"""Records of tick times, torques and headings. A record is sampled, then encoded as lines.
 
-This module knows wheels as the board sees them. It must not know when the lines are sent.
+This module knows wheels as the board sees them. It does not know when the lines are sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -14,7 +14,7 @@ PADDING, HEADING_PADDING = 10, 0x016A
 
 
 class Recorder:
-    """Takes one record at a time.
+    """Recorder of one record at a time.
 
     number: command number that requested the record in progress, or None.
     """
@@ -37,14 +37,14 @@ class Recorder:
     def control(self) -> None:
         """Take a torque sample if a torque record is running.
 
-        Called at each step of the controllers.
+        Called at each step of the speed controllers.
         """
         if self.number == TORQUE:
             for channel in self._wheels:
                 channel.torque()
 
     def heading(self, heading: int) -> bytes:
-        """Record a heading in degrees; return the encoded record if it is complete, else b""."""
+        """Record a heading in degrees. Return the encoded record if it is complete, else b""."""
         if self.number != HEADINGS:
             return b""
         full = len(self._headings) >= min(self._wanted, 2 * RECORD_DEPTH)
@@ -61,7 +61,7 @@ class Recorder:
         return b"".join([*lines, wire.words(HEADINGS, HEADING_PADDING, HEADING_PADDING)])
 
     def of_wheels(self) -> bytes:
-        """Return the encoded record of both wheels once it is complete; until then b""."""
+        """Return the encoded record of both wheels if it is complete, else b""."""
         left, right = self._wheels
         if self.number not in (RPM, TORQUE) or left.record_left or right.record_left:
             return b""

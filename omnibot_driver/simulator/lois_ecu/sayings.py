@@ -2,7 +2,7 @@
 
 """The board's periodic messages as lines: GPS position, time, date, heading, ticks, odometry.
 
-This module knows where each value comes from. It must not know when a message is sent.
+This module knows where each value comes from. It does not know when a message is sent.
 """
 
 from omnibot_driver.simulator.lois_ecu import wire
@@ -14,7 +14,7 @@ from omnibot_driver.simulator.lois_ecu.vehicle import Vehicle
 
 
 class Sayings:
-    """Encodes the periodic messages of one board, from one boot to the next."""
+    """Encoder of the periodic messages of one board. A boot makes a new one."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class Sayings:
         return group + wire.sequence(code, numbers) if quirks.appends_odometry else group
 
     def fix(self, now_s: float) -> Fix:
-        """Return the GPS fix at ``now_s``; its values are zero if the firmware ignores the GPS."""
+        """Return the GPS fix at ``now_s``. Its values are zero if the firmware ignores the GPS."""
         settings, truth = self._settings, self._vehicle.truth
         if settings.quirks.gps_is_ignored:
             return Fix(0.0, 0.0, (0, 0, 0), (0, 0, 0))

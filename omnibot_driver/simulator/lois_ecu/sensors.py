@@ -2,7 +2,7 @@
 
 """The GPS receiver and the compass on the board's serial inputs.
 
-This module knows the true pose of the robot. It must not know the host's protocol.
+This module knows the true pose of the robot. It does not know the host's protocol.
 """
 
 from collections import deque
@@ -16,7 +16,11 @@ DAY_S = 86_400
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """A GPS position in degrees, with date (year of the century, month, day) and time in UTC."""
+    """A GPS position, date and time.
+
+    date: year of the century, month and day.
+    time: hour, minute and second in UTC.
+    """
 
     latitude_deg: float
     longitude_deg: float
@@ -27,7 +31,8 @@ class Fix:
 def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> Fix:
     """Return the fix ``x_m`` east and ``y_m`` north of ``start`` (latitude, longitude in degrees).
 
-    ``utc_s`` is in s since 2000-01-01; each year has 365 days, and each month 31.
+    ``utc_s``: time in s since 2000-01-01. For simplicity, each year has 365 days, and each month
+    31.
     """
     latitude = start[0] + y_m / METRES_PER_DEGREE
     longitude = start[1] + x_m / (METRES_PER_DEGREE * cos(radians(start[0])))
@@ -48,7 +53,7 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether the readings are averaged as plain numbers; their mean is then wrong
+    ``over_north``: whether the readings are averaged as plain numbers. Their mean is then wrong
     near north.
     """
 
@@ -58,7 +63,10 @@ class Compass:
         self.last = 0
 
     def read(self, yaw_rad: float) -> int:
-        """Take a reading; return the mean of three in degrees clockwise from north, -179..180."""
+        """Take a reading.
+
+        Return the mean of the last three, in degrees clockwise from north, -179..180.
+        """
         true = 90.0 - degrees(yaw_rad) + self._random.gauss(0.0, self._noise_deg)
         raw = int(true % 360.0) % 360
         self._raw.append(raw)

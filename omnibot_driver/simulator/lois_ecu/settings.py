@@ -2,8 +2,8 @@
 
 """Settings of a simulated LOIS ECU and its robot: nominal values, deliberate errors, firmware.
 
-``Quirks`` are the deviations of the public firmware from the manual, one switch each, so that a
-driver can be tested against both, or against a single deviation.
+``Quirks`` are the deviations of the public firmware from the manual, with one switch each. So a
+driver can be tested against the manual, the firmware, or a single deviation.
 """
 
 from dataclasses import dataclass, fields
@@ -17,20 +17,21 @@ class Quirks:
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
     odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
         are equal.
-    velocity_may_be_nan: two ticks within one count of the timer make the velocity in 0x20 NaN or
-        infinite, by a division by zero.
+    velocity_may_be_nan: two ticks within one count of the timer cause a division by zero. The
+        velocity in 0x20 is then NaN or infinite.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
     keeps_speed_of_stalled_wheel: a wheel without ticks keeps its last measured speed.
     duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
     reverse_runs_fast: a negative duty of the speed controller also lowers the target by 1 at each
         tick, until the next control step.
-    low_pass_starts_at_zero: the low pass of the target has gain 0, so the wheels do not follow an
-        RPM target until 0x23 is written.
+    low_pass_starts_at_zero: the low-pass filter of the target has gain 0. So the wheels do not
+        follow an RPM target until 0x23 is written.
     extra_settings: the settings 0x21 to 0x23 exist.
     appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
     clock_stops_while_sending: the clock of the board stops while a message or record is sent.
-    deaf_while_sending: of the characters received while sending, all but the first are lost.
+    deaf_while_sending: of the characters that arrive while the board sends, all but the first are
+        lost.
     deaf_while_counting: at each tick the board receives nothing for 0.2 ms.
     button_waits_while_sending: a press switches the motors off only after the message or record in
         progress is sent.
@@ -38,13 +39,13 @@ class Quirks:
     terminal_mode_zeroes_correction: every write of 0x11 overwrites the left short correction.
     button_is_lost_in_terminal_mode: in a terminal mode, a press of the button is not reported.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
-    reset_clears_ticks_only: 0x18 keeps the odometry and the set points.
+    reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
     terminal_passes_input_on: characters from the host are forwarded to the sensor at the sensor's
-        baud rate (9600, 4800), and the board reads no further input until they are forwarded.
+        baud rate (9600, 4800). The board reads no further input until they are forwarded.
     one_ball_in_six_seconds: 0x19 is ignored within 6 s of the previous ball.
     gps_is_ignored: GPS position, time and date are zeros.
     headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
-    records_in_100_us: tick times are in 100 µs, not in 100 ns.
+    records_in_100_us: the samples of an RPM record are in 100 µs, not in 100 ns.
     torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
     record_waits_for_one_more: a record of n headings is sent when sample n + 1 arrives.
     large_records_never_end: a record of more than 1024 samples is never completed.
@@ -52,7 +53,7 @@ class Quirks:
     limits_rpm: targets beyond 50 RPM are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
     slow_timer: a timer count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
-    slow_boot: the board does not react for 2 s after power-up; it reads the input afterwards.
+    slow_boot: the board does not react for 2 s after power-up. It reads the input afterwards.
     """
 
     ticks_of_forward_targets: bool = False
@@ -101,8 +102,9 @@ QUIRKS: dict[Firmware, Quirks] = {"documented": DOCUMENTED, "firmware": FIRMWARE
 class MotorSettings:
     """A first-order motor with dry friction.
 
-    rpm_per_percent: speed per duty beyond the dead zone. dead_zone_percent: duty below which the
-    motor has no torque. time_constant_s: time constant of the speed.
+    rpm_per_percent: speed in RPM for each percent of duty beyond the dead zone.
+    dead_zone_percent: duty below which the motor has no torque.
+    time_constant_s: time constant of the speed.
     friction_rpm_per_s: additional deceleration without power.
     second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
     backlash_turns: play between motor and encoder, in turns of the wheel.
@@ -121,17 +123,17 @@ class MotorSettings:
 class LoisSettings:
     """The board, its robot, and its position on Earth.
 
-    wheel_radius_m, track_m, steps: nominal geometry; ``steps`` are encoder edges per turn.
+    wheel_radius_m, track_m, steps: nominal geometry. ``steps`` are encoder edges per turn.
     wheel_radius_scale, track_scale: true value divided by nominal value.
     slip: standard deviation, in m, of the distance that a wheel rolls in 1 m.
-    load_percent: standard deviation, in percent of duty, of the load from the ground, which has a
-        correlation time of 0.5 s.
+    load_percent: standard deviation, in percent of duty, of the load from the ground. Its
+        correlation time is 0.5 s.
     mark_noise: standard deviation of the distance between adjacent encoder marks, as a fraction of
         half a period.
-    start_latitude_deg, start_longitude_deg: position of x = y = 0; x points east.
+    start_latitude_deg, start_longitude_deg: position of x = y = 0. The x axis points east.
     compass_period_s: time between two compass readings.
     heading_noise_deg: standard deviation of each raw heading.
-    running: the board has already booted.
+    running: whether the board has already booted.
     """
 
     quirks: Quirks = FIRMWARE

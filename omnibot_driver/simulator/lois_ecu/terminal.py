@@ -2,7 +2,7 @@
 
 """The terminal mode: characters that pass between the board's sensors and the host.
 
-This module knows characters and which sensor sent them. It must not know the protocol, nor when the
+This module knows characters and which sensor sent them. It does not know the protocol, nor when the
 board sends.
 """
 
@@ -19,7 +19,7 @@ CHARACTERS_PER_STEP = {GPS: 0.96, COMPASS: 0.48}
 
 
 class Terminal:
-    """State of the terminal mode; ``mode`` is the value that the host wrote last."""
+    """State of the terminal mode. ``mode``: the value that the host wrote last."""
 
     def __init__(self, quirks: Quirks) -> None:
         self._quirks = quirks
@@ -29,7 +29,10 @@ class Terminal:
 
     @property
     def on(self) -> bool:
-        """Whether sensor data replaces the board's own lines."""
+        """Whether the board is in a terminal mode.
+
+        It then sends data of sensors instead of its messages.
+        """
         return self.mode not in NO_TERMINAL
 
     @property
@@ -38,12 +41,15 @@ class Terminal:
         return self._to_sensor > 0
 
     def heard(self, count: int) -> None:
-        """Record ``count`` characters from the host; the public firmware forwards them."""
+        """Record that ``count`` characters came from the host.
+
+        The public firmware forwards them.
+        """
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)
 
     def sensor(self, sensor: int, text: bytes) -> bytes:
-        """Process text from a sensor; return the part to send to the host at once."""
+        """Process text from a sensor. Return the part that the board sends to the host at once."""
         if not self._quirks.terminal_mixes_sensors:
             return text if self.mode == sensor else b""
         if self.on:
@@ -51,7 +57,7 @@ class Terminal:
         return b""
 
     def mixed(self) -> bytes:
-        """Advance by 1 ms; return the next character of each sensor, or b"" if ``busy``."""
+        """Advance by 1 ms. Return the next character of each sensor, or b"" while ``busy``."""
         if self.busy:
             speed = CHARACTERS_PER_STEP.get(self.mode, BYTES_PER_STEP)
             self._to_sensor = max(self._to_sensor - speed, 0.0)

@@ -11,14 +11,17 @@ ONCE, NEVER = 0xFFFE, 0xFFFF
 
 @dataclass(slots=True)
 class Timer:
-    """Period of one message and the time at which the current period began, both in ms."""
+    """Period of one message, and the time at which the present period began. Both are in ms."""
 
     period_ms: int
     since_ms: int = 0
 
 
 class Timers:
-    """Timers by command number, in the order in which the board checks them."""
+    """Timers of all periodic messages, by command number.
+
+    They are in the order in which the board checks them.
+    """
 
     def __init__(self) -> None:
         self._timers = {code: Timer(period) for code, period in PERIODS_MS.items()}
@@ -42,7 +45,7 @@ class Timers:
             timer.since_ms = clock_ms
 
     def take(self, code: int, clock_ms: int) -> bool:
-        """Return whether the message ``code`` is due; if so, begin its next period."""
+        """Return whether the message ``code`` is due. If so, begin its next period."""
         timer = self._timers[code]
         if timer.period_ms == NEVER:
             return False

@@ -2,7 +2,7 @@
 
 """Initial parameters of the wheels' controllers and encoders, and the commands that change them.
 
-This module knows the commands that write one number each. It must not know lines.
+This module knows the commands that write one number each. It does not know lines.
 """
 
 from omnibot_driver.simulator.lois_ecu.channel import WheelChannel
@@ -27,9 +27,9 @@ def wheels_of(quirks: Quirks, steps: int) -> tuple[WheelChannel, ...]:
 
 
 def adjust(wheels: tuple[WheelChannel, ...], command: int, number: float, quirks: Quirks) -> None:
-    """Set the gain or correction that ``command`` writes; ignore other commands.
+    """Set the gain or correction that ``command`` writes. Other commands are ignored.
 
-    Feed-forward and low pass (0x21 to 0x23) exist in the public firmware only.
+    Feed-forward and low-pass filter (0x21 to 0x23) exist in the public firmware only.
     """
     left, right = wheels
     if command in GAIN_NAMES:

@@ -2,7 +2,7 @@
 
 """The board's serial port at 115200 baud: what it receives, and what it sends with interrupts off.
 
-This module knows characters and steps of a millisecond. It must not know lines.
+This module knows characters and steps of a millisecond. It does not know lines.
 """
 
 from collections import deque
@@ -12,10 +12,12 @@ INPUT_DEPTH = 600
 
 
 class Uart:
-    """The port; if ``loses``, it keeps only the first byte that arrives while interrupts are off.
+    """The serial port.
 
-    received: all bytes sent to the port. lost_bytes: number of bytes that were lost.
-    input: characters received but not read yet.
+    ``loses``: whether it keeps only the first byte that arrives while interrupts are off.
+    received: all bytes that were sent to the port.
+    lost_bytes: number of bytes that were lost.
+    input: characters that were received but not read yet.
     """
 
     def __init__(self, *, loses: bool) -> None:
@@ -27,7 +29,7 @@ class Uart:
         self.boot()
 
     def boot(self) -> None:
-        """Clear the buffers; bytes still on the line arrive later."""
+        """Clear the buffers. Bytes that are still on the line arrive later."""
         self.input: deque[int] = deque()
         self._sending: deque[tuple[bytearray, bool]] = deque()
         self._out_credit = 0.0
@@ -45,12 +47,12 @@ class Uart:
         return bool(self._sending) and self._sending[0][1]
 
     def receive(self, data: bytes) -> None:
-        """Put bytes on the line; they arrive one after the other from now on."""
+        """Put bytes on the line. They arrive one after the other from now on."""
         self.received += data
         self._inbound.extend(data)
 
     def say(self, data: bytes, *, deaf: bool) -> None:
-        """Queue data to be sent; ``deaf``: whether interrupts are off during the sending."""
+        """Queue data to be sent. ``deaf``: whether interrupts are off while it is sent."""
         self._sending.append((bytearray(data), deaf))
 
     def miss(self) -> None:
@@ -58,7 +60,7 @@ class Uart:
         self._misses = True
 
     def listen(self) -> int:
-        """Receive for one step of 1 ms; return the number of characters received."""
+        """Receive for one step of 1 ms. Return the number of characters received."""
         came = heard = 0
         self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._inbound and self._in_credit >= 1.0:
@@ -80,7 +82,7 @@ class Uart:
     def send(self, sent: bytearray) -> bool:
         """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
-        Return whether interrupts are switched on again; the caller must then call ``hear_kept``.
+        Return whether interrupts are switched on again. The caller must then call ``hear_kept``.
         """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._sending and self._out_credit >= 1.0:

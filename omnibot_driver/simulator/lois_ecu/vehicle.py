@@ -2,7 +2,7 @@
 
 """The robot that a simulated LOIS ECU drives: two wheels on the ground, and the resulting motion.
 
-This module knows duties and the positions of the encoder marks. It must not know the board.
+This module knows duties and the positions of the encoder marks. It does not know the board.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from omnibot_driver.simulator.lois_ecu.settings import LoisSettings
 
 @dataclass(frozen=True, slots=True)
 class TrueState:
-    """True pose and motion of the robot: m, rad (unwrapped), m/s, rad/s."""
+    """True pose and motion of the robot, in m, rad, m/s and rad/s. The yaw is not wrapped."""
 
     x_m: float
     y_m: float
@@ -26,9 +26,11 @@ class TrueState:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """An encoder edge of wheel ``index`` (0 left, 1 right) at ``at_s``.
+    """An edge that the encoder of a wheel gives at ``at_s``.
 
-    is_long: whether a long level ended. direction: 1 forward, -1 backward.
+    index: 0 for the left wheel, 1 for the right wheel.
+    is_long: whether a long level ended.
+    direction: 1 forward, -1 backward.
     """
 
     at_s: float
@@ -38,10 +40,11 @@ class Edge:
 
 
 class Vehicle:
-    """The robot; ``truth`` is its true pose and motion.
+    """The robot. ``truth``: its true pose and motion.
 
     ``corrections``: for each encoder, the board's factors for the durations of the short and the
-    long level. The encoder's levels are as long as these factors assume.
+    long level. The levels of the simulated encoder have exactly the lengths for which these factors
+    are right.
     """
 
     def __init__(
@@ -71,7 +74,7 @@ class Vehicle:
         return all(motor.rpm == 0.0 for motor in self.motors)
 
     def advance(self, duties: tuple[float, float], now_s: float, step_s: float) -> list[Edge]:
-        """Advance by the step that ends at ``now_s``; return the encoder edges in order of time."""
+        """Advance by the step that ends at ``now_s``. Return the encoder edges in order of time."""
         settings, state = self._settings, self.truth
         ways: list[float] = []
         edges: list[Edge] = []

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The protocol as the board encodes and decodes it, written from the manual alone.
+"""The protocol as the board encodes and decodes it, from the manual and the public firmware.
 
-A line is ``:``, two hexadecimal digits of command, eight of payload, two of checksum (XOR of all
-characters before it) and a line feed. This module shares no code with the driver. It must not know
-what a command means.
+A line is ``:``, two hexadecimal digits of command, eight of payload, two of checksum, and a line
+feed. The checksum is the XOR of all characters before it.
+
+This module shares no code with the driver. It does not know what a command means.
 """
 
 import re
@@ -36,7 +37,7 @@ def words(command: int, high: int, low: int) -> bytes:
 
 
 def bits_of(number: float) -> int:
-    """Return the bits of ``number`` as a float32; a number that is too large becomes infinity."""
+    """Return the bits of ``number`` as a float32. A number that is too large becomes infinity."""
     try:
         return int.from_bytes(struct.pack(">f", number), "big")
     except OverflowError:
@@ -44,22 +45,23 @@ def bits_of(number: float) -> int:
 
 
 def number_of(bits: int) -> float:
-    """Return the float32 whose bits are ``bits``."""
+    """Return the number that ``bits`` encode as a float32."""
     (number,) = struct.unpack(">f", bits.to_bytes(4, "big"))
     return float(number)
 
 
 def sequence(command: int, payloads: list[int]) -> bytes:
-    """Encode a line whose payload is 0xFFFFFFFF, then a line for each payload."""
+    """Encode a line whose payload is 0xFFFFFFFF, and then one line for each payload."""
     return b"".join(line(command, payload) for payload in (0xFFFFFFFF, *payloads))
 
 
 class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
-    ``checks``: whether lines have a checksum. ``lenient``: whether fields are read like C's strtol,
-    which accepts space, sign and prefix and stops at the first character that is not a digit.
-    Without ``lenient``, a field with such characters invalidates the line.
+    ``checks``: whether lines have a checksum.
+    ``lenient``: whether fields are read as C's strtol reads them. It accepts space, sign and
+        prefix, and stops at the first character that is not a digit. If false, such characters make
+        the line invalid.
     """
 
     def __init__(self, *, lenient: bool) -> None:
@@ -68,7 +70,7 @@ class LineReader:
         self._buffer: list[str] = []
 
     def take(self, character: int) -> tuple[int, int] | None:
-        """Process a character; return command and payload if it completes a line, else None."""
+        """Process a character. Return command and payload if it completes a line, else None."""
         letter = chr(character)
         length = LINE_CHARACTERS if self.checks else LINE_CHARACTERS - 2
         if letter == ":" or len(self._buffer) >= length:
@@ -87,7 +89,7 @@ class LineReader:
         return command, high * 0x10000 + low
 
     def take_all(self, data: bytes) -> Iterator[tuple[int, int]]:
-        """Process many characters; yield command and payload of each complete line."""
+        """Process many characters. Yield command and payload of each complete line."""
         for character in data:
             found = self.take(character)
             if found is not None:
