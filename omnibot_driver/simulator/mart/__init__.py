@@ -2,10 +2,12 @@
 
 """A simulated MART motion controller that follows its manual or its public server.
 
-It shares no code with the driver: otherwise both would contain the same misreading of the manual,
-and tests would not find it. ``MartServer`` uses no sockets or clocks: its interface is
-``receive(datagram, port, sender, now)``, ``advance(now)`` and ``copy()``. ``SimulatedMart`` wraps
-``MartServer`` for real ports, ``sim://`` and simulated bad networks.
+The package shares no code with the driver. Otherwise, a misreading of the manual would affect both,
+and tests would not find it.
+
+``MartServer`` uses no sockets or clocks. Its interface is ``receive(datagram, port, sender, now)``,
+``advance(now)`` and ``copy()``. ``SimulatedMart`` wraps ``MartServer`` for real ports, ``sim://``
+and simulated bad networks.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

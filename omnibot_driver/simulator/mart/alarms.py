@@ -2,9 +2,13 @@
 
 """Supervision of a motion in progress, 100 times a second, as the server does it.
 
-This module detects from the encoder when the right wheel starts and stops, and detects obstacles;
-it also ends controlled moves. Without samples of the IMU, it detects only obstacles and the dock,
-and only in controlled linear moves. It knows motions; it does not know commands.
+The supervision uses the encoder of the right wheel to detect when the motion starts and stops. It
+also detects obstacles, and it ends controlled moves.
+
+While samples of the IMU are missing, it detects only obstacles and the dock, and only in controlled
+linear moves.
+
+This module knows motions; it does not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -23,7 +27,10 @@ _TIMED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR)
 
 
 def stop_motors(server: "MartServer", motion: Motion) -> None:
-    """Set both motor registers to stop; ``sample`` then waits until the right wheel is at rest."""
+    """Write the value for stop to both motor registers.
+
+    Afterwards, ``sample`` waits until the right wheel is at rest.
+    """
     if motion.kind is Kind.REFERENCE and (
         motion.left < motions.FAST_REGISTER or motion.right < motions.FAST_REGISTER
     ):
@@ -71,7 +78,7 @@ def sample(server: "MartServer", motion: Motion) -> None:
 
 
 def _miss(server: "MartServer", motion: Motion) -> None:
-    """End the motion with an error if samples of the IMU are missing for too long.
+    """End the motion with an error if samples of the IMU have been missing for too long.
 
     With the quirk ``drives_trust_imu``, only controlled motions are checked.
     """
@@ -145,7 +152,7 @@ def _end(server: "MartServer", motion: Motion) -> None:
 
 
 def _timed_distance_in(motion: Motion) -> float:
-    """Return the distance in inches, from the calibration and the time alone.
+    """Return the distance in inches, computed from time and calibration alone.
 
     Like the server, this function adds the distance of the ramps in feet to a sum in inches.
     """
@@ -180,7 +187,9 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 
 
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
-    """Change the speeds of both wheels, in register units with forward positive.
+    """Change the speeds of both wheels.
+
+    ``right``, ``left``: changes of the speeds in register units, forward positive.
 
     Each speed is kept between stop and full speed. If a wheel would exceed full speed, the other
     wheel is slowed by the excess.

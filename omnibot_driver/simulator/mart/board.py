@@ -2,7 +2,8 @@
 
 """The simulated controller as a simulated board: two channels of datagrams, and time in ticks.
 
-This module knows the server and the common protocol of simulated boards; it does not know commands.
+This module knows the server and the common interface of simulated boards; it does not know
+commands.
 """
 
 from collections.abc import Mapping
@@ -18,7 +19,7 @@ TICK_S = 0.002
 class SimulatedMart:
     """A simulated MART controller with the common interface of simulated boards.
 
-    ``server`` is the controller with its robot, which holds all state except ``ticks``.
+    ``server``: the controller with its robot. It holds all state except ``ticks``.
     """
 
     channels, tick_s = CHANNELS, TICK_S
@@ -33,16 +34,16 @@ class SimulatedMart:
         return self.ticks * TICK_S
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Deliver a datagram to the port ``channel`` at the simulated time, not at ``now``."""
+        """Deliver a datagram to the port ``channel``. The time is ``now_s``; ``now`` is ignored."""
         self.server.receive(data, channel, None, self.now_s)
 
     def advance(self) -> list[Packet]:
-        """Let one tick pass and return the replies sent in it."""
+        """Advance by one tick. Return the replies that are sent in it."""
         self.ticks += 1
         return [(reply.port, reply.data) for reply in self.server.advance(self.now_s)]
 
     def reboot(self) -> None:
-        """Cycle the power; the robot stays where it is."""
+        """Switch the controller off and on. The robot stays where it is."""
         self.server.power_cycle()
 
     @property

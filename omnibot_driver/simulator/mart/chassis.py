@@ -2,8 +2,9 @@
 
 """The motor board, its two motors, and the robot that they move.
 
-This module knows registers (0 full forward, 128 stop, 255 full backward), volts and metres; it does
-not know commands or the reason for a movement.
+A motor register is 0 for full speed forward, 128 for stop, and 255 for full speed backward.
+
+This module knows registers, volts and metres; it does not know commands or why the robot moves.
 """
 
 from math import cos, exp, inf, pi, sin
@@ -13,9 +14,9 @@ from omnibot_driver.simulator.mart.settings import MartSettings, Stuck
 STOP = 128
 STEP_S = 0.01
 RAMPS_PER_S = 40.0
-"""Updates of the applied effort per second.
+"""Number of updates of the applied effort per second.
 
-Every 25 ms the effort changes by at most the set acceleration.
+At each update, every 25 ms, the effort changes by at most the set acceleration.
 """
 STANDS_MPS = 0.006
 RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
@@ -24,10 +25,12 @@ RIGHT_FAULTS, LEFT_FAULTS = 4 | 16, 8 | 32
 class Chassis:
     """The motor board with its motors, its encoder and the body of the robot.
 
-    right, left: registers of the two motors. right_mps, left_mps: speeds in m/s. x_m, y_m, yaw_rad:
-    the true pose, yaw unwrapped. counts: encoder counts of the right wheel since the last reset.
-    way_m: total distance, forward and backward added. Set volts, stuck, motor_status and silent
-    with ``change`` only.
+    right, left: registers of the two motors.
+    right_mps, left_mps: speeds of the two wheels in m/s.
+    x_m, y_m, yaw_rad: the true pose. The yaw is not wrapped.
+    counts: encoder counts of the right wheel since the last reset.
+    way_m: total distance; distances forward and backward are added.
+    volts, stuck, motor_status, silent: properties that only ``change`` may set.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -45,7 +48,7 @@ class Chassis:
         self.power_cycle()
 
     def power_cycle(self) -> None:
-        """Switch the motor board off and on; the wheels stop."""
+        """Switch the motor board off and on. The wheels stop."""
         self.right = self.left = STOP
         self._applied_right = self._applied_left = 0.0
         self.right_mps = self.left_mps = 0.0
@@ -61,7 +64,10 @@ class Chassis:
         motor_status: int | None = None,
         silent: bool | None = None,
     ) -> None:
-        """Change the given properties of the motor board; None leaves a property as it is."""
+        """Change the given properties of the motor board.
+
+        A property that is None stays as it is.
+        """
         self.volts = self.volts if volts is None else volts
         self.stuck = self.stuck if stuck is None else stuck
         self.motor_status = self.motor_status if motor_status is None else motor_status
@@ -84,7 +90,10 @@ class Chassis:
         return new
 
     def set(self, right: int, left: int) -> None:
-        """Write both motor registers; without effect if the board's serial line is cut."""
+        """Write both motor registers.
+
+        This has no effect if the serial line to the motor board is cut.
+        """
         if not self.silent:
             self.right, self.left = right & 0xFF, left & 0xFF
 
@@ -100,7 +109,7 @@ class Chassis:
 
     @property
     def encoder(self) -> int:
-        """Encoder count that the board reports; 0 if the board's serial line is cut."""
+        """Encoder count that the motor board reports; 0 if the serial line to it is cut."""
         return 0 if self.silent else int(self.counts)
 
     @property
@@ -120,13 +129,15 @@ class Chassis:
 
     @property
     def rests(self) -> bool:
-        """Whether commands, applied effort and wheel speeds are all zero, so that time changes
-        nothing."""
+        """Whether the robot is at rest and will stay at rest.
+
+        Commands, applied efforts and wheel speeds are then all zero.
+        """
         return not (self.powered or self.moving or self._applied_right or self._applied_left)
 
     @property
     def error_bits(self) -> int:
-        """Status bits that the board reports, as in the reply to MCSTAT."""
+        """Status bits of the motor board, as the reply to MCSTAT contains them."""
         return self.motor_status | (64 if self.volts > 30 else 0) | (128 if self.volts < 16 else 0)
 
     def _turn(
@@ -148,7 +159,7 @@ class Chassis:
         return applied, speed_mps
 
     def step(self) -> float:
-        """Advance by 10 ms; return the turn rate in deg/s, with noise while a wheel turns."""
+        """Advance by 10 ms. Return the turn rate in deg/s, which has noise while a wheel turns."""
         self._applied_right, right = self._turn(
             STOP - self.right, self._applied_right, self.right_mps, self._gain_right
         )
@@ -172,7 +183,9 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """Return the range in m of a sonar to the wall that it faces, or infinity if it faces none.
+    """Return the distance in m from a sonar to the wall that it faces, or infinity.
+
+    ``backward``: whether the sonar is the rear one.
 
     The walls lie across the x axis, ``front_m`` in front of the start and ``rear_m`` behind it.
     """

@@ -2,9 +2,10 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The server compares the beginning of a request with its commands in a fixed order, so F also matches
-each command that begins with F and comes later in that order. This module knows command words and
-numbers; it does not know how a motion proceeds.
+The server compares the beginning of a request with its commands, in a fixed order. So the command F
+also matches a request for any later command that begins with F.
+
+This module knows command words and numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,10 @@ It returns the reply, or None if the reply comes later or never.
 """
 
 NEED_ALL = ("VOLTS", "RM ", "MCF", "MCB", "TF", "PTF", "TB", "R", "L", "MCR", "MCL")
-"""Commands that need the objects which the server creates last, after it has opened its ports."""
+"""Commands that need objects which the server does not have at once.
+
+The server creates these objects after it has opened its ports.
+"""
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
 BAD_DISTANCE = "fail bad distance value"
@@ -32,8 +36,8 @@ BAD_DISTANCE = "fail bad distance value"
 class Row(NamedTuple):
     """A command and its handler.
 
-    word: the complete command, or its beginning if ``begins``. moves: whether the server refuses
-    the command while a motion, a recording or MCS is in progress.
+    word: the complete command, or its beginning if ``begins`` is true.
+    moves: whether the server refuses the command while a motion, a recording or MCS is in progress.
     """
 
     word: str
@@ -43,7 +47,7 @@ class Row(NamedTuple):
 
 
 def execute(server: "MartServer", text: str) -> str | None:
-    """Begin a command; return its reply, or None if the reply comes later or never."""
+    """Begin a command. Return its reply, or None if the reply comes later or never."""
     if not server.quirks.undocumented_commands and _is_undocumented(text):
         return NOT_SUPPORTED
     for word, handler, begins, is_motion in ROWS:
@@ -81,7 +85,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _joined(server: "MartServer") -> bool:
-    """Return whether the server refuses L because of a motion, recording or MCS in progress."""
+    """Return whether the server refuses L, because a motion, a recording or MCS is in progress."""
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
     others = [each for each in server.motions if each.kind is not Kind.REFERENCE]
@@ -89,7 +93,7 @@ def _joined(server: "MartServer") -> bool:
 
 
 def _timed(server: "MartServer", text: str) -> str | None:
-    """Start TF or TB: an optional speed word, then a distance in inches.
+    """Start TF or TB. The request has an optional speed word, then a distance in inches.
 
     Without the quirk ``speed_word_first``, the speed word may also follow the distance.
     """
@@ -185,7 +189,10 @@ def _change_linear(server: "MartServer", text: str) -> str | None:
 
 
 def _measured(server: "MartServer", text: str) -> str | None:
-    """Start a move measured by the accelerometer (MCF, MCB), simulated like TF and TB."""
+    """Start a move whose distance the server measures by the accelerometer (MCF, MCB).
+
+    The move is simulated like TF and TB.
+    """
     numbers = wire.fields(text)
     if not numbers:
         return MISSNG if text[2] == "F" else MISSING
@@ -203,7 +210,10 @@ def _measured(server: "MartServer", text: str) -> str | None:
 
 
 def _tuned(server: "MartServer", text: str) -> str | None:
-    """Start PTF: a distance in inches and three gains, whose effect is not simulated."""
+    """Start PTF. The request has a distance in inches and three gains.
+
+    The gains have no effect here.
+    """
     slow = text.startswith("PTF SLOW")
     behind = text[len("PTF SLOW") if slow else len("PTF") :].removeprefix(" NORMAL")
     numbers = wire.fields(behind)
@@ -221,13 +231,13 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """Set the least front clearance of the next TF, in inches (TFSFC)."""
+    """Set how near an obstacle in front may be in the next TF, in inches (TFSFC)."""
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 
 
 def _parameters(name: str, wrong: str) -> Handler:
-    """Return the handler that stores an acceleration and a speed (SLMP, SSP)."""
+    """Return the handler of a command that stores an acceleration and a speed (SLMP, SSP)."""
 
     def handle(server: "MartServer", text: str) -> str | None:
         numbers = wire.fields(text)
@@ -240,7 +250,7 @@ def _parameters(name: str, wrong: str) -> Handler:
 
 
 def _gains(server: "MartServer", text: str) -> str | None:
-    """Accept three gains (SLPP), whose effect is not simulated."""
+    """Accept three gains (SLPP). They have no effect here."""
     return "ok" if len(wire.fields(text)) >= 3 else MISSNG
 
 

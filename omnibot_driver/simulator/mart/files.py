@@ -2,7 +2,7 @@
 
 """The files in which the server records motions.
 
-This module knows the form of the files; it does not know when they are sent.
+This module knows the format of the files; it does not know when they are sent.
 """
 
 from dataclasses import dataclass
@@ -27,10 +27,12 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class FileNote:
-    """The data from which the file of a motion is generated.
+    """The data from which the file of a motion is made.
 
-    head: first lines of the file. rows: number of samples in the file. is_turn: whether the motion
-    was a spin. angle_deg, encoder: total angle and encoder count of the motion.
+    is_turn: whether the motion was a spin.
+    head: first lines of the file.
+    rows: number of samples in the file.
+    angle_deg, encoder: angle and encoder count at the end of the motion.
     """
 
     name: str
@@ -52,7 +54,7 @@ class FileNote:
 
 
 def note_of(server: "ServerState", motion: Motion) -> FileNote:
-    """Return the data for the file of a motion that has ended."""
+    """Return the data from which the file of a motion is made. The motion must have ended."""
     head = (
         server.date,
         "Gyro Z bias (\u00b0/sec): 0.000",

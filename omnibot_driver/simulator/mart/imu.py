@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The IMU: its gyro, whether it works, and the heading that the server integrates.
+"""The IMU: its gyro, whether it works, and the heading that the server computes from it.
 
 This module knows turn rates and times; it does not know motions or commands.
 """
@@ -9,13 +9,13 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 
 
 class Imu:
-    """The gyro, and the values that the server derives from it.
+    """The gyro, and the values that the server computes from it.
 
-    alive: False while the IMU is unplugged; the caller can set it at any time. During the outage
-    that the settings plan, the IMU fails even if ``alive`` is True. closed: whether the server has
-    stopped using the IMU, until RST IMU or SB. rate_dps: turn rate of the last sample in deg/s,
-    minus the bias that the server knows. heading_deg: the relative heading in degrees, left
-    positive.
+    alive: whether the IMU is plugged in. The caller can set it at any time. The settings can plan a
+        time in which the IMU fails even if this is true.
+    closed: whether the server has stopped using the IMU. RST IMU or SB ends this.
+    rate_dps: turn rate of the last sample in deg/s, minus the bias that the server knows.
+    heading_deg: the relative heading in degrees, left positive.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -26,7 +26,7 @@ class Imu:
         self.restart()
 
     def restart(self) -> None:
-        """Reset the bias, the heading and the rate, as at the start of the server."""
+        """Reset the known bias, the heading and the rate, as at the start of the server."""
         self._known_dps = 0.0
         self.closed = False
         self.heading_deg = 0.0
@@ -47,13 +47,14 @@ class Imu:
         return self.alive and not self.closed and not self._dies_s <= now < self._returns_s
 
     def learn(self) -> None:
-        """Let the server know the present bias, as if it had measured the bias at rest."""
+        """Make the server know the present bias, as if it had measured the bias at rest."""
         self._known_dps = self._bias_dps
 
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:
         """Take a sample of the turn rate.
 
-        If ``integrates``, add the rate times the time since the previous sample to the heading.
+        ``integrates``: whether to add the rate times the time since the previous sample to the
+        heading.
         """
         self.rate_dps = rate = rate_dps + self._bias_dps - self._known_dps
         if integrates:
@@ -61,9 +62,9 @@ class Imu:
         self._since_s = now
 
     def drift(self, now: float, *, integrates: bool) -> None:
-        """Advance to ``now``, for a robot at rest since the previous sample.
+        """Advance to ``now``. The robot has been at rest since the previous sample.
 
-        If ``integrates``, the part of the bias that the server does not know moves the heading.
+        ``integrates``: whether the unknown part of the bias changes the heading meanwhile.
         """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)

@@ -11,7 +11,8 @@ SAMPLE_S = 0.01
 START_SAMPLES, STOP_SAMPLES, STILL_SAMPLES = 60, 75, 15
 SLOW_STOP_SAMPLES = 188
 FAST_REGISTER = 45
-"""Register value (0 is full forward) below which RM counts as fast; a fast RM stops gently."""
+"""RM is regarded as fast if a motor register is below this value (0 is full speed forward). A fast
+RM stops gently."""
 SETUP_S = 0.05
 BIAS_SAMPLE_S = 0.0107
 LOST_AT_START_S, LOST_S = 0.5, 1.5
@@ -24,7 +25,7 @@ NOT_SUPPORTED = "fail command not supported"
 
 
 class Kind(IntEnum):
-    """The kinds of motion; the server keeps a separate state for each."""
+    """The kinds of motion. The server keeps a separate state for each kind."""
 
     LINEAR = 0
     """Uncontrolled move (F, B)."""
@@ -45,18 +46,22 @@ STOP_OFFSET_DEG = {"NORMAL": 3.16, "SLOW": 0.7}
 SMALL_SPIN_DEG = 10
 TOP_SPEED_INPS = {"NORMAL": 0.64 * 12, "SLOW": 0.34 * 12}
 RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
-"""Calibrated durations of acceleration and deceleration in s, by speed word."""
+"""Calibrated durations of acceleration and deceleration in s. The key is the speed word."""
 
 
 class Motion:
-    """The state of the last motion of a kind, kept after its end.
+    """The state of the last motion of a kind. It is kept after the end of the motion.
 
-    running: in progress, so that other motions are refused. watching: supervised by the module
-    ``alarms``. posts: notices of a start or a stop that are not consumed yet. error: failure text
-    of this motion. right, left: register values as the server knows them. encoder: the last count,
-    which the next sample evaluates. sampled_s: time of the last sample of the IMU, or -1. moved_s,
-    turned_s: when the wheel began to turn, and when it last turned. angle_deg: angle since the
-    start. released: whether the stop port ended the motion.
+    running: whether the motion is in progress, so that other motions are refused.
+    watching: whether the module ``alarms`` supervises the motion.
+    posts: number of notices of a start or a stop that no waiter has taken yet.
+    error: failure text of this motion.
+    right, left: values of the motor registers, as the server knows them.
+    encoder: the last count, which the next sample evaluates.
+    sampled_s: time of the last sample of the IMU, or -1.
+    moved_s, turned_s: times at which the wheel began to turn, and at which it last turned.
+    angle_deg: angle since the start.
+    released: whether the stop port ended the motion.
     """
 
     def __init__(self, kind: Kind) -> None:
@@ -85,7 +90,10 @@ class Motion:
         self.stop_samples = STOP_SAMPLES
 
     def limit(self, inches: int) -> None:
-        """Compute, from a distance and the calibration, the time after which the motion stops."""
+        """Set the time after which the motion stops.
+
+        It follows from a distance and the calibration.
+        """
         up_s, down_s = RAMPS_S[self.word]
         top_inps = TOP_SPEED_INPS[self.word]
         self.stop_after_s = (inches - (up_s + down_s) / 2 * top_inps) / top_inps + up_s

@@ -2,8 +2,10 @@
 
 """The start of each kind of motion, and its end by a command.
 
-Each step is a function that the server calls later, so that a copy of the server can also continue
-the motion. This module knows motions; it does not know the words of commands.
+Each step of a motion is a function that the server calls later. So a copy of the server can
+continue the motion too.
+
+This module knows motions; it does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING
@@ -23,8 +25,8 @@ PATIENCE_SAMPLES = 50
 PROBE_S = 0.5
 WRITES_S = 0.005
 LINEAR_S = REFERENCE_S = 0.015
-"""``LINEAR_S``, ``REFERENCE_S``: duration in s of the motor board's set-up before a linear move and
-before a reference move."""
+"""``LINEAR_S``, ``REFERENCE_S``: time in s that the set-up of the motor board takes before a linear
+move and before a reference move."""
 
 
 def start_linear(server: "MartServer", word: str, *, backward: bool) -> None:
@@ -50,7 +52,9 @@ def start_controlled(
 ) -> None:
     """Start a move over a distance (TF, TB, PTF, MCF, MCB).
 
-    A distance of 0 or less is unlimited. ``plain``: whether the reply has no distance.
+    ``inches``: the distance. With 0 or less, the move is unlimited.
+
+    ``plain``: whether the reply has no distance.
     """
     motion = server.motions[kind]
     motion.word, motion.backward = word, backward
@@ -81,10 +85,13 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """Take a sample of the gyro bias, and schedule the next one until ``left`` are taken.
+    """Take a sample of the gyro bias, and schedule the next sample while some are left to take.
 
-    After the last sample, start the motion ``kind``, or answer SB if ``kind`` is None. ``missed``:
-    consecutive samples that did not arrive.
+    After the last sample, start the motion ``kind``. If ``kind`` is None, answer SB.
+
+    ``left``: number of samples that are left to take.
+
+    ``missed``: number of samples in a row that did not arrive.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
@@ -150,7 +157,7 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    With 0 degrees or less the command only tests the IMU, unless the quirk ``probe_turns`` is set.
+    With 0 degrees or less, the command only tests the IMU, unless the quirk ``probe_turns`` is set.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word
@@ -187,7 +194,7 @@ def _go_spin(server: "MartServer", kind: Kind, left: bool) -> None:
 
 
 def started(server: "MartServer", kind: Kind) -> None:
-    """Answer the command of an uncontrolled motion that has started, or failed to start."""
+    """Answer the command of an uncontrolled motion, which has started or failed to start."""
     motion = server.motions[kind]
     server.starting = None
     if kind is Kind.REFERENCE and (server.settings.reference_start_fails or motion.error):
@@ -230,7 +237,7 @@ def stop(server: "MartServer", kind: Kind) -> None:
 
 
 def stopped(server: "MartServer", kind: Kind) -> None:
-    """Answer SM or SRM, after the robot has come to rest or has failed to."""
+    """Answer SM or SRM. The robot has come to rest, or has failed to come to rest."""
     motion = server.motions[kind]
     motion.running = motion.released = False
     if kind is Kind.LINEAR:
@@ -246,7 +253,7 @@ def stopped(server: "MartServer", kind: Kind) -> None:
 
 
 def change_linear(server: "MartServer", right: int, left: int) -> bool:
-    """Change the speeds of F or B (CS); return whether the server accepts it."""
+    """Change the speeds of F or B (CS). Return whether the server accepts the change."""
     motion = server.motions[Kind.LINEAR]
     if motion.stopping:
         return False
@@ -255,7 +262,7 @@ def change_linear(server: "MartServer", right: int, left: int) -> bool:
 
 
 def change_reference(server: "MartServer", right: int, left: int) -> bool:
-    """Change the speeds of RM (RMCS); return whether the server accepts it."""
+    """Change the speeds of RM (RMCS). Return whether the server accepts the change."""
     motion = server.motions[Kind.REFERENCE]
     if motion.stopping or motion.starting:
         return False

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command line options of a simulated MART controller, besides its seed and its network.
+"""Command line options of a simulated MART controller, except its seed and its network.
 
-This module knows the names, values and effects of options; it does not know what runs the board.
+This module knows the names, values and effects of options; it does not know which program runs the
+board.
 """
 
 import argparse

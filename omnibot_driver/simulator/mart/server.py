@@ -2,9 +2,10 @@
 
 """The server: two ports with a thread each, a timer while something moves, and simulated time.
 
-The input is datagrams and times, the output is replies; the same settings and input give the same
-output. Time advances from event to event, so a robot at rest takes no computing time. This module
-does not know sockets, real time or the set of commands.
+The input is datagrams and times, and the output is replies. The same settings and input give the
+same output. Time advances from event to event, so a robot at rest takes no computing time.
+
+This module does not know sockets, real time or the set of commands.
 """
 
 from collections import deque
@@ -20,8 +21,10 @@ from omnibot_driver.simulator.mart.state import COMMAND, STOP, ServerState, Then
 QUEUE_LENGTH, REMEMBERED, LOG_LINES = 256, 10_000, 10_000
 QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
-"""``BOOT_S``: time in s from a restart to the opening of the ports. ``START_UP_S``: time in s from
-then to the complete start-up."""
+"""``BOOT_S``: time in s from a restart of the program until it opens its ports.
+
+``START_UP_S``: time in s from the opening of the ports until the program has started up completely.
+"""
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
 Sender = object
@@ -43,10 +46,12 @@ class _Later(NamedTuple):
 
 
 class MartServer(ServerState):
-    """The controller with its robot, driven by ``receive`` and ``advance``.
+    """The controller with its robot. ``receive`` and ``advance`` let time pass.
 
-    ``ServerState`` describes its state. received: the last datagrams at both ports, each with time
-    and port. executed: the last commands that were begun, in order.
+    ``ServerState`` describes its state.
+
+    received: the last datagrams at both ports, each with its time and port.
+    executed: the last commands that the server began, in order.
     """
 
     def __init__(self, settings: MartSettings | None = None) -> None:
@@ -59,7 +64,7 @@ class MartServer(ServerState):
         self.begin()
 
     def begin(self) -> None:
-        """Reset all that the program knows, as when it starts."""
+        """Reset all that the program knows, as at its start."""
         super().begin()
         self._sender: Sender = None
         self._later: _Later | None = None
@@ -69,7 +74,7 @@ class MartServer(ServerState):
     # From outside
 
     def receive(self, datagram: bytes, port: int, sender: Sender, now: float) -> None:
-        """Receive a datagram at ``now``, in s since construction and never decreasing."""
+        """Receive a datagram at ``now``, in s since construction. ``now`` must never decrease."""
         self._run(now)
         self.received.append((now, port, datagram))
         if self.crashed or now < self._boots_until_s:
@@ -87,20 +92,23 @@ class MartServer(ServerState):
             self._next()
 
     def advance(self, now: float) -> list[Reply]:
-        """Let time pass until ``now`` and return the replies sent since the last call."""
+        """Let time pass until ``now``. Return the replies that were sent since the last call."""
         self._run(now)
         out, self._out = self._out, []
         return out
 
     @property
     def wake_at(self) -> float:
-        """Time in s of the next event that happens without a datagram; infinity if none is due."""
+        """Time in s of the next event that needs no datagram. It is infinity if there is none."""
         if self._out:
             return self.now_s
         return min(self._step_at_s, inf if self._later is None else self._later.at_s)
 
     def copy(self) -> "MartServer":
-        """Return an independent copy that continues from here; faster than a deep copy."""
+        """Return an independent copy, which continues from here.
+
+        This is faster than a deep copy.
+        """
         new = MartServer.__new__(MartServer)
         new.__dict__.update(self.__dict__)
         new.chassis, new.imu = self.chassis.copy(), self.imu.copy()
@@ -114,10 +122,10 @@ class MartServer(ServerState):
         return new
 
     def restart(self, boot_s: float = BOOT_S) -> None:
-        """Restart the server program; the motors keep the last command that they got.
+        """Restart the server program. The motors keep the last command that they received.
 
-        Datagrams of the next ``boot_s`` seconds are lost. START_UP_S later the server has started
-        up completely.
+        Datagrams of the next ``boot_s`` seconds are lost. ``START_UP_S`` later, the server has
+        started up completely.
         """
         self.begin()
         self.imu.restart()
@@ -126,17 +134,17 @@ class MartServer(ServerState):
 
     @property
     def starts_up(self) -> bool:
-        """Whether the program has opened its ports, but has not created everything yet."""
+        """Whether the program has opened its ports, but has not started up completely."""
         return self.now_s < self._starts_until_s
 
     def power_cycle(self, boot_s: float = 1.0) -> None:
-        """Switch controller and motor board off and on; the robot stays where it is."""
+        """Switch the controller and the motor board off and on. The robot stays where it is."""
         self.chassis.power_cycle()
         self.restart(boot_s)
 
     @property
     def blocked(self) -> bool:
-        """Whether the command port waits for samples of an IMU that is dead."""
+        """Whether the command port waits for samples of an IMU that does not send any."""
         if self.imu.living(self.now_s) or self.crashed:
             return False
         later = self._later
@@ -163,8 +171,10 @@ class MartServer(ServerState):
         self._later = _Later(self.now_s + seconds, then, args)
 
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
-        """Call ``then`` at the next notice of this motion's start or end, or now if a notice is
-        already there."""
+        """Call ``then`` at the next notice that a motion of this kind has started or ended.
+
+        If such a notice is already there, call ``then`` now.
+        """
         motion = self.motions[kind]
         if motion.posts:
             motion.posts -= 1
@@ -174,7 +184,10 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give a notice of a motion's start or end to the first waiter; keep it if none waits."""
+        """Give the first waiter the notice that a motion of this kind has started or ended.
+
+        If none waits for this kind of motion, the notice is kept.
+        """
         for waiter in self.waiters:
             if waiter.kind is kind:
                 self.waiters.remove(waiter)
@@ -198,12 +211,12 @@ class MartServer(ServerState):
         self._out.append(Reply(self.now_s, COMMAND, self._sender, data))
 
     def done(self) -> None:
-        """Finish the command in progress and begin the next one."""
+        """Finish the command in progress, and begin the next one."""
         self.busy = False
         self._next()
 
     def abort(self, text: str) -> None:
-        """Give up the motion that is being started, and answer its command."""
+        """Give up the motion that is being started, and answer its command with ``text``."""
         kind, self.starting = self.starting, None
         self._later = None
         self.waiters = [waiter for waiter in self.waiters if waiter.port != COMMAND]
@@ -214,7 +227,7 @@ class MartServer(ServerState):
         self.answer(text)
 
     def end(self, why: str) -> None:
-        """End the program, for the reason ``why``; the motors keep their last command."""
+        """End the program for the reason ``why``. The motors keep their last command."""
         self.crashed = why
         self.alarm = self.starting = self._later = None
         self.busy = False

@@ -29,9 +29,10 @@ Handler = Callable[["MartServer", str], str | None]
 
 
 def missing(server: "MartServer", what: str) -> str | None:
-    """Refuse a command that lacks numbers.
+    """Refuse a command that has too few numbers.
 
-    With the quirk ``crashes_on_missing_numbers``, end the server instead, for the reason ``what``.
+    With the quirk ``crashes_on_missing_numbers``, end the server instead. ``what``: the reason for
+    its end.
     """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
@@ -40,12 +41,12 @@ def missing(server: "MartServer", what: str) -> str | None:
 
 
 def fine(server: "MartServer", text: str) -> str | None:
-    """Accept a command whose effect is not simulated (SMCST, STPMCST, SSR, MFC)."""
+    """Accept a command that has no effect here (SMCST, STPMCST, SSR, MFC)."""
     return "ok"
 
 
 def bare_fail(server: "MartServer", text: str) -> str | None:
-    """Answer ``fail``, because calibration files do not exist (MNLV)."""
+    """Answer ``fail`` to MNLV, because the server has no calibration files."""
     return "fail"
 
 
@@ -70,7 +71,7 @@ def heading(server: "MartServer", text: str) -> str | None:
 
 
 def last_measured(server: "MartServer", text: str) -> str | None:
-    """Answer 0, because the distances of MCD and MD are not simulated."""
+    """Answer 0 to MCD and MD, because the distances that they report are not simulated."""
     return "ok 0"
 
 
@@ -79,7 +80,7 @@ def _ask_board(server: "MartServer", then: Callable[["MartServer"], None]) -> No
 
 
 def encoder(server: "MartServer", text: str) -> str | None:
-    """Answer with the encoder count, or with ``fail`` if the motor board is silent (ENC)."""
+    """Answer ENC with the encoder count, or with ``fail`` if the motor board is silent."""
     _ask_board(server, _tell_encoder)
     return None
 
@@ -89,7 +90,7 @@ def _tell_encoder(server: "MartServer") -> None:
 
 
 def motor_status(server: "MartServer", text: str) -> str | None:
-    """Answer with the status bits of the motor board, or 255 if it is silent (MCSTAT)."""
+    """Answer MCSTAT with the status bits of the motor board, or with 255 if it is silent."""
     _ask_board(server, _tell_status)
     return None
 
@@ -100,7 +101,8 @@ def _tell_status(server: "MartServer") -> None:
 
 
 def sonar(*, backward: bool) -> Handler:
-    """Return the handler of SFC or SRC, which measures a near obstacle three times."""
+    """Return the handler of SFC or SRC. It reads the sonar once, or three times if an obstacle is
+    near."""
 
     def handle(server: "MartServer", text: str) -> str | None:
         least = REAR_CLEARANCE_IN if backward else FRONT_CLEARANCE_IN
@@ -121,14 +123,14 @@ def _tell_rear(server: "MartServer") -> None:
 
 
 def record_sonar(server: "MartServer", text: str) -> str | None:
-    """Accept a recording of some minutes (SFR, SRR), whose file is not simulated."""
+    """Accept a recording of the sonar (SFR, SRR). Its file is not simulated."""
     return "ok" if wire.fields(text) else missing(server, f"{text} without a number")
 
 
 def take_bias(server: "MartServer", text: str) -> str | None:
     """Measure the gyro bias (SB).
 
-    A closed IMU is opened again first; the command fails if this is impossible.
+    If the server has stopped using the IMU, it first opens the IMU again. If it cannot, SB fails.
     """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
@@ -173,7 +175,7 @@ def _reset_board(server: "MartServer") -> None:
 
 
 def set_time(server: "MartServer", text: str) -> str | None:
-    """Set the clock in UTC (TIME m d yyyy h mi s); the seconds are ignored."""
+    """Set the clock in UTC (TIME m d yyyy h mi s). The seconds are ignored."""
     numbers = [wire.integer(word) for word in text.split(" ")[1:] if word]
     if len(numbers) < 6:
         return missing(server, "TIME with fewer than six numbers")
@@ -190,7 +192,7 @@ def set_time(server: "MartServer", text: str) -> str | None:
 
 
 def open_log(server: "MartServer", text: str) -> str | None:
-    """Open the log (LOG); a log that is open stays open."""
+    """Open the log (LOG). A log that is already open stays open."""
     if server.log is None:
         if server.quirks.log_deletes_files:
             server.files.clear()
@@ -219,7 +221,7 @@ def last_file(which: str) -> Handler:
 
 
 def leave(server: "MartServer", text: str) -> str | None:
-    """End the program (EXIT), after sending the log if one is open."""
+    """End the program (EXIT). If a log is open, send it first."""
     if server.log is not None:
         content = (
             "\n".join([*server.log, f"{server.date} UDP server shutting down"]) + "\n"
@@ -234,7 +236,7 @@ def leave(server: "MartServer", text: str) -> str | None:
 
 
 def start_record(server: "MartServer", text: str) -> str | None:
-    """Begin a recording (REC START), whose file is not simulated."""
+    """Begin a recording (REC START). Its file is not simulated."""
     server.recording = True
     return "ok"
 

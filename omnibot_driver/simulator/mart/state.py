@@ -19,17 +19,18 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 COMMAND, STOP = 0, 1
 """``COMMAND``, ``STOP``: indices of the command port and of the stop port."""
 NEAR_READINGS_S = 0.15
-"""Duration of the three readings that confirm a near obstacle, in s."""
+"""Time in s that the three readings take which confirm a near obstacle."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Time in s by which the server misreads a negative duration: it counts unsigned milliseconds."""
+"""Error of a negative duration in s. The server counts milliseconds without a sign, so a negative
+duration is too long by this time."""
 FILES = 100
 
 Then = Callable[..., None]
 
 
 class Waiter(NamedTuple):
-    """The thread of a port that waits for the notice that a motion has started or stopped."""
+    """The thread of a port while it waits for the notice that a motion has started or stopped."""
 
     port: int
     kind: Kind
@@ -40,12 +41,17 @@ class Waiter(NamedTuple):
 class ServerState:
     """The state of the server, its robot and its surroundings.
 
-    now_s: simulated time since construction. crashed: why the server ended; empty while it runs.
-    busy: whether a command is in progress. motions: state of each kind of motion; alarm: the kind
-    that is supervised; starting: the kind whose command is not answered yet. custom: parameters set
-    by SLMP and SSP. sampling_since_s: time since which a motion uses a sonar, or -1 if none does.
-    front_m, rear_m, dock_m and the attributes of the chassis and the IMU can be changed at any
-    time.
+    now_s: simulated time since construction.
+    crashed: why the server ended. Empty while it runs.
+    busy: whether a command is in progress.
+    motions: state of each kind of motion.
+    alarm: the kind of motion that is supervised.
+    starting: the kind of motion whose command is not answered yet.
+    custom: parameters that SLMP and SSP have set.
+    sampling_since_s: time since which a motion uses a sonar, or -1 if none does.
+    front_m, rear_m, dock_m: distances from the start. They can be changed at any time.
+
+    The attributes of the chassis and the IMU can also be changed at any time.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -60,7 +66,7 @@ class ServerState:
         self.files: dict[str, FileNote] = {}
 
     def begin(self) -> None:
-        """Reset all that the program knows, as when it starts."""
+        """Reset all that the program knows, as at its start."""
         self.crashed = ""
         self.motions = [Motion(kind) for kind in Kind]
         self.alarm: Kind | None = None
@@ -105,7 +111,7 @@ class ServerState:
 
     @property
     def date(self) -> str:
-        """Date and time of the server's clock as text, in the form used in its files."""
+        """Date and time of the server's clock as text, in the format of its files."""
         return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
 
     @property
@@ -120,27 +126,33 @@ class ServerState:
 
     @property
     def conflict(self) -> bool:
-        """Whether the server refuses motions, because of a motion, recording or MCS in progress."""
+        """Whether the server refuses motions, as a motion, a recording or MCS is in progress."""
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:
-        """Store the file of the last move or turn; beyond 100 files, delete the oldest."""
+        """Store the file of the last move or turn.
+
+        If there are more than 100 files, delete the oldest.
+        """
         self.files[note.name] = note
         if len(self.files) > FILES:
             del self.files[next(iter(self.files))]
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
 
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
-        """Return the reading of a sonar ``ago_s`` ago, in inches; -1 if no wall is in range."""
+        """Return the reading of a sonar ``ago_s`` ago, in inches.
+
+        It is -1 if no wall is in range.
+        """
         seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
         way_m = self.chassis.speed_mps * ago_s
         inches = (seen_m - way_m if backward else seen_m + way_m) * INCHES_PER_M
         return int(inches) if 1.0 <= inches < FARTHEST_IN + 1 else -1
 
     def clearance_in(self, *, backward: bool) -> int:
-        """Return the last reading in inches of the sonar that a motion uses.
+        """Return the last reading, in inches, of the sonar that the present motion uses.
 
-        Return -1 if no wall is in range, or before the first reading.
+        It is -1 if no wall is in range, or before the first reading.
         """
         since_s = self.sampling_since_s
         if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:
@@ -149,14 +161,15 @@ class ServerState:
 
     @property
     def heading_integrates(self) -> bool:
-        """Return whether turning currently changes the relative heading."""
+        """Whether turning changes the relative heading now."""
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:
         """Record the time of a sample of RM.
 
-        With ``heading_starts_off``, the first sample of RM is integrated over the time since the
-        last sample of the previous RM. That time is huge if the clock was set back meanwhile.
+        With the quirk ``heading_starts_off``, the first sample of RM changes the heading by half
+        the turn rate times the time since the last sample of the previous RM. This time is huge if
+        the clock was set back meanwhile.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stop port: commands that work while the command port is busy, and are never answered.
+"""The stop port. Its commands work while the command port is busy, and are never answered.
 
 This module knows the three commands of the stop port; it does not know those of the command port.
 """
@@ -33,7 +33,7 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
-    """Stop an uncontrolled motion; return whether the port must wait for a notice of its end."""
+    """Stop an uncontrolled motion. Return whether the port must wait for the notice of its end."""
     if motion.kind is Kind.SPIN:
         if motion.stopping:
             return False
@@ -70,7 +70,10 @@ def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
 
 
 def _limit(server: "MartServer", text: str) -> None:
-    """Limit an unlimited move to a distance in inches from the place where it began (SDR)."""
+    """Limit an unlimited move (SDR).
+
+    The command gives a distance in inches, counted from the place where the move began.
+    """
     motion = next(
         (each for each in server.motions if each.running and each.kind in DRIVES[1:3]), None
     )

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Codec of the datagrams as the server reads and writes them; its only source is the manual.
+"""Codec of the datagrams as the server reads and writes them. Its only source is the manual.
 
 A request is one line of text without a terminator. Numbers are parsed as C's ``atoi`` parses them.
+
 This module does not know the meaning of a command.
 """
 
@@ -25,22 +26,22 @@ def reply(text: str) -> bytes:
 
 
 def integer(text: str) -> int:
-    """Return the number at the beginning of the text, or 0 without a number."""
+    """Return the number at the beginning of the text, or 0 without such a number."""
     found = _NUMBER.match(text)
     return int(found[1]) if found else 0
 
 
 def fields(text: str) -> list[str]:
-    """Return, for each blank in the text, everything after this blank."""
+    """Return for each blank in the text everything after this blank."""
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 
 
 def degrees(angle_deg: float) -> str:
-    """Return the reply of RMCS and RMRA with an angle in degrees."""
+    """Return the text with which RMCS and RMRA report an angle in degrees."""
     return f"ok {angle_deg:.2f}"
 
 
 def blocks(name: str, content: bytes) -> list[bytes]:
-    """Return the datagrams of a file: its name and size, then its bytes."""
+    """Return the datagrams that contain a file: its name and size, then its bytes."""
     head = reply(f"ok {name} {len(content)}")
     return [head, *(content[at : at + BLOCK] for at in range(0, len(content), BLOCK))]
