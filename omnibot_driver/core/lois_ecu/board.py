@@ -44,15 +44,15 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Time in s from one reset to its repetition. In this time, the wheels have come to rest after a
-stop, and at the usual period at least four groups of ticks have arrived."""
+"""Time in s after which a reset is repeated. By then, the wheels have come to rest after a stop,
+and at least four groups of ticks have arrived at the usual period."""
 STEADY_S: Final = 0.3
 """Time in s. After this time without a change of the tick counts, the driver treats the counts as
 steady. It is longer than the usual period of the ticks."""
 
 
 class LoisEcuBoard(Board):
-    """A robot's LOIS ECU; ``settings`` may be replaced at any time."""
+    """A robot's LOIS ECU. ``settings`` may be replaced at any time."""
 
     traits = TRAITS
 
@@ -99,9 +99,10 @@ class LoisEcuBoard(Board):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether unchanged ticks prove a standstill now: the board counts both wheels' ticks.
+        """Whether the board counts both wheels' ticks now.
 
-        The public firmware counts a wheel's ticks only while its RPM target is positive.
+        Only then, unchanged ticks prove a standstill. The public firmware counts a wheel's ticks
+        only while its RPM target is positive.
         """
         return self._ecu.translation.odometry.counting
 
@@ -133,7 +134,8 @@ class LoisEcuBoard(Board):
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings of held groups that waited long enough, and odometry if it is due."""
+        """Return the readings that were held back for long enough, and the odometry if it is
+        due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)
@@ -147,7 +149,10 @@ class LoisEcuBoard(Board):
 
     @property
     def _odometry_due_at(self) -> float:
-        """Time when the next odometry is due; infinity while the board does not report motion."""
+        """Time when the next odometry is due.
+
+        It is infinity while the board does not report motion.
+        """
         silent = self._sensor_speaks or self.mode is not Mode.NOMINAL
         return math.inf if silent else self._odometry_at
 

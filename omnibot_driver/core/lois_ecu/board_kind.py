@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Smallest number of groups of ticks that must arrive without odometry directly after them. Then a
-group of odometry with its own command byte (0x20) shows a board as in the manual."""
+"""If this number of groups of ticks arrive without odometry directly after them, a group of
+odometry with its own command byte (0x20) shows a board as in the manual."""
 UNCOUNTED_M: Final = 0.06
 """Distance in m, of both wheels together. If wheels roll backward this far and no count falls, the
 driver concludes that ticks do not count backward."""

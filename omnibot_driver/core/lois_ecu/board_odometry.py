@@ -94,7 +94,7 @@ class OdometryReader:
 
 
 def rim_speeds(group: BoardOdometry, track_m: float) -> tuple[float, float] | None:
-    """Return the speeds of the left and right rim in m/s; None if the velocity is not finite."""
+    """Return the speeds of the left and right rim in m/s, or None if the velocity is not finite."""
     along = group.dx_mps * math.cos(group.yaw_rad) + group.dy_mps * math.sin(group.yaw_rad)
     # After a rest between two ticks, the board computes one large turn for the time of the rest.
     # The velocity then points along the middle of this turn.

@@ -51,8 +51,8 @@ UNFORESEEN_TICKS: Final = 1.5
 """Largest usual difference between a reported and the expected count, in ticks. Above it, the
 filter assumes that the wheel's speed has changed although its set-point has not."""
 SAME_TICKS: Final = 0.6
-"""Smallest difference between an unchanged and the expected count, in ticks, that the filter uses.
-Below it, the missing tick shows nothing, because the tick may not be due yet."""
+"""If a count has not changed, the filter uses it only if it differs from the expected count by at
+least this number of ticks. At a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP``, ``LEAP_M``: largest difference between a reported and the expected heading, in standard
@@ -102,7 +102,9 @@ class Comparison:
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
         """Correct the filter by a wheel's count.
 
-        ``ticks``: number of new ticks of the wheel in the last ``duration_s``.
+        ``ticks``: number of new ticks of the wheel.
+
+        ``duration_s``: time since the last group, in s.
 
         ``late_s``: how much later than usual the ticks arrived, in s.
         """

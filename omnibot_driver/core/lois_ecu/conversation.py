@@ -151,12 +151,15 @@ class LoisConversation:
 
     @property
     def translation(self) -> Translation:
-        """Translation of reports; it contains the estimate of the robot's motion."""
+        """Translation of reports. It contains the estimate of the robot's motion."""
         return self._translation
 
     @property
     def held_until(self) -> float:
-        """Time at which ``receive(b"", …)`` returns held reports; infinity if none is held."""
+        """Time at which ``receive(b"", …)`` returns the held reports.
+
+        It is infinity if none is held.
+        """
         return self._decoder.resolves_at
 
     def predicted(self, now: float) -> FusedOdometry | None:
@@ -258,8 +261,8 @@ class LoisConversation:
         The board does not latch an e-stop. So during an e-stop, the driver sends RPM 0/0 and Stop
         in turn.
 
-        In a terminal mode, only Stop is sent. The public firmware then forwards all received
-        characters to the sensor, and reads at most 480 characters a second.
+        In a terminal mode, only Stop is sent. The public firmware then forwards each received
+        character to the sensor, so it reads at most 480 characters a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
@@ -294,9 +297,9 @@ class LoisConversation:
         return self._lines(outbound.STOP, Reset())
 
     def write_settings(self, now: float) -> None:
-        """Write all settings again.
+        """Write all settings again after a reset.
 
-        The manual says that a reset affects controllers and interfaces.
+        According to the manual, a reset affects controllers and interfaces.
         """
         self._upkeep.writer.begin(now)
 

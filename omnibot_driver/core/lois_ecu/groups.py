@@ -8,9 +8,9 @@ A group is returned complete or not at all. A lost line makes a group too short.
 makes it too long, and a line of another group interrupts it. So only what follows a group shows
 whether the group is complete.
 
-A group need not wait for that on two conditions: no line equals the one before it, so none was
-received twice, and the values can follow those of the last group. It is then returned with its last
-line. Any other group is held until the next line comes, or until no line has come for ``QUIET_S``.
+But most groups are returned at once with their last line, on two conditions. First, no line equals
+the line before it, so no line was received twice. Second, the values can follow those of the last
+group. Any other group is held until the next line comes, or until no line has come for ``QUIET_S``.
 
 After such a silence, a held group of a valid length is returned. A shorter group continues to wait,
 because its other lines may be read late. But lines that come almost a period later may belong to
@@ -58,7 +58,7 @@ lines of a group 1.2 ms apart, and a reader usually delivers them within this ti
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
 """Longest allowed pause within a group, as a fraction of the time from the marker of the previous
-group to the marker of this group. The pause may be at least ``QUIET_S`` and at most ``LATE_S``."""
+group to the marker of this group. This limit is at least ``QUIET_S`` and at most ``LATE_S``."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
@@ -126,7 +126,8 @@ class Assembler:
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """Forget the last counts and poses, because a reset of the board may have cleared them."""
+        """Forget the last counts and poses, because a reset may have cleared the board's
+        counters."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()

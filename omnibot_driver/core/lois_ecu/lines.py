@@ -40,7 +40,7 @@ class Line:
 
 
 def checksum(text: bytes) -> int:
-    """Return the XOR of the characters of a line before its checksum."""
+    """Return the checksum of a line: the XOR of its first eleven characters."""
     return reduce(xor, text[:_SUMMED], 0)
 
 
@@ -53,10 +53,10 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 
 
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
-    """Return the line that the characters from ``:`` to the line feed form; None if not valid.
+    """Parse the characters of one line, from ``:`` to the line feed. None if they are not valid.
 
     A carriage return before the line feed is accepted. If ``sum_required`` is false, the line may
-    lack the checksum. A checksum that the line has must be right in any case.
+    lack the checksum. But if the line has a checksum, it must be right in any case.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Prediction of the wheel speeds that the public firmware keeps, and of their effect on 0x20.
+"""Prediction of the wheel speeds that the firmware measured last, and of their effect on 0x20.
 
 The motion filter calls this module in each of its steps. The module works on the states of the
 filter, without reports.
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""``START_TICKS``, ``START_STDDEV_TICKS``: how many ticks of a starting wheel 0x20 (odometry)
-misses, as mean and standard deviation."""
+"""``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
+that 0x20 (odometry) misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of the motion that 0x20 (odometry) misses while a wheel turns
@@ -35,11 +35,11 @@ comes soon after a delayed one."""
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
-    """Predict the speeds that the firmware keeps, and the resulting changes of 0x20 (odometry).
+    """Predict the speeds that the firmware measured last, and the resulting changes of 0x20.
 
-    The firmware updates 0x20 at each tick of either wheel. It uses the speed that it measured last
-    for each wheel. So while only one wheel rolls, 0x20 combines the present speed of this wheel
-    with an old speed of the wheel at rest.
+    The firmware updates 0x20 (odometry) at each tick of either wheel. It uses the speed that it
+    measured last for each wheel. So while only one wheel rolls, 0x20 combines the present speed of
+    this wheel with an old speed of the wheel at rest.
 
     ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
     """

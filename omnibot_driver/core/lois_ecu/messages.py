@@ -110,7 +110,7 @@ class RecordKind(Enum):
 class SetDuty:
     """A command that sets the duty of each motor, in percent of the supply voltage: -100..100.
 
-    The duty is not controlled by speed (open loop).
+    The board does not control the speed (open loop).
     """
 
     left_percent: int

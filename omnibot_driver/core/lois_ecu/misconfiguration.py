@@ -22,7 +22,7 @@ GAINS: Final = (
     Setting.RIGHT_TN,
     Setting.RIGHT_TD,
 )
-"""Gains of the speed controllers; the board does not report their values."""
+"""Gains of the speed controllers. The board does not report their values."""
 OWN_GAINS: Final = (
     "the speed controllers run with the board's own {}. With the gains of the public firmware a"
     " wheel oscillates, so the robot does not hold its course. After 5 m, odometry is wrong by"

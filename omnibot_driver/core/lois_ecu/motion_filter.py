@@ -102,8 +102,8 @@ class MotionFilter:
     ``tuned``: whether the speed controllers have gains that the user set.
 
     Some wheels are halted soon after a change of their set-point. Such a wheel did not yet roll at
-    the modelled speed, and perhaps rolled in the other direction. The filter then adds an error to
-    the wheel's distance. Its standard deviation is the change of speed times
+    the modelled speed, and perhaps rolled in the other direction. So the filter adds an error to
+    the wheel's distance. The standard deviation of this error is the change of speed times
     ``UNSETTLED_S[tuned]``.
     """
 

@@ -178,9 +178,9 @@ class LoisOdometry:
     # Inbound
 
     def heard_ticks(self, ticks: Ticks, now: float, late_s: float = 0.0) -> list[FusedOdometry]:
-        """Process ticks (0x12).
+        """Process ticks (0x12), and return a list with the new estimate.
 
-        Return the new estimate, or nothing for the first ticks of a connection.
+        The list is empty for the first ticks of a connection.
 
         ``late_s``: how much later than usual the ticks arrived, in s.
         """

@@ -3,13 +3,15 @@
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
 All settings are sent in ``ROUNDS`` rounds. The pause between two rounds is longer than the time for
-which the board cannot receive. Two things confirm the settings: the ticks arrive with the requested
-period, and a date arrives. Each round requests one date, because the board sends no dates after a
-boot. The rounds continue until both have arrived. Writing a gain resets the firmware's controller.
-So while the robot drives, rounds after the first ``ROUNDS`` wait.
+which the board cannot receive. Writing a gain resets the firmware's controller. So while the robot
+drives, rounds after the first ``ROUNDS`` wait.
 
-Later, ``ask_date`` requests the date while the GPS works but the date is unknown. The GPS had no
-date before, or midnight has passed.
+Two things confirm the settings: the ticks arrive with the requested period, and a date arrives.
+Each round requests one date, because the board sends no dates after a boot. The rounds continue
+until both things have confirmed the settings.
+
+Later, ``ask_date`` requests the date while the GPS works but the date is unknown. This happens if
+the GPS had no date before, or after midnight.
 
 A request for one date ends the board's periodic sending of dates. So if the user has set a period
 of the date, the requests end with the first answer. The following rounds restore the period.
@@ -232,7 +234,10 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether the user has set a period of the date, which a request for one date would end."""
+        """Whether the user has set a period of the date.
+
+        A request for one date would end the periodic sending.
+        """
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:

@@ -2,7 +2,7 @@
 
 """Lines that make the robot move and stop, for a board that loses characters and complete lines.
 
-Damage does not change a line into another valid line. The firmware accepts a line if it has 14
+Damage almost never changes a line into another valid line. The firmware accepts a line if it has 14
 characters (12 without checksum) from its ``:`` to its line feed, and if its checksum is right. It
 counts characters from the last ``:``, and restarts after the fourteenth. So a line that lost
 characters is too short. Two lines become one only if fourteen characters in a row are lost (twelve

@@ -73,7 +73,7 @@ class Gate(Generic[Group]):
         return True
 
     def would_pass(self, group: Group, now: float) -> bool:
-        """Return whether the group can follow the last accepted one. Changes nothing."""
+        """Return whether the group can follow the last accepted one. Nothing is stored."""
         last = self._last
         return last is not None and self._reachable(last[0], group, now - last[1])
 
@@ -83,7 +83,7 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what the subclass has learnt about the board's counters; by default, nothing."""
+        """Forget what a subclass has learnt about the board's counters."""
 
 
 class TicksGate(Gate[Ticks]):
@@ -105,7 +105,7 @@ class TicksGate(Gate[Ticks]):
         return passed
 
     def would_pass(self, group: Ticks, now: float) -> bool:
-        """Return whether the ticks can follow the last accepted ones. Changes nothing."""
+        """Return whether the ticks can follow the last accepted ones. Nothing is stored."""
         last, unit = self._last, self.unit
         return super().would_pass(group, now) and (
             last is None

@@ -122,7 +122,7 @@ class RecordRequest:
         return self._begun_s + SAID_AFTER_S[self._said]
 
     def due(self, now: float) -> Command | None:
-        """Return the command to send now; None if nothing is due."""
+        """Return the command to send now, or None if nothing is due."""
         if now < self.wake_at:
             return None
         self._begun_s = min(self._begun_s, now)

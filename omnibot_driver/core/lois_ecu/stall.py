@@ -12,7 +12,7 @@ While the other wheel turns, 0x20 repeats the same speed for the wheel at rest.
 A wheel that rolls steadily also repeats a speed. But this speed is not far above its set-point: far
 above it, the controller gives no power, so the wheel would slow down. There are two exceptions. A
 feed-forward gives power at any speed. A saturated controller may keep full power until RPM 0/0
-restarts it; the wheel is then faster than any wheel that comes to rest.
+restarts it. The wheel is then faster than any wheel that comes to rest.
 
 This module works on set-points, reports and times.
 """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One wheel as the board sees it: encoder edges in; ticks, speed and motor duty out.
+"""One wheel as the board sees it. It takes encoder edges, and gives ticks, speed and motor duty.
 
 This module knows the firmware's quirks of counting and measuring. It does not know the protocol or
 the other wheel.
@@ -51,7 +51,7 @@ class WheelChannel:
         self._count = 0
         self._ticked_s = 0.0
         self.turned_ticks = 0
-        """Ticks since the odometry last read this number; negative if the wheel truly turned
+        """Ticks since the odometry last read this number. It is negative if the wheel truly turned
         backward."""
         self.record: list[int] = []
         self.record_left = 0

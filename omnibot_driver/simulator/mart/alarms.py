@@ -154,7 +154,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    Like the server, this function adds the distance of the ramps in feet to a sum in inches.
+    The server wrongly adds the distance of the ramps in feet to a sum in inches. This function does
+    the same.
     """
     if motion.kind not in _TIMED:
         return 0.0

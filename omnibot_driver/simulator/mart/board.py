@@ -34,7 +34,7 @@ class SimulatedMart:
         return self.ticks * TICK_S
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Deliver a datagram to the port ``channel``. The time is ``now_s``; ``now`` is ignored."""
+        """Deliver a datagram to the port ``channel`` at the simulated time. ``now`` is ignored."""
         self.server.receive(data, channel, None, self.now_s)
 
     def advance(self) -> list[Packet]:

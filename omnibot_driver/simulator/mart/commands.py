@@ -212,7 +212,7 @@ def _measured(server: "MartServer", text: str) -> str | None:
 def _tuned(server: "MartServer", text: str) -> str | None:
     """Start PTF. The request has a distance in inches and three gains.
 
-    The gains have no effect here.
+    The gains have no effect in the simulation.
     """
     slow = text.startswith("PTF SLOW")
     behind = text[len("PTF SLOW") if slow else len("PTF") :].removeprefix(" NORMAL")
@@ -250,7 +250,7 @@ def _parameters(name: str, wrong: str) -> Handler:
 
 
 def _gains(server: "MartServer", text: str) -> str | None:
-    """Accept three gains (SLPP). They have no effect here."""
+    """Accept three gains (SLPP). They have no effect in the simulation."""
     return "ok" if len(wire.fields(text)) >= 3 else MISSNG
 
 

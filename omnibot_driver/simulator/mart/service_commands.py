@@ -31,8 +31,9 @@ Handler = Callable[["MartServer", str], str | None]
 def missing(server: "MartServer", what: str) -> str | None:
     """Refuse a command that has too few numbers.
 
-    With the quirk ``crashes_on_missing_numbers``, end the server instead. ``what``: the reason for
-    its end.
+    With the quirk ``crashes_on_missing_numbers``, end the server instead.
+
+    ``what``: the reason why the server ends.
     """
     if not server.quirks.crashes_on_missing_numbers:
         return "fail improper command format"
@@ -41,7 +42,7 @@ def missing(server: "MartServer", what: str) -> str | None:
 
 
 def fine(server: "MartServer", text: str) -> str | None:
-    """Accept a command that has no effect here (SMCST, STPMCST, SSR, MFC)."""
+    """Accept a command that has no effect in the simulation (SMCST, STPMCST, SSR, MFC)."""
     return "ok"
 
 
@@ -101,8 +102,10 @@ def _tell_status(server: "MartServer") -> None:
 
 
 def sonar(*, backward: bool) -> Handler:
-    """Return the handler of SFC or SRC. It reads the sonar once, or three times if an obstacle is
-    near."""
+    """Return the handler of SFC or SRC.
+
+    The handler reads the sonar once, or three times if an obstacle is near.
+    """
 
     def handle(server: "MartServer", text: str) -> str | None:
         least = REAR_CLEARANCE_IN if backward else FRONT_CLEARANCE_IN

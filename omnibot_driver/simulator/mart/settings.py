@@ -24,8 +24,8 @@ class Quirks:
     left_spin_in_reference_move: L is accepted during RM, and hangs the command port.
     moves_wait_for_imu: F, B, TF, TB and SB wait until a dead IMU works again, and then continue.
     drives_trust_imu: RM, R and L start without a working IMU. Every uncontrolled motion continues
-        without a working IMU. Without its samples, the server detects neither obstacles nor the
-        start and the stop of the motion.
+        without a working IMU. Without samples of the IMU, the server detects neither obstacles nor
+        the start and the stop of the motion.
     reference_speed_wraps: RM with a speed below 1 or above 127 writes a register value that wraps
         around. RMCS then limits the value.
     reference_start_counts_on: RM counts samples until the wheel turns. The count does not begin at

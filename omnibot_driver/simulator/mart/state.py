@@ -19,11 +19,11 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 COMMAND, STOP = 0, 1
 """``COMMAND``, ``STOP``: indices of the command port and of the stop port."""
 NEAR_READINGS_S = 0.15
-"""Time in s that the three readings take which confirm a near obstacle."""
+"""Duration in s of the three sonar readings that confirm a near obstacle."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Error of a negative duration in s. The server counts milliseconds without a sign, so a negative
-duration is too long by this time."""
+"""Error of the server in s if a duration is negative. The server counts milliseconds without a
+sign, so it computes a duration that is too long by this time."""
 FILES = 100
 
 Then = Callable[..., None]
