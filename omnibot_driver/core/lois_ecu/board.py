@@ -134,8 +134,7 @@ class LoisEcuBoard(Board):
         self._ecu.silence()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that were held back for long enough, and the odometry if it is
-        due."""
+        """Return readings that were held back for long enough, and odometry if it is due."""
         readings: list[Reading] = []
         if now >= self._ecu.held_until:
             readings += self.receive(b"", now)

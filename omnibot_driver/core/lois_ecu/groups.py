@@ -126,8 +126,7 @@ class Assembler:
         self._record.expect(kind, left, right)
 
     def forget(self) -> None:
-        """Forget the last counts and poses, because a reset may have cleared the board's
-        counters."""
+        """Forget the last counts and poses, because a reset may have cleared them."""
         self._ticks_gate.forget()
         for gate in self._odometry_gates.values():
             gate.forget()
