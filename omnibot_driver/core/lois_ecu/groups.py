@@ -8,7 +8,7 @@ A group is returned complete or not at all. A lost line makes a group too short.
 makes it too long, and a line of another group interrupts it. So only what follows a group shows
 whether the group is complete.
 
-But most groups are returned at once with their last line, on two conditions. First, no line equals
+But a group is returned at once with its last line if it meets two conditions. First, no line equals
 the line before it, so no line was received twice. Second, the values can follow those of the last
 group. Any other group is held until the next line comes, or until no line has come for ``QUIET_S``.
 
