@@ -2,10 +2,11 @@
 
 """The envelope: the velocities that a robot may have under its recent set-points.
 
-A robot follows its set-points late and smoothly, so its velocity is in the convex hull of the
+A robot follows its set-points late and smoothly. So its velocity is inside the convex hull of its
 recent set-points and rest. Rest is included because a robot may always be slower than commanded. A
-margin around the hull allows for inexact scales, unequal wheels and noise. The module is pure
-geometry, in the board's own axes, and does not know time.
+margin around the hull allows for inexact scales, unequal wheels and noise.
+
+This module knows velocities in the board's own axes; it does not know times.
 """
 
 import math
@@ -20,29 +21,35 @@ STRETCH: Final = 1.2
 hand, and controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: noise in m/s and rad/s that is always allowed.
+"""``NOISE_MPS``, ``NOISE_RADPS``: speed in m/s and yaw rate in rad/s outside the hull that are
+always allowed.
 
-The causes are encoder counts, rounding, and a slope on which a slow controller lets the robot roll.
+Their causes are the resolution of the encoders, rounding, and slopes on which a slow controller
+lets the robot roll.
 """
 SIDEWAYS: Final = 0.1
-"""Fraction of a speed, or of a yaw rate, by which motion may deviate in any direction.
+"""Deviation that is allowed in any direction, as a fraction of the commanded speed or yaw rate.
 
-The heading is uncertain, and wheels differ. The resulting error is independent of the noise, so the
-squares of both are added.
+The heading is uncertain, and wheels differ. Their error is independent of the noise, so the
+allowance is the square root of the sum of both squares.
 """
 OVERSHOOT: Final = 0.15
-"""Fraction of a change of set-point by which a robot may overshoot, in any direction.
+"""Overshoot that is allowed in any direction, as a fraction of the change of the set-point.
 
-Overshoot is allowed only if the robot leaves a set-point other than rest.
+Overshoot is allowed only if the earlier set-point was not rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""``SKEW_RADPS_PER_MPS``, ``SKEW_MPS_PER_RADPS``: yaw rate that is allowed for each m/s of
-commanded speed, and speed that is allowed for each rad/s of commanded yaw rate. The reason is that
-wheels differ by some per cent."""
+"""``SKEW_RADPS_PER_MPS``: yaw rate in rad/s that is allowed for each m/s of commanded speed.
+
+``SKEW_MPS_PER_RADPS``: speed in m/s that is allowed for each rad/s of commanded yaw rate.
+
+Wheels differ by some per cent. So a robot that drives also turns a little, and a robot that turns
+also drives a little.
+"""
 CHANGING_RADPS_PER_MPS: Final = 0.4
-"""Yaw rate that is allowed for each m/s by which the set-point changes, because wheels accelerate
-differently."""
+"""Yaw rate in rad/s that is allowed for each m/s by which the set-point changes. The wheels
+accelerate differently, so the robot turns a little during the change."""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 """Factor that converts a yaw rate in rad/s to a speed in m/s, so that the noises of both are
@@ -50,17 +57,18 @@ equal."""
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Normals of 16 half-planes around a hull. They give a distance to the hull that is at most 2 % too
-small."""
+"""Sixteen directions in which the distance of a velocity to the hull is computed. The largest of
+these distances is at most 2 % smaller than the true distance."""
 
 
 def outside(
     motion: BodyTwist, explained: Sequence[Velocity], *, heading_known: bool
 ) -> tuple[float, float]:
-    """Return by how much the motion exceeds the envelope, in m/s and rad/s; 0 or less if inside.
+    """Return how far the motion is outside the envelope, in m/s and in rad/s.
 
-    ``explained``: velocities that recent set-points can cause, the current set-point's first. If
-    the heading is unknown, only the magnitude of the linear velocity is checked.
+    A result of 0 or less means that the motion is inside. ``explained``: velocities that recent
+    set-points can cause; the velocity of the current set-point comes first. If the heading is
+    unknown, the direction of the linear velocity is not checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0
@@ -85,9 +93,10 @@ def outside(
 
 
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
-    """Return whether ``motion`` lies between two successive set-points, and so in the envelope.
+    """Return whether the motion is near a set-point or between two successive set-points.
 
-    This check is quick, and true for nearly all motion.
+    Such motion is inside the envelope. Nearly all motion is such motion, and this check is quick.
+    So it is made before the exact check by ``outside``.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]
@@ -117,9 +126,9 @@ def dot(one: BodyTwist, other: BodyTwist) -> float:
 
 
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
-    """Return how far a velocity is outside the hull of rest and the stretched set-points.
+    """Return how far a velocity is outside the hull, in m/s; 0 or less if it is inside.
 
-    The result is in m/s, and 0 or less inside the hull. Set-points are stretched by ``STRETCH``.
+    The hull contains rest and all set-points, each multiplied by ``STRETCH``.
     """
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:

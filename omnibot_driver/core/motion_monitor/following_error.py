@@ -1,10 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The following error: how far a robot moves outside its envelope without interruption.
+"""The following error: the distance that a robot moves outside its envelope without interruption.
 
-A single displacement is never enough to exceed a limit, because its data may be damaged. A short
-jerk ends before the sum of its displacements exceeds a limit. This module knows velocities in the
-board's own axes, and times; it does not know which fault an error shows.
+The motion monitor reports a fault when the error exceeds a limit. One displacement alone cannot
+exceed the limit, because its data may be damaged. A short jerk does not exceed it either, because
+the jerk ends too soon.
+
+This module knows velocities in the board's own axes, and times; it does not know which fault an
+error shows.
 """
 
 from typing import Final
@@ -15,24 +18,25 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s over which a robot's speed is compared with its set-points. If the robot is slower than
-all set-points of this time, something is assumed to hold it."""
+"""Time in s before a displacement from which set-points are compared with the robot's speed. If the
+robot is clearly slower than all these set-points, something is assumed to hold the robot."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
 """``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: largest fraction of a limit that one short
-displacement, or one long displacement, can add to the error. The limits are ``UNEXPLAINED_M`` and
-``UNEXPLAINED_RAD``. So at least three displacements in a row, or two long ones, are needed to
-exceed a limit."""
+displacement, or one long displacement, adds to the error.
+
+The limits are ``UNEXPLAINED_M`` and ``UNEXPLAINED_RAD``. So the error exceeds a limit only after
+three displacements in a row, or two long ones.
+"""
 
 
 class FollowingError:
-    """Sums up how far a robot moves outside its envelope.
+    """The following error of one robot: the sum of its motion outside the envelope.
 
-    The envelope is the set of velocities that the set-points allow.
+    ``slack_mps``, ``slack_radps``: speed and yaw rate outside the envelope that are tolerated.
 
-    ``slack_mps``, ``slack_radps``: speeds outside the envelope that are tolerated; ``outside``:
-    whether the last displacement was outside the envelope by more than these speeds.
+    ``outside``: whether the last displacement was outside the envelope by more than is tolerated.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -48,12 +52,12 @@ class FollowingError:
 
     @property
     def exceeded(self) -> bool:
-        """Whether the linear or the angular excess is beyond its limit."""
+        """Whether the linear or the angular error is larger than its limit."""
         return self.way_exceeded or self._turn_rad > UNEXPLAINED_RAD
 
     @property
     def way_exceeded(self) -> bool:
-        """Whether the linear excess is beyond its limit."""
+        """Whether the linear error is larger than its limit."""
         return self._way_m > UNEXPLAINED_M
 
     def update(
@@ -65,9 +69,10 @@ class FollowingError:
         *,
         heading_known: bool,
     ) -> None:
-        """Add ``motion``, which began at ``begun_s`` and lasted ``seconds``.
+        """Add one displacement to the error, or reset the error if the displacement is inside.
 
-        If the heading is unknown, only the magnitude of the linear velocity is checked.
+        ``motion``: mean twist of the displacement. ``seconds``: its duration. ``begun_s``: when it
+        began. If the heading is unknown, the direction of the linear velocity is not checked.
         """
         newest = history.since(begun_s - RISING_S)
         way_mps = turn_radps = 0.0

@@ -2,8 +2,8 @@
 
 """The motion monitor: compares the robot's displacements with its set-points.
 
-All velocities are in the board's own axes; time is that of the displacements. This module knows
-neither bytes nor how a robot is stopped. docs/internals/motion_monitor.md has the thresholds.
+All velocities are in the board's own axes. All times are stamps of displacements. This module knows
+neither bytes nor how a robot is stopped. docs/internals/motion_monitor.md explains the thresholds.
 """
 
 import math
@@ -22,19 +22,20 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s for which all set-points must have been rest before the robot counts as not driven."""
+"""Time in s for which a robot still counts as driven after its last set-point that was not rest."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds in m/s and rad/s above which the displacements
-must show motion. If they show none for ``BLOCKED_S``, the robot is regarded as blocked."""
+"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speed in m/s and yaw rate in rad/s above which the
+robot must move. If displacements show no motion for ``BLOCKED_S``, the robot is regarded as
+blocked."""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time at rest in s after which a robot has certainly obeyed a stop. The stopped command is not the
-cause of later motion."""
+"""Time in s for which a robot must be at rest to prove that it has obeyed Stop. If the robot moves
+after that, its last command is not the cause."""
 STOPS_S: Final = 5.0
 """Time in s for which the command policy repeats Stop if the robot keeps moving."""
 
@@ -43,7 +44,7 @@ COSINE_60: Final = 0.5
 
 
 class Fault(Enum):
-    """The faults of a robot's motion; each value is the beginning of a sentence."""
+    """The faults of a robot's motion. Each value is the beginning of a sentence for the user."""
 
     WRONG_WAY = "robot moves in the wrong direction"
     WRONG_TURN = "robot turns in the wrong direction"
@@ -80,11 +81,16 @@ ADVICE: Final[Mapping[Fault, str]] = {
     Fault.BLOCKED: "check motor power, and whether the wheels are blocked",
     Fault.HELD_BY_ESTOP: "check whether the board itself still holds an e-stop",
 }
-"""Advice on each fault for any board; a board may replace it by its own ``Traits.advice``."""
+"""What the user should check after each fault. A board may replace this advice by its own
+``Traits.advice``."""
 
 
 class MotionMonitor:
-    """Compares motion with commands. ``commanded``, ``measured``: twists at the last fault."""
+    """Compares the motion of one robot with its commands.
+
+    ``commanded``, ``measured``: the commanded and the measured twist when the driven robot last
+    moved too fast or in a wrong direction.
+    """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
         self.commanded = self.measured = AT_REST
@@ -116,19 +122,26 @@ class MotionMonitor:
             self._has_stood = False
 
     def release(self) -> None:
-        """Record that the e-stop was released; the board may still hold an e-stop of its own."""
+        """Record that the driver's e-stop was released.
+
+        The board may still hold an e-stop of its own.
+        """
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Note ``fault``; return whether it is new since the robot last moved as commanded."""
+        """Return whether ``fault`` occurs for the first time since the robot moved as commanded.
+
+        The fault is recorded, so the next call returns False.
+        """
         told, self._told = self._told, self._told | {fault}
         return fault not in told
 
     def count_refused(self, count: int, now: float) -> Fault | None:
-        """Return the fault that implausible displacements show, or None.
+        """Return the fault that rejected displacements show, or None.
 
-        ``count``: number of displacements since the driver began that were rejected because a robot
-        cannot have made them.
+        The outlier filter rejects a displacement that no robot can make. ``REFUSED_IN_A_ROW`` of
+        them without an accepted one show a fault. ``count``: number of displacements that were
+        rejected since the driver began.
         """
         self._refused = count
         if count < self._refused_before + REFUSED_IN_A_ROW:
@@ -138,7 +151,10 @@ class MotionMonitor:
         return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
 
     def disregard_refused(self, count: int) -> None:
-        """Record the number of rejected displacements while the robot is not monitored."""
+        """Record how many displacements were rejected so far, without a check.
+
+        This is called while the robot is not monitored.
+        """
         self._refused = self._refused_before = count
 
     def check(
@@ -146,8 +162,8 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: mean twist of the displacement, during the ``seconds`` before ``stamp_s``. If
-        the heading is unknown, only the magnitude of the linear velocity is checked.
+        ``motion``: mean twist of the displacement. ``seconds``: its duration, which ended at
+        ``stamp_s``. If the heading is unknown, the direction of the linear velocity is not checked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -174,10 +190,11 @@ class MotionMonitor:
         return fault
 
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
-        """Return the fault: too fast if a set-point has the measured direction, else wrong way.
+        """Return the fault of a robot that moves outside its envelope.
 
-        ``explained``: velocities that recent set-points can cause. Linear directions that differ by
-        less than 60° count as the same direction.
+        If the robot moves in the direction of a set-point, it is too fast, else it moves in the
+        wrong direction. Linear directions that differ by less than 60° count as the same direction.
+        ``explained``: velocities that recent set-points can cause.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -190,10 +207,10 @@ class MotionMonitor:
         return Fault.TOO_FAST if right or not heading_known else Fault.WRONG_WAY
 
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
-        """Return UNCOMMANDED if a robot moves without a command and Stop is due, else None.
+        """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        If the robot was at rest after its last command, a person may be pushing the robot. In this
-        case Stop is due at longer intervals.
+        If the robot was at rest after its last command, a person may be pushing it. Then the
+        intervals between two Stops grow.
         """
         if not self._error.outside:
             self._stood_s += seconds

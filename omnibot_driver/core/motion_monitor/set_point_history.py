@@ -2,9 +2,11 @@
 
 """The history of set-points, and the velocities of the robot that they explain.
 
-A robot follows a set-point late, and leaves it smoothly. So a set-point that was replaced explains
-its full velocity for ``HELD_S``, and less and less of it afterwards. This module knows velocities
-in the board's own axes, and times; it does not know how the robot moves.
+A robot follows a set-point late, and leaves it smoothly. After a set-point is replaced, it explains
+its full velocity for ``HELD_S``, and an ever smaller part of it afterwards.
+
+This module knows velocities in the board's own axes, and times; it does not know how the robot
+moves.
 """
 
 import math
@@ -14,12 +16,12 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 CommandedTwist = BodyTwist | None
-"""A commanded body velocity. None: the motion is not known in advance, as on the way to a goal."""
+"""A commanded twist. None: the twist is not known in advance, because the robot goes to a goal."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]
-"""The values of a BodyTwist as a plain tuple. The monitor creates many of them, and a tuple is
-created quickly."""
+"""The three values of a BodyTwist as a tuple. The monitor creates many of them, and a tuple is
+created more quickly."""
 
 HELD_S: Final = 0.3
 """Time in s for which a robot may keep the full velocity of a replaced set-point.
@@ -29,18 +31,24 @@ This time covers the delay of the line, a lost repetition, and a controller's de
 FADING_S: Final = 0.2
 """Time constant in s with which the velocity of a replaced set-point decays after ``HELD_S``.
 
-Robots with a time constant of up to 0.35 s stay within the envelope.
+A robot that follows its set-points with a time constant of up to 0.35 s stays inside the envelope.
 """
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point is ignored: 2 % of its velocity are left."""
+"""Time in s after which a replaced set-point is ignored. Then it explains less than 2 % of its
+velocity."""
 UNKNOWN_S: Final = 0.8
-"""Time in s that motion by earlier, unknown commands may last after the first known set-point."""
+"""Time in s after the first known set-point in which earlier, unknown commands may still move the
+robot."""
 HISTORY_S: Final = 3.0
-"""Length of the history in s; displacements arrive later than this only if the computer stalls."""
+"""Length of the history in s. A displacement is older than this only if the computer has
+stalled."""
 
 
 class SetpointHistory:
-    """The recent set-points. ``current``: the set-point that was added last."""
+    """The recent set-points of one robot.
+
+    ``current``: the set-point that was added last.
+    """
 
     def __init__(self) -> None:
         self.clear()
@@ -52,7 +60,11 @@ class SetpointHistory:
         self._known_from_s = math.inf
 
     def add(self, setpoint: CommandedTwist, at_s: float) -> None:
-        """Add a set-point that holds from ``at_s`` on; for rest, pass the object ``AT_REST``."""
+        """Add a set-point that holds from ``at_s`` on.
+
+        For rest, pass the object ``AT_REST`` itself, because the history recognises rest by
+        identity.
+        """
         before, self.current = self.current, setpoint
         if setpoint is None:
             self._entries.clear()

@@ -1,11 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The wind-up of wheel controllers while a robot is held or pushed, and the motion it explains.
+"""Wind-up: the distance that wheel controllers make up for after the robot was held or pushed.
 
-The wheel controllers integrate their errors. A robot that is held falls behind its set-point; a
-robot whose set-point is rest may be pushed away. Once released, the robot makes up for the lost
-distance: it moves faster than commanded, or backwards, even if the command has changed
-meanwhile or is a stop. This module knows velocities; it does not know what is inside the envelope.
+The wheel controllers integrate their errors. A robot that is held falls behind its set-point. A
+robot that should be at rest may be pushed away. When the robot is released, the controllers make up
+for this distance. Then the robot moves faster than commanded, or backwards. This happens even if
+the command has changed meanwhile, or is a stop.
+
+This module knows velocities; it does not know the envelope.
 """
 
 import math
@@ -17,36 +19,40 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""Largest distance in m that a robot is assumed to make up for. The integrators of the wheel
-controllers are assumed to be at their limits then."""
+"""Largest distance in m that a robot is assumed to make up for. At this distance, the integrators
+of the wheel controllers are assumed to reach their limits."""
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
-A single long displacement does not prove that the robot is held: the robot may have reversed.
+One long displacement does not prove that the robot is held: the robot may have changed its
+direction during this displacement.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
-"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants in s with which the wind-up is
-forgotten, in motion and at rest.
+"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants in s with which the wind-up decays while
+the set-point is motion, and while the set-point is rest.
 
-It is forgotten more slowly at rest, because a robot that is still held keeps its wind-up.
+At rest it decays more slowly, because a robot that is still held keeps its wind-up.
 """
 HELD_PART: Final = 0.7
-"""A robot whose speed is below this fraction of its set-points is regarded as held."""
+"""A robot that is slower than this fraction of its recent set-points is regarded as held."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""``BACK_MPS``, ``BACK_RADPS``: speeds against the set-point, in m/s and rad/s, above which a robot
-is not regarded as held.
+"""``BACK_MPS``, ``BACK_RADPS``: largest speed in m/s and yaw rate in rad/s against the set-point at
+which a robot may still be held.
 
-Faster motion against the set-point does not add to the wind-up.
+A robot that moves back faster is not held. Such motion does not add to the wind-up.
 """
 LEVER_M: Final = 0.15
-"""Approximate distance in m of the wheels from the centre: converts a turn to rim motion."""
+"""Approximate distance in m of the wheels from the robot's centre. It converts a yaw rate to the
+speed of a wheel."""
 
 
 class WindUp:
-    """The wind-up of a robot's wheels. ``way_m``: distance in m at a rim that the robot may still
-    make up for."""
+    """The wind-up of one robot.
+
+    ``way_m``: distance in m, at the rim of a wheel, that the robot may still make up for.
+    """
 
     def __init__(self) -> None:
         self.way_m = 0.0
@@ -54,14 +60,16 @@ class WindUp:
         """Distance in m by which the robot fell behind in one long displacement. It is added to
         ``way_m`` only if the robot is held in the next displacement too.
 
-        0: the distance has been added. None: the robot was not held in the last displacement.
+        0: the robot is held, and the distance has been added. None: the robot was not held in the
+        last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion outside the envelope from ``way_m``; return whether that explains it.
+        """Return whether the wind-up explains motion outside the envelope; subtract this motion.
 
-        The wind-up explains motion that is shorter than ``way_m``, in any direction. ``way_mps``,
-        ``turn_radps``: speeds outside the envelope, which lasted for ``seconds``.
+        Motion in any direction is explained if it is shorter than ``way_m``. ``way_mps``,
+        ``turn_radps``: speed and yaw rate outside the envelope. ``seconds``: how long the motion
+        lasted.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -82,10 +90,11 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance by which a held robot falls behind; else slowly forget the wind-up.
+        """Add the distance by which a held robot falls behind in one displacement.
 
-        ``motion``: motion inside the envelope. ``newest``: the set-points that the robot may not
-        have reached yet, the current one first.
+        If the robot is not held, the wind-up decays a little. ``motion``: mean twist of the
+        displacement, which is inside the envelope. ``seconds``: its duration. ``newest``: the
+        set-points that the robot may not have reached yet, the current one first.
         """
         current, lost_mps = newest[0], 0.0
         if current is AT_REST and not self.way_m:

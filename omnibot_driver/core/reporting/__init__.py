@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reports to the user about the driver: notices, figures and verdicts."""
+"""Reports to the user about the driver: notices, figures and diagnostic statuses."""

@@ -2,9 +2,13 @@
 
 """The diagnosis: a status for each part of the driver, with what an operator should do.
 
-Levels are those of diagnostic_msgs. ERROR: the robot cannot be used, or must not be. WARN: it can
-be used, but something should be checked. STALE: nothing can be concluded. This module knows figures
-and times; it does not know how they are obtained.
+The levels are those of diagnostic_msgs:
+
+- ERROR: the robot cannot be used, or must not be used.
+- WARN: the robot can be used, but the operator should check something.
+- STALE: the driver does not know.
+
+This module knows figures and times; it does not know how the figures are obtained.
 """
 
 import math
@@ -19,34 +23,36 @@ from omnibot_driver.core.reporting.status import RUNNING, Level, Status
 RATE_TOLERANCE: Final = 0.05
 STUCK_READINGS: Final = 100
 LATE_S: Final = 0.005
-"""Mean delay in s above which reads are reported as late: half the period of a 10 ms timer."""
+"""Mean delay in s above which reads are reported as late. A timer of 10 ms causes this mean
+delay."""
 LARGEST_SKEW_PPM: Final = 115.0
 """Largest accepted difference in ppm between the rates of two crystal clocks."""
 SKEW_KNOWN_S: Final = 75.0
-"""Time in s for which the arrival time of a reading affects the estimated clock skew.
+"""Time in s for which one arrival time affects the estimated clock skew.
 
-A skew that lasts for a shorter time may be due to a busy computer, so it is not reported.
+A skew that ends sooner may come from a busy computer, so it is not reported.
 """
 
 BUSY_SHARE: Final = 0.1
-"""Largest share of time, 0 to 1, for which the reader may wait for the processor. Above it, the
-computer is reported as too busy."""
+"""Largest share of time, from 0 to 1, for which the reader may wait for the processor. If the
+reader waits longer, the computer is reported as too busy."""
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
-"""Label of the rate at which the driver publishes odometry. "Odometry rate (Hz)" is the rate at
-which odometry readings arrive."""
+"""Label of the rate at which the driver publishes odometry. The label "Odometry rate (Hz)" is for
+the rate at which odometry readings arrive."""
 OF_KIND: Final[Mapping[RateName, tuple[str, ...]]] = {
     "IMU": ("IMU frames lost", "IMU readings refused"),
     "Odometry": ("Odometry frames lost", "Odometry readings refused"),
     "Pose": ("Poses refused",),
 }
-"""For each kind of reading, the figures to leave out if the board does not send that kind."""
+"""For each kind of reading: the labels of the figures that are left out if the board does not send
+readings of that kind."""
 
 
 class Diagnosis:
     """The diagnosis of one board, made about once a second from recent figures.
 
-    ``to_check``: text that names what to check if no valid data comes from the board.
+    ``to_check``: what the operator should check if no valid data comes from the board.
     """
 
     def __init__(self, to_check: str) -> None:
@@ -57,7 +63,10 @@ class Diagnosis:
     def judge(
         self, link: LinkFigures, session: SessionFigures, refusals: Refusals, now: float
     ) -> list[Status]:
-        """Return the diagnostic statuses; for one board, their names and order never change."""
+        """Return all diagnostic statuses of the board.
+
+        The names and the order of the statuses are the same in every call.
+        """
         self._recent.remember(session, now)
         statuses = [
             self._link(link, now),

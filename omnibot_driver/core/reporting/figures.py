@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The figures for diagnostics of the link, the board and the commands: values only."""
+"""The figures that the diagnosis is made from: of the link, the board and the commands."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,15 @@ from omnibot_driver.core.readings import Vector3
 class LinkFigures:
     """The figures of the link to the board.
 
-    ``trouble``: why the port is not open, in a sentence; empty while it is open; ``opened``: how
-    often the port was opened; ``overruns``: how often the kernel has lost bytes since the port was
-    last opened; ``waited_s``: time in s that the reader has waited for the processor. ``overruns``
-    and ``waited_s`` are None where they are not counted.
+    ``trouble``: a sentence that says why the port is not open; empty while the port is open.
+
+    ``opened``: how often the port was opened.
+
+    ``overruns``: how often the kernel has lost bytes since the port was last opened; None if this
+    is not counted.
+
+    ``waited_s``: time in s for which the reader has waited for the processor; None if this is not
+    counted.
     """
 
     port: str
@@ -41,10 +46,16 @@ class Refusals:
 class CommandFigures:
     """The figures of the commands.
 
-    ``source``: the topic in control, or None; ``age_s``: age of its last command; ``monitored``:
-    whether the motion monitor stops a robot that does not move as commanded; ``trips``: how often
-    the motion monitor has stopped the robot; ``interlock``: why motion is refused, in a sentence
-    with a remedy; empty while motion is allowed.
+    ``source``: the topic that commands the robot now, or None.
+
+    ``age_s``: age in s of the last command from this topic.
+
+    ``monitored``: whether the motion monitor stops a robot that does not move as commanded.
+
+    ``trips``: how often the motion monitor has stopped the robot.
+
+    ``interlock``: a sentence that says why motion is refused, with a remedy; empty while motion is
+    allowed.
     """
 
     source: str | None = None
@@ -60,9 +71,11 @@ class CommandFigures:
 class ImuFigures:
     """The figures of the IMU.
 
-    ``gravity_mps2`` and ``noise_radps`` were measured at the last standstill; they are None if
-    there was no standstill. ``advice``: which parameter contradicts the measured gravity, in a
-    sentence.
+    ``gravity_mps2``, ``noise_radps``: values that were measured at the last standstill; None before
+    the first standstill.
+
+    ``advice``: a sentence that names the parameter that contradicts the measured gravity; empty if
+    there is no contradiction.
     """
 
     bias_radps: Vector3
@@ -75,8 +88,10 @@ class ImuFigures:
 class SessionFigures:
     """The figures of the board, its readings and its commands.
 
-    ``skew_ppm``: how much faster the board's clock runs than the host's; ``task``: name, elapsed
-    time and limit of the board's long task, as text; empty without such a task.
+    ``skew_ppm``: how much faster the board's clock runs than the host's, in ppm.
+
+    ``task``: name, elapsed time and time limit of a long task of the board, as text; empty if the
+    board does not work on such a task.
     """
 
     state: str

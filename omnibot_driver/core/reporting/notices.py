@@ -54,7 +54,11 @@ class ThrottledNotice:
         self._told_at = -math.inf
 
     def since_told(self, count: int, now: float) -> int:
-        """Return the growth since the last report; 0 if that report is less than NEWS_S old."""
+        """Return how much the counter has grown since its last report, if a new report is due.
+
+        The result is 0 if the last report is less than ``NEWS_S`` old. ``count``: the counter's
+        value.
+        """
         if count == self._told or now - self._told_at < NEWS_S:
             return 0
         new, self._told, self._told_at = count - self._told, count, now
@@ -72,9 +76,10 @@ class Notices:
         self._standing = ""
 
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
-        """Return the notices of losses and rejections that were not reported before.
+        """Return notices of lost frames and rejected readings that were not reported before.
 
-        ``lost``: lost odometry frames so far; ``overruns``: overruns of the serial port so far.
+        ``lost``: number of odometry frames lost so far. ``overruns``: number of overruns of the
+        serial port so far. ``refused``: numbers of readings rejected so far.
         """
         news = []
         if overruns != self._overruns:
@@ -103,10 +108,11 @@ class Notices:
         return [sentence]
 
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
-        """Return the notice that Stop was repeated for its full time without a measured standstill.
+        """Return the notice that a stop is unconfirmed.
 
-        ``measured``: whether displacements arrived while Stop was repeated; ``blind``: whether the
-        board did not measure its wheels after the last command.
+        The driver has repeated Stop for its full time and has not measured a standstill.
+        ``measured``: whether displacements arrived meanwhile. ``blind``: whether the board did not
+        measure its wheels after the last command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
@@ -117,19 +123,20 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """Return the sentence if that of the previous call was empty, else an empty list.
+        """Return the sentence as a list if the previous call had an empty one, else an empty list.
 
-        ``sentence`` is empty while its condition does not hold, so each occurrence is reported
-        once.
+        Pass an empty sentence while the sentence's condition does not hold. So each time that the
+        condition begins to hold, it is reported once.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []
 
 
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
-    """Return a sentence on ``silence_s`` seconds without valid data, and on what to check.
+    """Return a sentence that reports missing data and says what to check.
 
-    ``bytes_came``: whether invalid bytes arrived; ``baudrate``: whether the port has a baud rate.
+    ``silence_s``: time in s without valid data. ``bytes_came``: whether invalid bytes arrived in
+    this time. ``baudrate``: whether the port has a baud rate.
     """
     if bytes_came:
         return (

@@ -14,7 +14,8 @@ RECENT_S: Final = 10.0
 
 
 class RecentFigures:
-    """The figures since the session's state last changed, for at most RECENT_S."""
+    """The figures since the session's state last changed, at most those of the last
+    ``RECENT_S``."""
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
@@ -38,7 +39,7 @@ class RecentFigures:
         return now - at < RECENT_S
 
     def waiting_share(self, link: LinkFigures, now: float) -> float:
-        """Return the share of recent time in which the reader waited for the processor."""
+        """Return the share of recent time, 0 to 1, in which the reader waited for the processor."""
         if link.waited_s is None:
             return 0.0
         self._waits.append((now, link.waited_s))
@@ -65,9 +66,10 @@ class RecentFigures:
         return {name: count / self.span_s for name, count in counts.items()}
 
     def delay_s(self) -> tuple[float, float] | None:
-        """Return the mean and standard deviation, in s, of how late the recent reads came.
+        """Return the mean and the standard deviation, in s, of the delays of recent reads.
 
-        The read with the smallest delay counts as on time. Returns None without recent reads.
+        A delay is relative to the least delayed read. The result is None if there are no recent
+        reads.
         """
         old, new = self._window[0][1].tally, self._window[-1][1].tally
         reads = new.reads - old.reads

@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Clocks that stamp readings: sampling times, estimated from arrival times."""
+"""Clocks that stamp readings: they estimate sampling times from arrival times."""

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Arrival times as stamps, for boards whose readings carry no time and keep no regular tick.
+"""A clock for boards whose readings carry no time and have no regular tick.
 
-``ArrivalClock`` has the interface of ``DeviceClock``, and does not read a clock itself.
+``ArrivalClock`` has the same methods as ``DeviceClock``. It receives times as arguments, and does
+not read a clock itself.
 """
 
 import math

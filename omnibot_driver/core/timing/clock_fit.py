@@ -2,25 +2,29 @@
 
 """The time of each tick: a straight line over the ticks, fitted to bounds of their times.
 
-The bytes of a tick come late, never early: arrivals are on or above the line, whose slope is the
-true period. Bytes that a read did not bring were sent after that read, so the line cannot be much
-lower either. Two points are kept of every block of ticks:
+The bytes of a tick arrive late, never early. So all arrivals are on or above the line, and its
+slope is the true period. Bytes that a read did not bring were sent after that read. So the line
+cannot be much lower either. The ticks are divided into blocks. Of each block, at most two points
+are kept:
 
-*Latest*, the least delayed arrival, is an upper bound. It is always valid; after bursts, stalls and
-losses it is only higher than necessary.
+- *Latest*: the arrival with the smallest delay. This upper bound is always valid. After bursts,
+  stalls and losses it is higher than necessary.
+- *Earliest*: a tick that a read did not bring, and the time of this read. This lower bound is too
+  high if the read was late, so the highest tenth of these bounds is left out. A bound that is far
+  below the arrivals is of little use, and is not kept.
 
-*Earliest*, from what a read did not bring, is a lower bound. A read that was late gives a bound
-that is too high, so the highest tenth of the bounds is left out. A bound far below the arrivals is
-of little use, and is not kept.
+The line is placed in one of two ways:
 
-With earliest points, every pair of a latest and an earliest point bounds the slope, and the line
-runs in the middle of all bounds. If an adapter's timer hides the true arrival times for seconds,
-the error is at most half the gap between the bounds. Without earliest points, or if the bounds
-contradict each other (which shows that reads were late), the line is laid as closely as possible
-under the latest points: along an edge of their lower convex hull. A read that ends within a sample
-cuts that sample; a cut sample has not waited to be read. So if any latest points are of cut
-samples, only these points are used. If every block has such a point, the line is always laid under
-these points, without the earliest points.
+- *Between*: in the middle of all bounds. Each latest point and each earliest point together limit
+  the slope. If an adapter's timer hides the true arrival times for seconds, the error is at most
+  half the distance between the bounds.
+- *Under*: as closely as possible under the latest points, along an edge of their lower convex hull.
+  This way is used if there are no earliest points, or if the bounds contradict each other because
+  reads were late.
+
+A read that ends within a sample cuts that sample. A cut sample has not waited to be read. So if
+some latest points are cut samples, a line that is placed under the points uses only these. If all
+latest points are cut samples, the line is always placed under them.
 
 This module knows ticks and times, in s of the host's steady clock; it does not know what is
 sampled, nor how ticks are counted.
@@ -36,8 +40,8 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept; together they cover 75 s.
 
-If an adapter's timer and the board's tick differ by 100 ppm, their phases repeat every 20 s. So the
-blocks cover several repetitions.
+If the period of an adapter's timer and the board's tick differ by 100 ppm from their nominal ratio,
+their phases repeat every 20 s. So the blocks cover several repetitions.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
@@ -52,13 +56,14 @@ FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
 late ones cannot be recognized."""
 LATE_PART: Final = 0.1
-"""Largest assumed fraction of reads that are late by more than ``LATE_S``, in s."""
+"""Largest assumed fraction of reads that are late by more than the time ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest allowed distance of an earliest point below a latest one, as a fraction of a period.
+"""Largest allowed distance of an earliest point below a latest point, as a fraction of a period.
 
-An earliest point that is farther below is not kept. With a 16 ms timer in the adapter, reads occur
-at phases of the 10 ms tick that are 2 ms apart, a fifth of the period.
+An earliest point that is farther below is not kept. With a timer of 16 ms in the adapter, the
+distance can be 2 ms, a fifth of the period: reads occur at phases of the 10 ms tick that are 2 ms
+apart.
 """
 
 Point = tuple[int, float]
@@ -68,7 +73,9 @@ Point = tuple[int, float]
 class ClockFit:
     """The line that gives the time of each tick, from the first tick seen on.
 
-    ``period_s``: the nominal period in s; ``slope_s``: the fitted period.
+    ``period_s``: the nominal period in s.
+
+    ``slope_s``: the fitted period in s.
     """
 
     def __init__(self, period_s: float, first: Point) -> None:
@@ -130,7 +137,7 @@ class ClockFit:
         return min(max(slope_s, least), most)
 
     def _lay_between(self) -> bool:
-        """Lay the line in the middle of all bounds and return True.
+        """Place the line in the middle of all bounds and return True.
 
         If the bounds contradict each other, forget the earliest points and return False.
         """
@@ -154,7 +161,8 @@ class ClockFit:
         return True
 
     def _lay_under(self) -> None:
-        """Lay the line along the lower hull of the latest points, at ``SUPPORT`` of their span."""
+        """Place the line along the lower hull of the latest points, at ``SUPPORT`` of their
+        span."""
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])
         middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])

@@ -2,18 +2,20 @@
 
 """Sampling times from arrival times: the board's clock, as seen by the host's clock.
 
-The board samples once a tick, by a crystal of its own. Its bytes arrive with a delay that is
-unknown and always changes, but never before they were sent. Two questions follow.
+The board samples once a tick, controlled by its own crystal. Its bytes arrive with a delay that is
+unknown and always changes, but never before they were sent. For each reading, two questions must be
+answered.
 
-*Which tick is it?* IMU readings are counted, together with those that are reported as lost. The
-displacements' counter also shows the exact number of losses that nothing reports. Until the next
-displacement arrives, or if none ever does, arrival times show such losses: a read takes all bytes
-that have arrived, so its newest tick is hardly older than one period, and never from the future.
+*Which tick is it?* Each IMU reading is one tick. IMU readings that are reported as lost are counted
+too. Others are lost without a report; the counter in the displacements shows how many. Until the
+next displacement arrives, or on a board that sends none, arrival times show these losses. A read
+takes all bytes that have arrived. So its newest tick is hardly older than one period, and never in
+the future.
 
-*When was it?* ``ClockFit`` lays a line under the arrivals. The error that remains in the stamps is
-the least delay that ever occurs, which is a constant.
+*When was it?* ``ClockFit`` fits a line to the arrivals. The error that remains in the stamps is
+constant: it is the smallest delay that ever occurs.
 
-This module knows readings and times. It reads no clock and does not know any board's bytes.
+This module knows readings and times; it reads no clock and does not know any board's bytes.
 """
 
 import math
@@ -33,21 +35,21 @@ from omnibot_driver.core.timing.clock_fit import ClockFit, Point
 LARGEST_LOSS_TICKS: Final = 25
 """Largest number of missing ticks that is corrected by arrival times.
 
-If more are missing, everything known about the clock is forgotten.
+If more ticks are missing, the clock is restarted.
 """
 BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
-If an adapter delivers every 16 ms, the phase of the tick at which reads occur repeats after five
-reads, so 12 reads see each phase twice.
+If an adapter delivers every 16 ms, the reads occur at five different phases of the 10 ms tick. So
+12 reads contain each phase at least twice.
 """
 CALM: Final = 0.45
 """Largest distance of a read from the line, as a fraction of a period, at which the tick of the
-read is certain. The read before it must be as near to the line. The fraction must be less than a
+read is certain. The read before must be as near to the line. The fraction must be less than a
 half."""
 LARGEST_RISE: Final = 0.02
-"""Largest fraction by which a step of the stamps may exceed the period. After the line was raised,
-the stamps approach it slowly."""
+"""Fraction by which the step from one stamp to the next may exceed the period. So if the line
+rises, the stamps approach it slowly."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
@@ -58,7 +60,9 @@ WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 class DeviceClock:
     """Stamps readings with the times at which the board sampled them, estimated from arrivals.
 
-    ``period_s``: the nominal tick in s; the board sends one ImuReading in each tick.
+    The board sends one ImuReading in each tick.
+
+    ``period_s``: the nominal period of the tick, in s.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -82,16 +86,16 @@ class DeviceClock:
         self._calm: ClockFit | None = None
         """The line if the last read was near it and cut no sample, else None."""
         self._single_reads = 0
-        """Number of reads in a row, up to the last one, that brought one sample each."""
+        """How many reads in a row, up to the last one, brought exactly one sample."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        If the next tick is seen soon after a late tick, both ticks had waited to be read.
+        If two new ticks are seen within half a period, both had waited to be read.
         """
         self._awaited: Point | None = None
-        """Lower bound for the tick after the newest one: until this time in s, it had not
-        arrived."""
+        """Lower bound for the tick after the newest one: at this time in s, it had not arrived
+        yet."""
         self._cut_off: Point | None = None
         """Lower bound for the tick whose sample the last read cut; None if no sample was cut.
 
@@ -109,9 +113,10 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling times in s of the readings that a read at ``now`` completed.
 
-        ``edge``: where the read ended among the samples, None if unknown. Stamps increase from
-        tick to tick, and no stamp is later than ``now``; a displacement has the stamp of its tick's
-        ImuReading.
+        ``edge``: where the read ended among the samples; None if this is unknown.
+
+        Stamps increase from tick to tick, and no stamp is later than ``now``. A displacement has
+        the stamp of the ImuReading of its tick.
         """
         ticks = self._count(readings)
         if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
@@ -174,7 +179,10 @@ class DeviceClock:
         return self._stamp_s
 
     def _count(self, readings: Sequence[Reading]) -> list[int]:
-        """Return each reading's tick number: lost readings count, and displacements correct it."""
+        """Return the tick number of each reading.
+
+        Lost readings are counted too. The counter in the displacements corrects the number.
+        """
         ticks: list[int] = []
         for reading in readings:
             if isinstance(reading, ImuReading):
@@ -188,7 +196,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return how many ticks the displacements' counter is ahead of the counted ticks."""
+        """Return how many more ticks the counter in the displacements shows than were counted."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -196,9 +204,9 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
-        """Compare the newest arrival with the line; return how many ticks had not been counted.
+        """Compare the newest arrival with the line; return how many ticks were not counted so far.
 
-        ``counted``: whether the counter of the displacements has confirmed this tick.
+        ``counted``: whether the counter in the displacements has confirmed the number of this tick.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -245,8 +253,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
 
-        If another tick was read just before, the new delay replaces the delay of the other tick,
-        because both had waited to be read.
+        If another tick was read just before, both had waited to be read. Then only the delay of the
+        new tick is kept.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -261,8 +269,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set the stamp of a tick to the line's time, but limit the step from the last stamp.
 
-        ``latest_s``: upper limit of the stamp. ``room_s``: step in s with which this stamp and all
-        later ones of the read stay before the time of the read.
+        ``latest_s``: latest allowed stamp. ``room_s``: step in s that leaves room, before the time
+        of the read, for the later stamps of this read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
