@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot as a ``core.board.Board``: decodes its bytes into readings, encodes requests.
+"""The OmniBot as a ``core.board.Board``: decodes its bytes, and encodes requests to it.
 
-Source: the board's manual ver. 0.3. ``translation`` describes the data from the board,
+Source: the board's manual ver. 0.3. The module ``translation`` describes the data from the board,
 ``command_encoder`` the commands to it.
 """
 
@@ -104,7 +104,7 @@ class OmniBot:
         self._nothing_begun = SampleBoundary(0, 0.0, (frames.IMU_LENGTH - 1) * byte_s)
 
     def connect(self) -> None:
-        """Begin a new connection: forget everything but the settings and the counters."""
+        """Begin a new connection: forget everything except the settings and the counters."""
         self._decoder = FrameDecoder(
             self._settings.pose_byte_order,
             ACCEL_COUNTS_PER_G[self._settings.imu.accel_range_g],
@@ -126,8 +126,8 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """Where the last read ended in the stream of IMU samples; None if this is unknown.
 
-        The position is computed from the bytes held after the last decoded frame: whether they
-        begin with a complete or incomplete IMU frame, and how many bytes follow this frame.
+        The bytes that are held after the last decoded frame show this. They may begin with an IMU
+        frame, complete or not, and other bytes may follow this frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -170,7 +170,10 @@ class OmniBot:
         return self._translation.suspicion.advice
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that these bytes complete, in the order sent; ``now``: time in s."""
+        """Return the readings that these bytes complete, in the order in which they were sent.
+
+        ``now``: arrival time of the bytes in s.
+        """
         pieces, line = self._pieces, (self._decoder, self._translation)
         single = take_pieces(pieces, data, now, *line) if pieces else take_single(data, now, *line)
         if single:
@@ -267,5 +270,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the guard's two alternatives: Stop, or emergency stop and then Stop."""
+        """Return the two alternatives for the guard: Stop, or emergency stop followed by Stop."""
         return LAST_WORDS

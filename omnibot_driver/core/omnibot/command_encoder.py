@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The encoder that turns orders into the board's frames; it knows neither modes nor send times.
+"""The encoder that turns orders into the board's frames.
 
-Velocity and wheel commands are in the firmware's own unit. ``linear_scale`` and ``angular_scale``
-convert to this unit (70 and 500 are the vendor's values, found by trial). Commanded poses are
-assumed to have the unit of the poses that the board sends, mm and mrad; this is not verified.
+Velocity and wheel commands are in a unit of the firmware. ``linear_scale`` and ``angular_scale``
+convert to this unit. The vendor has found their values, 70 and 500, by trial. Commanded poses are
+assumed to be in mm and mrad, like the poses that the board sends. This is not verified.
+
+This module knows orders and frames; it knows neither modes nor send times.
 """
 
 from collections.abc import Sequence
@@ -38,8 +40,9 @@ EMERGENCY_STOP_PACKETS: Final = packed(EMERGENCY_STOP)
 class CommandEncoder:
     """Encodes orders as packets, with the scales of ``settings``.
 
-    ``settings`` may be replaced at any time. ``saturated`` counts the commands that were slowed
-    down because a value exceeded 16 bits.
+    ``settings``: the board's settings, which may be replaced at any time.
+
+    ``saturated``: number of commands that were slowed down because a value exceeded 16 bits.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -112,10 +115,11 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control; unlike a velocity, a zero goal is not sent as Stop.
+        """Encode a goal for positional control.
 
-        Raises CommandRefused if a coordinate exceeds 16 bits, or if its high byte is S, P or R: if
-        bytes are lost, the board could obey this byte as a letter.
+        A goal of zero is a place, so it is not replaced by Stop. Raises CommandRefused if a
+        coordinate exceeds 16 bits, or if its high byte is one of the letters S, P and R. If the
+        line loses bytes, the board could obey such a byte as a letter.
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)

@@ -1,14 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The cost of an interpretation of the bytes: all evidence for and against it in one unit.
+"""The cost of an interpretation of the bytes: the evidence against it as one number.
 
-A cost is about the negative logarithm of a probability: each unit of cost makes an interpretation
-about three times less likely. This module knows what a board is likely to send next, and how likely
-the line is to damage frames. It does not know how interpretations are searched (``trellis``) or
-when one is accepted (``decoder``).
+A cost is about the negative logarithm of a probability. Each unit of cost makes an interpretation
+about three times less likely.
 
-Content is weak evidence: odd content costs less than the assumption that the frame is damaged. So
-the frame of a true shock is delivered if the frames right before and after it are complete.
+Odd content is weak evidence: it costs less than the assumption that the frame is damaged. So the
+frame of a true shock is delivered if the frames right before and after it are complete.
+
+This module knows what a board is likely to send next, and how likely the line is to damage frames;
+it does not know how interpretations are searched (``trellis``), nor when one is accepted
+(``decoder``).
 """
 
 from math import ceil, floor
@@ -38,14 +40,15 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of assuming that a frame gained bytes, if a header follows its regular length."""
+"""Extra cost of assuming that a frame gained bytes, if a header follows right after the length of
+an undamaged frame."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
 Noise, or the loss of many bytes at once, causes such a run.
 """
 BAD_TAIL: Final = 2.5
-"""Extra cost of a bad run that begins after a frame but not with a header, which is rare."""
+"""Extra cost of a bad run that begins after a frame but not with a header; such a run is rare."""
 UNKNOWN_START: Final = 1.0
 """Cost of assuming that the first bytes are not the beginning of a frame.
 
@@ -87,13 +90,13 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
 
-Such a frame is probably read from a wrong start: at a gyro word of -6, which has the bytes of a
-header. Gyro words, which are small, are then read as accelerations.
+Such a frame probably has a wrong start: a gyro word of -6, which has the bytes of an IMU header.
+The gyro words after it are small, and are taken for accelerations.
 """
 JUMP: Final = 2.5
-"""Cost of a counter that did not advance by one: a frame before this frame was lost."""
+"""Cost of a counter that did not advance by one, because an earlier frame was lost."""
 IMPOSSIBLE: Final = 2.0
-"""Cost of a movement that a robot of this kind cannot make."""
+"""Cost of a movement that a robot with this board cannot make."""
 OFF_BEAT: Final = 1.0
 """Cost of an unexpected number of IMU frames per delta, or of deltas per pose.
 
@@ -101,26 +104,27 @@ With deltas at 25 Hz, four IMU frames per delta and five deltas per pose are exp
 """
 
 CONTRADICTED: Final = 1.5
-"""Cost of a pose whose turn since the last pose differs from the sum of the deltas in between."""
+"""Cost of a pose that contradicts the deltas: its turn since the last pose differs from their
+sum."""
 
 IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""``ROUNDING``, ``ROUNDING_PER_DELTA``: largest rounding error of a sum of deltas, in 0.1 mrad: a
-constant part, and a part per delta.
+"""``ROUNDING``, ``ROUNDING_PER_DELTA``: largest rounding error of a sum of deltas, in 0.1 mrad. The
+first is a constant part, the second is added for each delta.
 
-The error of five deltas is at most 4.
+The error of the sum of five deltas is therefore at most 4.
 """
 FASTEST: Final = 1e5
-"""Largest possible speed in 0.1 mm/s or 0.1 mrad/s: 10 m/s or 10 rad/s."""
+"""Largest possible speed: 10 m/s or 10 rad/s, in the unit 0.1 mm/s or 0.1 mrad/s."""
 FARTHEST_POSE: Final = 1e7
 """Limit of the coordinates of a pose in mm or mrad: 10 km, or 1600 turns.
 
 A greater value was misread from other bytes.
 """
 LONGEST_STEP: Final = 2000.0
-"""Largest possible step between two poses in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
+"""Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
 """Number of missed deltas after which deltas are no longer expected."""
 
@@ -151,7 +155,7 @@ NOTHING_KNOWN: Final = Context()
 class Expectation:
     """Judges the content of a frame by the frames before it.
 
-    This class learns from accepted frames how much the IMU's words scatter.
+    An object of this class learns from accepted frames how much the IMU's words scatter.
     """
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
@@ -170,9 +174,9 @@ class Expectation:
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
         """Limits within which an IMU frame costs nothing, in counts.
 
-        The limits are the least and the greatest squared norm of the acceleration, and the largest
-        steps of an acceleration word and of a gyro word. They are integers, which Python compares
-        twice as fast as floats.
+        The first two are the smallest and the largest squared norm of the acceleration. The others
+        are the largest step of an acceleration word and the largest step of a gyro word. All are
+        integers, because Python compares integers twice as fast as floats.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
@@ -268,8 +272,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the last byte of this frame may belong to the next header.
 
-    False if no header contains this byte. If the last word of an IMU frame equals that of the
-    previous IMU frame, True only if the byte is FF.
+    This is impossible if the byte is not part of any header. If the last word of an IMU frame is
+    the same as in the IMU frame before it, only the byte FF may belong to the next header.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -2,20 +2,21 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-The protocol has no checksum and its header words are the commonest readings of a gyro at rest, so a
-header alone proves nothing. A frame is accepted because of the bytes around it, in two ways:
+The protocol has no checksum. The two bytes of a header are also the most common readings of a gyro
+at rest. So a header alone proves nothing. The bytes around a frame decide whether the decoder
+accepts it:
 
-* *In step* means that the frame begins right after an accepted one. The frame is then returned as
-  soon as its last byte arrives, unless evidence speaks against it: the bytes after it do not begin
-  like a frame, its content is a spike, the line was idle within it, or its last byte may belong to
-  the next header.
+* *In step* means that the frame begins right after an accepted one. The decoder returns it as soon
+  as its last byte arrives, unless evidence speaks against it. Such evidence is that the bytes after
+  it do not begin like a frame, that its content is a spike, that the line was idle within it, or
+  that its last byte may belong to the next header.
 * *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
-  cost, which sums up the evidence against it (``cost_model``). A frame of the cheapest
-  interpretation is returned when every interpretation without this frame costs clearly more.
+  cost, which is the sum of the evidence against it (``cost_model``). The decoder returns a frame of
+  the cheapest interpretation when every interpretation without this frame costs clearly more.
   Otherwise the bytes wait for more evidence, at most until ``DOUBT_BYTES`` are held.
 
-This module reads no clock and never raises on input. It holds fewer than ``DOUBT_BYTES`` bytes
-between calls, and looks at each byte a bounded number of times.
+This module reads no clock, and no input makes it raise an exception. It holds fewer than
+``DOUBT_BYTES`` bytes between calls, and looks at each byte a bounded number of times.
 """
 
 import math
@@ -42,7 +43,8 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""Least cost of a frame's content at which the decoder waits for the bytes after the frame."""
+"""If the content of a frame costs this much or more, the decoder waits for the bytes after the
+frame."""
 DOUBT_BYTES: Final = 170
 """Number of uncertain bytes at which the decoder must decide. In nominal mode the board sends this
 number of bytes in 100 ms."""
@@ -55,12 +57,12 @@ On such a line, the decoder needs less evidence before it assumes that the last 
 not the first byte of the next header.
 """
 FRAMES_TO_SETTLE: Final = 3
-"""Number of certain frames after an uncertain frame at which the uncertain one is discarded."""
+"""An uncertain frame is discarded when this number of certain frames has followed it."""
 
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counters that a decoder adds to; several decoders in succession may share them."""
+    """Counters of a decoder. Several decoders, one after another, may add to the same counters."""
 
     frames: int = 0
     discarded_bytes: int = 0
@@ -71,9 +73,16 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    ``single_imu`` decodes some frames without this class, and updates the state of this class:
-    ``context`` (what the frames so far show), ``expectation`` (which content the next frame may
-    have), ``pauses`` (where the line was idle) and ``last_arrival_s``.
+    The module ``single_imu`` decodes some frames without this class. It then updates the following
+    attributes:
+
+    ``context``: what the frames so far show.
+
+    ``expectation``: which content the next frame may have.
+
+    ``pauses``: where the line was idle.
+
+    ``last_arrival_s``: arrival time of the last bytes in s.
     """
 
     def __init__(
@@ -222,9 +231,9 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether, given the arrival times, the last byte held may begin another frame.
+        """Return whether the last byte held may begin another frame, as arrival times show.
 
-        ``start``, ``length``: position and length in bytes of the last frame held; ``due``: whether
+        ``start``, ``length``: position and length in bytes of the last frame held. ``due``: whether
         the board may send another frame right after it.
         """
         pauses, calm = self.pauses, self.calm
@@ -239,9 +248,9 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept all frames of ``walk`` except the last two: the odd bytes after them raise doubt.
+        """Accept all frames of ``walk`` except the last two, because odd bytes follow these.
 
-        Always return False, because ``_walk`` must return False afterwards.
+        The result is always False: it is the result of ``_walk``.
         """
         believed = len(walk.frames) - 2
         if believed > 0:
@@ -249,7 +258,7 @@ class FrameDecoder:
         return False
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
-        """Accept the first ``count`` frames of ``walk``; ``after``: the context after them."""
+        """Accept the first ``count`` frames of ``walk``. ``after``: the context after them."""
         if not count:
             return
         self.statistics.frames += count
@@ -297,7 +306,7 @@ class FrameDecoder:
         """Yield the pieces up to the first undecided one, each with whether to accept it.
 
         A piece is decided if later bytes cannot change the result. A piece that ends at or before
-        the position ``until`` has waited long enough, and is decided as well.
+        the position ``until`` has waited long enough, so it is decided as well.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

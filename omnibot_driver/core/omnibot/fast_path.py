@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The fast path for frames that no evidence speaks against, and for shocks that continue.
+"""The fast path: decodes frames with expected content more quickly than the decoder's own loop.
 
-It accepts a frame only if the decoder's own loop, with the cost from ``weigh``, would accept it
-too; a test compares the two results. All other frames are left to that loop. A single IMU frame in
-a read has an even faster path (``single_imu``).
+It accepts a frame only if no evidence speaks against the frame, or if the frame continues a shock.
+The decoder's own loop would accept the same frame; a test compares the results. All other frames
+are left to that loop. If a read brings exactly one IMU frame, there is an even faster path
+(``single_imu``).
 """
 
 import struct
@@ -53,12 +54,15 @@ LEARN_EVERY: Final = 8
 
 
 class Walk:
-    """Consecutive frames, from the first byte held on, that no evidence speaks against.
+    """Consecutive frames, beginning with the first byte held, that no evidence speaks against.
 
-    ``ends``: position after each frame. ``lessons``: for each frame from which the expectation will
-    learn, the number of frames before it, the frame, and the last IMU frame before it. ``known``:
-    pairs of a number of frames and the context after that number of frames (as the fields of a
-    Context), for some numbers only.
+    ``ends``: the position after each frame.
+
+    ``lessons``: the frames from which the expectation will learn. Each entry is the number of
+    frames before it, the frame, and the last IMU frame before it.
+
+    ``known``: pairs of a number of frames and the context after this number of frames. The context
+    is a tuple of the fields of a Context. Not all numbers have an entry.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -70,7 +74,7 @@ class Walk:
         self.known: list[tuple[int, Any]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
-        """Add a frame that ends at ``end``; ``before``: the context before it."""
+        """Add a frame that ends at ``end``. ``before``: the context before it."""
         number = len(self.frames)
         is_lesson = not number % LEARN_EVERY and not before.imus & 3
         if is_lesson and type(frame) is ImuFrame and before.imu is not None:
@@ -115,10 +119,9 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Add frames from ``at`` on to ``walk``, while they are as expected; return end and context.
+    """Add expected frames from ``at`` on to ``walk``; return their end and the context after them.
 
-    The returned context is the context after the added frames. The last frame held is left out if
-    its last byte may belong to the next header.
+    The last frame held is left out if its last byte may belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

@@ -3,8 +3,10 @@
 """The wire format: every frame the board sends or obeys, as bytes and as values.
 
 Source: the board's manual ver. 0.3, sections "Serial Command (Rx)", "Serial Data Output (Tx)" and
-"Appendix". This module knows layouts only; ``translation`` and ``command_encoder`` know what a
-value means in SI units. All words are signed, 16 bit, most significant byte first.
+"Appendix". All words are signed, 16 bit, most significant byte first.
+
+This module knows layouts; it does not know what a value means in SI units (``translation``,
+``command_encoder``).
 """
 
 import re
@@ -22,8 +24,8 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""The bytes of headers. If one of them is the last byte of a frame, the frame may have lost a byte,
-and this byte may belong to the next header."""
+"""The bytes of headers. If the last byte of a frame is one of them, the frame may have lost a byte,
+and its last byte may belong to the next header."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")
@@ -110,7 +112,7 @@ EMERGENCY_STOP: Final = CommandFrame(EMERGENCY_STOP_MODE, (0, 0, 0))
 
 
 def command(mode: int, a: int, b: int, c: int) -> bytes:
-    """Return the bytes of a command frame; ``a``, ``b`` and ``c`` must fit into 16 bits."""
+    """Return the bytes of a command frame. ``a``, ``b`` and ``c`` must fit into 16 bits."""
     return _COMMAND.pack(COMMAND_HEADER, mode, a, b, c)
 
 

@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pauses in which the line was idle, and how far they can be trusted.
+"""The pauses in which the line was idle, and how reliable they are.
 
-A board sends the frames of a tick at once, so a pause of its line is between frames. An adapter
-that collects bytes, or a reader that is scheduled late (``late_reads``), causes pauses anywhere.
-Only frames can show whether the line or the adapter paused: this module counts how often pauses
-were in the expected places. It knows positions and times; it does not know what a frame contains,
-nor which frames are accepted (``decoder``).
+A board sends all frames of a tick at once, so it pauses only between frames. But an adapter that
+collects bytes, or a reader that is scheduled late (``late_reads``), causes pauses anywhere. This
+module finds out who causes the pauses: it counts how often they were between accepted frames.
+
+This module knows positions and times; it does not know what a frame contains, nor which frames are
+accepted (``decoder``).
 """
 
 from bisect import bisect_right
@@ -34,9 +35,10 @@ Causes of a longer pause are lost bytes, an adapter that collects bytes, or a la
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
 TICK_BYTES: Final = 14 + 9 + 15
-"""Largest number of bytes in one tick; a read of more bytes after a pause was late."""
+"""Largest number of bytes that the board sends in one tick. A read of more bytes after a pause was
+late."""
 PAUSES_TO_TRUST: Final = 16
-"""Number of pauses between frames after which the line is assumed to cause the pauses, not an
+"""After this number of pauses between frames, the line is assumed to cause the pauses, not an
 adapter."""
 
 _FIRST: Final = attrgetter("first")
@@ -45,16 +47,21 @@ _FIRST: Final = attrgetter("first")
 class InterFrameGaps:
     """The pauses within the bytes held, and where the pauses of this line normally are.
 
-    * ``gaps``: the pauses within the bytes held.
-    * ``sharp``: whether the first byte after a pause normally begins a frame.
-    * ``between``: whether a frame normally begins somewhere in the read after a pause.
-    * ``certain``: whether ``sharp`` and ``between`` were confirmed so often that one more
-      confirmation changes nothing.
-    * ``at_pace``: whether the bytes of the last read came without a pause before them.
-    * ``collected``: whether the bytes of the last read were collected for more than a tick. Such a
-      read is unlikely to end right after the first byte of a frame.
-
     ``byte_s``: time in s that the line takes for a byte.
+
+    ``gaps``: the pauses within the bytes held.
+
+    ``sharp``: whether the first byte after a pause normally begins a frame.
+
+    ``between``: whether a frame normally begins somewhere in the read after a pause.
+
+    ``certain``: whether ``sharp`` and ``between`` were confirmed so often that one more
+    confirmation changes nothing.
+
+    ``at_pace``: whether the bytes of the last read came without a pause before them.
+
+    ``collected``: whether the bytes of the last read were collected for more than a tick. Such a
+    read is unlikely to end right after the first byte of a frame.
     """
 
     def __init__(self, byte_s: float) -> None:
@@ -65,7 +72,7 @@ class InterFrameGaps:
         self.doubt()
 
     def doubt(self) -> None:
-        """Stop trusting pauses as signs of an idle line: earlier pauses may have other causes."""
+        """Stop trusting pauses, because something other than an idle line may have caused them."""
         self.sharp = self.between = self.certain = False
         self._sharp = self._between = 0
 
@@ -104,8 +111,8 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Learn from accepted frames whether the pauses of this line are between frames.
 
-        The line causes pauses between frames; an adapter causes pauses anywhere. ``ends``: the ends
-        of the accepted frames among the bytes held.
+        The line causes pauses only between frames; an adapter causes pauses anywhere. ``ends``: the
+        position after each accepted frame among the bytes held.
         """
         start = 0
         for end in ends:
@@ -133,7 +140,7 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether the bytes from ``start`` on came within half a tick, after a pause."""
+        """Return whether a pause ended at ``start`` and all later bytes came within half a tick."""
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
                 came = next(read.now for read in self._reads if read.end > start)

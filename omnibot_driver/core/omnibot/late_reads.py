@@ -2,10 +2,12 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-A read does not return when bytes arrive. It returns when the reader is scheduled, with the bytes
-that the adapter has delivered by then. So a pause between two reads proves little about the line.
+A read does not return when bytes arrive. It returns when the operating system runs the reader, with
+all bytes that the adapter has delivered by then. So a pause between two reads proves little about
+the line.
+
 The board's clock proves more, because the board sends an IMU frame in every tick. If bytes were
-lost in a pause within a frame, that frame and all later ones stay late by whole ticks. If only the
+lost in a pause within a frame, this frame and all later ones are late by whole ticks. If only the
 reader was late, later frames are on time again.
 
 This module knows lengths, ticks and times; it does not know what a frame contains, nor which frame
@@ -44,19 +46,19 @@ INTO_TICK_S: Final = 1e-3
 PUNCTUAL_S: Final = 1e-3
 """Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Largest difference in s between the arrival time of bytes and the time expected from the baud
-rate, at which the bytes are regarded as arriving at the pace of the line."""
+"""Tolerance in s for the arrival time of bytes, compared with the time that follows from the baud
+rate. Within it, bytes are regarded as arriving at the pace of the line."""
 FEW_BYTES: Final = 2
-"""Largest number of bytes that are too few to measure the pace at which bytes arrive."""
+"""Number of bytes up to which the pace of their arrival cannot be measured."""
 TICKS_TO_PROVE: Final = 2
 """Number of late ticks, after a first late tick, that prove lost bytes.
 
-The ticks must be read one by one, and be as late as the first late tick.
+Each of these ticks must be read by a read of its own, and must be as late as the first late tick.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Number of bytes after a frame, within which the cause of a pause in the frame is decided.
+"""Number of bytes after a frame within which the cause of a pause in the frame is decided.
 
-Without proof of an idle line by then, the reader is assumed to have been late.
+If they do not prove an idle line, the reader is assumed to have been late.
 """
 
 
@@ -69,7 +71,12 @@ class Cause(Enum):
 
 
 class Read(NamedTuple):
-    """A read at ``now`` in s; ``end``: position in the held bytes after its last byte."""
+    """A read of bytes.
+
+    ``end``: position in the held bytes after the last byte of the read.
+
+    ``now``: time of the read in s.
+    """
 
     end: int
     now: float
@@ -79,11 +86,14 @@ _END: Final = attrgetter("end")
 
 
 class Gap(NamedTuple):
-    """A pause between two reads, before one of the bytes from ``first`` to ``before`` - 1.
+    """A pause between two reads, caused by an idle line or by a late reader.
 
-    During the pause the line was idle, or the reader was late. ``price``: cost of assuming that one
-    frame was sent partly before and partly after the pause, if the line was idle; ``pause_s``: time
-    in s between the two reads.
+    ``first``, ``before``: the pause is before one of the bytes from ``first`` to ``before`` - 1.
+
+    ``price``: if the line was idle, the cost of assuming that a frame was sent partly before and
+    partly after the pause.
+
+    ``pause_s``: time in s between the two reads.
     """
 
     first: int
@@ -97,20 +107,25 @@ def cause(
 ) -> Cause:
     """Return the cause of ``gap``, a pause within ``data[start:end]``, if these bytes are a frame.
 
-    ``reads``: all reads since the pause, from the one that ended it; ``byte_s``: time in s that the
-    line takes for a byte. The reader was late
+    ``reads``: all reads since the pause, beginning with the read that ended it. ``byte_s``: time in
+    s that the line takes for a byte.
 
-    * if any later bytes are on time again. Exception: if all bytes since the pause came at the pace
-      of the line, perhaps the reader was prompt and no frame begins at ``start``. Then the cause is
-      found from the next frame;
-    * if bytes came faster than the line can send them, because they had waited to be read;
-    * if the frame is a text or a text follows it, because a paused board does not send frames in
-      ticks;
-    * if nothing has proved an idle line after ``MOST_BYTES``.
+    The reader was late in each of these cases:
 
-    The line was idle if a text begins at the pause, if the bytes after the frame do not begin
-    another frame, or if ticks that were read one by one are equally late. UNDECIDED means that more
-    bytes are needed.
+    * Later bytes are on time again. Exception: all bytes since the pause came at the pace of the
+      line. Then perhaps the reader was prompt and no frame begins at ``start``, so the next frame
+      shows the cause.
+    * Bytes came faster than the line can send them, so they had waited to be read.
+    * The frame is a text, or a text follows it. A paused board does not send frames in ticks.
+    * ``MOST_BYTES`` after the frame have not proved an idle line.
+
+    The line was idle in each of these cases:
+
+    * A text begins at the pause.
+    * The bytes after the frame do not begin another frame.
+    * Ticks that were read one by one are equally late.
+
+    The result UNDECIDED means that more bytes are needed.
     """
     if is_text(data, start):
         return Cause.LATE_READER
@@ -166,11 +181,10 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause by the frame after it, which begins at ``start``.
+    """Return the cause of a pause, as the frame after it shows. This frame begins at ``start``.
 
-    The line was idle if that frame has a pause too, which ended whole ticks after the first pause.
-    The reader was late if that frame has no such pause. ``first``: the read that ended the
-    first pause.
+    If this frame has a pause too, which ended a whole number of ticks after the first pause, the
+    line was idle. Otherwise the reader was late. ``first``: the read that ended the first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

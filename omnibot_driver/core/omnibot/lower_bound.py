@@ -2,11 +2,13 @@
 
 """A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
 
-Undamaged frames follow one another from a header up to a place where no frame begins. From there, a
-damaged frame covers at most ``REACH`` bytes and costs at least ``DAMAGE``; a run of unexplained
-bytes (a bad run) costs more per byte. So the least number of damaged frames up to the end of a
-stretch is known before any content is judged. This module knows the shapes of frames and the lowest
-prices; ``trellis`` knows what is searched.
+From a header on, undamaged frames follow one another, up to a place where no frame begins. There,
+either a frame is damaged, or a run of unexplained bytes (a bad run) begins. A damaged frame covers
+at most ``REACH`` bytes and costs at least ``DAMAGE``. A bad run costs more per byte. So the
+smallest possible number of damaged frames is known before any content is judged.
+
+This module knows the shapes of frames and the lowest prices; it does not know what is searched
+(``trellis``).
 """
 
 import re
@@ -17,7 +19,7 @@ from omnibot_driver.core.omnibot.frames import INCOMPLETE, NO_FRAME, measure
 
 DAMAGE: Final = ONE_BYTE
 REACH: Final = 15 + 2
-"""Most bytes that one damaged frame covers: the longest frame, with two bytes added."""
+"""Largest number of bytes that one damaged frame covers: the longest frame and two added bytes."""
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
@@ -27,8 +29,8 @@ _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    An incomplete frame at the end costs nothing, because more bytes may follow. Along an edge of
-    the graph, the least cost decreases by at most the price of the edge.
+    An incomplete frame at the end costs nothing, because more bytes may follow. An edge of the
+    graph never costs less than the difference of the least costs at its two ends.
     """
     size = len(data)
     ends = _undamaged(data)
@@ -55,9 +57,10 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return, for each place where a frame may begin, the end of the chain of frames from there.
+    """Return where the undamaged frames end that follow one another from each possible start.
 
-    All frames of a chain are undamaged. Keys are positions in ``data``, in descending order.
+    Keys are the positions in ``data`` where a frame may begin, in descending order. Values are the
+    positions where the chain of undamaged frames ends.
     """
     size = len(data)
     ends: dict[int, int] = {}

@@ -2,10 +2,14 @@
 
 """Checks for settings that the board's data contradicts. The user is advised to change them.
 
-The checks find poses that are plausible only in the other byte order, deltas whose sum leads to the
-next pose only in the other frame (earth or body), and deltas at a rate that differs from the
-setting. This module knows what the data means under each setting; it does not know how the user is
-informed.
+Three settings are checked:
+
+* the byte order of the poses: they may be plausible only in the other order;
+* the frame of the deltas, earth or body: their sum may lead to the next pose only in the other
+  frame;
+* the period of the deltas: they may arrive at another rate.
+
+This module knows what the data means under each setting; it does not know how the user is informed.
 """
 
 import math
@@ -19,33 +23,34 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""Number of poses that prove a setting wrong if they contradict it and none confirms it.
+"""Number of poses that prove a setting wrong, if they contradict it and no pose confirms it.
 
 The board sends this number of poses in 2 s.
 """
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""``SMALLEST``, ``LARGEST``: limits of the absolute value of a coordinate in mm or mrad, unless the
-coordinate is 0.
+"""``SMALLEST``, ``LARGEST``: limits for the absolute value of a coordinate in mm or mrad, unless
+the coordinate is 0.
 
-A value outside the limits was misread from bytes in another order.
+A value outside the limits shows that its bytes were read in the wrong order.
 """
 POSE_PERIODS: Final = 2
-"""Longest allowed time between two compared poses, in pose periods; one pose in between may be
-lost."""
+"""Longest time between two poses that are compared, in pose periods. So one pose between them may
+be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""Limits above which a pose contradicts the configured frame of the deltas.
+"""``CLEARLY_M``, ``TIMES``: limits above which a pose contradicts the configured frame of the
+deltas.
 
-The deltas since the last pose are added to that pose, in the configured frame and in the other
-frame. ``CLEARLY_M`` limits the distance in m between the new pose and the sum in the configured
-frame. ``TIMES`` limits the ratio of this distance to the distance in the other frame.
+The deltas since the last pose are added to that pose, once in the configured frame and once in the
+other frame. Each sum has a distance from the new pose. In the configured frame, the distance must
+be above ``CLEARLY_M``, in m, and above ``TIMES`` times the distance in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""``FEWEST_DELTAS``, ``FOR_S``: least number, and least duration in s, of consecutive deltas that
-prove the configured rate wrong."""
+"""``FEWEST_DELTAS``, ``FOR_S``: smallest number of consecutive deltas, and their shortest duration
+in s, that prove the configured period wrong."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
@@ -69,7 +74,7 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Store a delta, so that the next pose can check the frame of the deltas.
+        """Store a delta, with which the next pose will check the frame of the deltas.
 
         ``reading``: the delta as the settings interpret it.
         """
@@ -81,10 +86,10 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """Check the rate of the deltas, with a delta that arrived at ``now`` in s.
+        """Check the period of the deltas, with a delta that arrived at ``now`` in s.
 
-        ``imus``: number of IMU frames received since the previous delta. This number shows the
-        period. Some IMU frames may be lost, so arrival times must confirm the period.
+        ``imus``: number of IMU frames received since the previous delta, which shows the period.
+        Some IMU frames may be lost, so arrival times must confirm this period.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:
@@ -108,7 +113,7 @@ class MisconfigurationChecks:
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
         """Check the byte order of the poses, and the frame of the deltas, with a new pose.
 
-        ``order``: the configured byte order; ``reading``: the pose as the settings interpret it.
+        ``reading``: the pose as the settings interpret it. ``order``: the configured byte order.
         """
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))

@@ -2,10 +2,12 @@
 
 """The board's modes as a table: how the letters S, P and R and the board's data change the mode.
 
-Source: the manual's "Operation State Machine" and "System state command". The board does not report
-its mode, so the driver infers it from the data that it *receives*. A letter that was sent proves
-nothing: the board may have missed it. After R the mode is unknown. P toggles between paused and
-running, so P is allowed only while the board is known to run.
+Source: the manual's "Operation State Machine" and "System state command".
+
+The board does not report its mode, so the driver infers it from the data that it *receives*. A
+letter that was sent proves nothing, because the board may have missed it. After R the mode is
+unknown. P toggles between paused and running, so the driver sends P only while it knows that the
+board is running.
 """
 
 from enum import Enum
@@ -40,7 +42,7 @@ TRANSITIONS: Final[dict[Happening, dict[Mode, Mode]]] = {
     Happening.SENT_PAUSE: {_N: _N, _I: _I},
     Happening.SENT_RESET: {_U: _U, _P: _U, _N: _U, _I: _U},
 }
-"""Mode after an event, by event and previous mode; an event without an entry is refused."""
+"""The mode after an event, by event and previous mode. An event without an entry is refused."""
 
 
 class ModeTracker:
@@ -53,7 +55,10 @@ class ModeTracker:
         self.mode = Mode.UNKNOWN
         self._imus_alone = self.imus_to_come = schedule.imus_alone
         """``_imus_alone``: number of IMU frames, without a delta between them, that show IMU-only
-        mode. ``imus_to_come``: how many of these frames have not come yet."""
+        mode.
+
+        ``imus_to_come``: how many of these frames have not arrived yet.
+        """
 
     def apply(self, happening: Happening) -> None:
         """Apply one event of the table. Raises RequestRefused if the mode does not allow it."""

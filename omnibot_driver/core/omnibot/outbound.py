@@ -5,28 +5,28 @@
 The frames are the manual's. This module decides which bytes precede them, and which of two
 neighbouring values a word takes. It knows bytes; it does not know what is commanded, nor when.
 
-The reasons: a control frame has no checksum, and the board's parser is unknown. The worst possible
-parser counts seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that
-parser completes the frame with the next byte that is sent.
+A control frame has no checksum, and the board's parser is unknown. The worst possible parser counts
+seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that parser completes
+the frame with the next byte that is sent. So the encoding has four rules.
 
-1. *Zeros precede everything.* A zero is neither a letter nor a header, and seven of them end any
-   frame that was begun. So zeros complete a Stop or an emergency stop that was cut: the frame
-   remains a stop, or becomes a frame in mode 0, which is not a command. A letter is never swallowed
-   by a frame that was begun, and a header never follows an ``FF``. The eighth zero makes up for one
-   that is lost. Before a motion frame four zeros are enough: only a frame that lost five or more
-   bytes of its payload could swallow the header after the zeros, and such a frame commands motion
-   as well.
-2. *Nothing follows a motion frame.* A motion frame that was cut has no effect until the next
-   transmission. Its zeros complete the cut frame, but 12 bytes (1.0 ms at 115200 baud) later the
-   next frame replaces the cut one. Zeros right after a motion frame would complete a cut frame at
-   once, and that frame would then be in force until the next repetition. Even a parser that
-   discards a cut frame after a pause would accept it.
-3. *A payload without its header is harmless.* If the header is lost, a parser looks for letters
-   and headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
-   follows ``FF``: each word takes the nearest value for which this holds. That value is one LSB
+1. *Zeros precede everything.* A zero is neither a letter nor a header, and seven zeros end any
+   frame that was begun. An eighth zero replaces one that is lost. If a Stop or an emergency stop
+   lost bytes, the zeros complete it: it is still a stop, or becomes a frame in mode 0, which is not
+   a command. A begun frame swallows zeros instead of a letter, and a header never follows an
+   ``FF``. Before a motion frame, four zeros are enough. Only a frame that lost five or more bytes
+   of its payload could swallow the header after four zeros, and such a frame commands motion as
+   well.
+2. *Nothing follows a motion frame.* A motion frame that lost bytes has no effect until the next
+   transmission. The zeros of that transmission complete it, but the next frame replaces it 12 bytes
+   later (1.0 ms at 115200 baud). If zeros followed a motion frame directly, they would complete it
+   at once, and the wrong command would last until the next repetition. Even a parser that discards
+   an incomplete frame after a pause would accept it.
+3. *A payload without its header is harmless.* If the header is lost, a parser looks for letters and
+   headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
+   follows ``FF``. Each word takes the nearest value for which this is true. That value is one LSB
    away, unless the high byte of the word is a letter.
-4. *What is lost is sent again*: each of these frames and letters is repeated, or confirmed by the
-   board's data.
+4. *What is lost is sent again.* Each of these frames and letters is repeated, or the board's data
+   confirms it.
 
 One risk remains: an added or changed byte can turn a frame into another valid frame, until the next
 repetition.
@@ -48,9 +48,10 @@ MAX_WORD: Final = 32767
 
 ZEROS: Final = bytes(8)
 """Zeros before a frame or letter. Seven zeros end any frame that was begun, and an eighth may be
-lost. Three zeros are enough to wake a board."""
+lost. To wake a board, three zeros are enough."""
 ZEROS_BEFORE_MOTION: Final = bytes(4)
-"""Zeros before a motion frame: few, so that the frame soon replaces a damaged one before it."""
+"""Zeros before a motion frame. They are few, so that this frame soon replaces a damaged frame
+before it."""
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET
 _HARMFUL: Final = re.compile(b"[%s]|%s" % (_LETTERS, re.escape(COMMAND_HEADER))).search
@@ -89,7 +90,7 @@ def nearest(a: float, b: float, c: float) -> Words:
 def begins_with_a_letter(word: int) -> bool:
     """Return whether the high byte of ``word`` is S, P or R.
 
-    A neighbouring value has the same high byte, so it does not avoid the letter.
+    If so, changing the word by one LSB does not avoid the letter.
     """
     return word >> 8 & 0xFF in _LETTERS
 
@@ -97,7 +98,7 @@ def begins_with_a_letter(word: int) -> bool:
 def _harmless_word(count: float, word: int, follows: int) -> int:
     """Return the word nearest to ``count`` whose bytes contain neither a letter nor a header.
 
-    ``word``: the nearest integer to ``count``; ``follows``: the byte after the word.
+    ``word``: the integer nearest to ``count``. ``follows``: the byte after the word.
     """
     reach = 0
     while True:

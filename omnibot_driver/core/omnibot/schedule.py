@@ -2,9 +2,10 @@
 
 """The rates at which a running board sends each kind of frame.
 
-The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. So
-their period is a setting, from which the other rates follow. This module knows rates; it does not
-know what a frame contains.
+The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. So the
+period of the deltas is a setting. The other rates follow from it.
+
+This module knows rates; it does not know what a frame contains.
 """
 
 from typing import Final
@@ -30,7 +31,10 @@ _DELTA_BYTES: Final = 9
 
 
 class Schedule:
-    """The rates of the board's frames. ``delta_period_s``: one of ``DELTA_PERIODS_S``."""
+    """The rates of the board's frames.
+
+    ``delta_period_s``: period of the deltas in s, one of ``DELTA_PERIODS_S``.
+    """
 
     def __init__(self, delta_period_s: float = 0.04) -> None:
         self.delta_period_s = delta_period_s

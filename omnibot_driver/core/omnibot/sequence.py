@@ -2,10 +2,12 @@
 
 """The counters of the board's deltas and poses: missing deltas, and whether the board restarted.
 
-SEQ, the counter of the deltas, is one byte and wraps every 10.24 s at 25 Hz; arrival times show how
-often it wrapped. A pose comes with every fifth delta (every second one at 10 Hz) and has a counter
-of its own, so a pose can reveal losses before the next delta does. This module does not know what a
-frame contains.
+SEQ, the counter of the deltas, is one byte. At 25 Hz it returns to 0 every 10.24 s, and arrival
+times show how often it has done so. Poses have a counter of their own. A pose comes with every
+fifth delta, or with every second delta at 10 Hz. So a pose can reveal lost deltas before the next
+delta does.
+
+This module knows counters and arrival times; it does not know what a frame contains.
 """
 
 from typing import Final
@@ -16,20 +18,22 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Difference in s between the elapsed and the counted time up to which no restart is assumed.
+"""Largest difference in s between the elapsed time and the time that the counter shows, at which no
+restart is assumed.
 
-The limit is extended by the possible drift of the board's clock. It is about twice the largest
-error of arrival times: 0.24 s, if a full buffer of the host (4096 bytes, 2.4 s) lacks one byte in
-ten.
+The possible drift of the board's clock is added to this limit. The limit is about twice the largest
+error of arrival times, 0.24 s. This error occurs when the host's buffer is full (4096 bytes, 2.4 s)
+and lacks one byte in ten.
 """
 DRIFT: Final = 0.01
-"""Largest relative error of the board's clock, and so of the counted time.
+"""Largest relative error of the board's clock, and so of the time that the counter shows.
 
-After a silence of minutes the error may be seconds. The count then shows little about a restart;
-the board's pose shows whether it restarted.
+After a silence of minutes, the error may be seconds. Then the counter hardly shows whether the
+board restarted, but the board's pose does.
 """
 EARLY_S: Final = 0.2
-"""Time in s by which the counted time since a restart may exceed the elapsed time.
+"""Time in s by which the time since a restart, as the counter shows it, may exceed the elapsed
+time.
 
 The elapsed time is too short if the last delta before the restart was read late. A restart of the
 board takes longer than this tolerance.
@@ -40,9 +44,12 @@ board takes longer than this tolerance.
 class Step:
     """What the counter of a new delta or pose shows, compared with its previous value.
 
-    ``lost``: number of missing deltas that were not reported before; ``duration_s``: time in s that
-    the delta covers, None if unknown; ``restarted``: whether the counter seems to have restarted
-    from zero, which only the board's pose can prove.
+    ``lost``: number of missing deltas that were not reported before.
+
+    ``duration_s``: time in s that the delta covers; None if this is unknown.
+
+    ``restarted``: whether the counter seems to have restarted from zero. Only the board's pose can
+    prove a restart.
     """
 
     lost: int
@@ -63,20 +70,21 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether a pose ever came after the expected number of deltas; until then the counts of
-        poses are ignored."""
+        """Whether a pose has ever come after the expected number of deltas. Until then, the
+        counters of poses are ignored."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
-        """Count of the last delta, if it was too high for the elapsed time, else None.
+        """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        A bit may be flipped, or the frame may be false. So lost deltas are computed from the
-        elapsed time instead, until a delta continues this count.
+        The counter may have a flipped bit, or the bytes may not be a true frame. So the number of
+        lost deltas is computed from the elapsed time, until a delta continues this counter.
         """
         self._left: tuple[int, float, int] | None = None
-        """Last count before a supposed restart, its arrival time in s, and first count after it."""
+        """The last counter before a supposed restart, its arrival time in s, and the first counter
+        after it."""
 
     def pause(self) -> None:
-        """Record that the board paused: its counter may continue, or restart from zero."""
+        """Record that the board paused. Then its counter may continue, or restart from zero."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
@@ -84,9 +92,10 @@ class Sequence:
         self._reconnected, self._pose = True, None
 
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
-        """Return what the counter of a delta that arrived at ``now`` in s shows about losses.
+        """Return what the counter of a new delta shows about lost deltas and about a restart.
 
-        ``count``: the counter; ``imus``: number of IMU frames since the previous delta.
+        ``count``: the counter. ``now``: arrival time of the delta in s. ``imus``: number of IMU
+        frames since the previous delta.
         """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose
@@ -125,9 +134,10 @@ class Sequence:
         return Step(lost, period_s)
 
     def pose(self, count: int, now: float) -> Step:
-        """Return what the counter of a pose that arrived at ``now`` in s shows about losses.
+        """Return what the counter of a new pose shows about lost deltas and about a restart.
 
-        ``lost`` of the result: number of missing deltas whose motion the pose includes.
+        ``count``: the counter. ``now``: arrival time of the pose in s. In the result, ``lost`` is
+        the number of missing deltas whose motion the pose includes.
         """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
@@ -148,7 +158,8 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if ``count`` continues the count from before the restart."""
+        """Withdraw a supposed restart if ``count`` continues the counter from before the
+        restart."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The settings of an OmniBot board that the board's data does not show; the user knows them."""
+"""The settings of an OmniBot board: facts that the user knows and the board's data does not
+show."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -13,12 +14,18 @@ from omnibot_driver.core.omnibot.frames import ByteOrder
 class OmniBotSettings:
     """Facts about a board that its data does not show.
 
-    ``baudrate``: in bits per second, with ten bits per byte; ``linear_scale``: LSB per m/s;
-    ``angular_scale``: LSB per rad/s; ``position_scale`` and ``heading_scale``: LSB per m and rad of
-    a commanded pose; ``delta_frame``: what deltas are: differences of positions in the board's
-    earth frame, motion along the board's own axes, or (older firmware) encoder counts of the wheels
-    A, B, C; ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``,
-    constant as long as the ``OmniBot`` exists.
+    ``baudrate``: in bits per second, with ten bits per byte.
+
+    ``linear_scale``, ``angular_scale``: LSB per m/s and LSB per rad/s of a commanded velocity.
+
+    ``position_scale``, ``heading_scale``: LSB per m and LSB per rad of a commanded pose.
+
+    ``delta_frame``: what the board's deltas are. "earth": differences of positions in the board's
+    earth frame. "body": motion along the board's own axes. "wheel_counts": encoder counts of the
+    wheels A, B and C, as older firmware sends them.
+
+    ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``. It must
+    not change while the ``OmniBot`` exists.
     """
 
     baudrate: int = 115200

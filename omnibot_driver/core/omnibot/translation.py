@@ -2,8 +2,8 @@
 
 """The translation of frames into readings in SI units, with the number of lost frames.
 
-Source: the board's manual ver. 0.3. Units on the wire: deltas 0.1 mm and 0.1 mrad; poses mm and
-mrad.
+Source: the board's manual ver. 0.3. On the line, the units of deltas are 0.1 mm and 0.1 mrad, and
+those of poses are mm and mrad.
 """
 
 import math
@@ -42,9 +42,12 @@ POSE_LSB_RAD: Final = 1e-3
 class Translation:
     """Translates the frames of one line, and infers the board's mode and wrong settings from them.
 
-    ``settings`` may be replaced at any time, except its ``delta_period_s``. ``singles_to_come``:
-    number of IMU frames that ``single_imu`` may take without a call to this class; ``heard_s``:
-    arrival time in s of the last decoded bytes.
+    ``settings``: may be replaced at any time, except its ``delta_period_s``.
+
+    ``singles_to_come``: number of IMU frames that ``single_imu`` may take without calling this
+    class.
+
+    ``heard_s``: arrival time in s of the last decoded bytes.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -63,15 +66,17 @@ class Translation:
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
         """``singles_to_come``: number of IMU frames that ``single_imu`` may still take.
-        ``_most_singles``: the initial value of ``singles_to_come``."""
+
+        ``_most_singles``: the initial value of ``singles_to_come``.
+        """
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Return the readings of the frames that one read brought.
 
-        ``skipped``: for each frame, the number of bytes before it that belong to no frame; ``now``:
-        time of the read in s. The bytes of one read did not arrive all at once, so the arrival time
-        of each frame is estimated.
+        ``skipped``: for each frame, the number of bytes before it that belong to no frame. ``now``:
+        time of the read in s. The bytes of a read arrived one after another, so the arrival time of
+        each frame is estimated.
         """
         self._catch_up()
         before_s, self.heard_s = self.heard_s, now

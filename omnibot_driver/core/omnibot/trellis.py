@@ -2,20 +2,23 @@
 
 """The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
-The search is for a shortest path in a graph. Each place between two bytes has two nodes: one as a
-boundary of frames, one within a run of unexplained bytes (a bad run). Edges are complete frames,
-damaged frames and unexplained bytes, with prices from ``cost_model``. A shortest path is the best
-interpretation. A frame on it is sure if every path that interprets the first byte of the frame in
-another way costs more by at least ``SURE``. This module knows how a line damages the shapes of
-frames. Work and memory are proportional to the length of the stretch.
+The search is for a shortest path in a graph. Each place between two bytes has two nodes: one if it
+is a boundary between frames, one if it is within a run of unexplained bytes (a bad run). Edges are
+complete frames, damaged frames and unexplained bytes, with prices from ``cost_model``. A shortest
+path is the best interpretation. A frame on this path is sure if every other interpretation of its
+first byte costs more by at least ``SURE``.
 
-The price of content depends on the context: what earlier frames show. The context of a node is the
-context at the end of the cheapest path to that node.
+The price of content depends on the context, that is, on what earlier frames show. The context of a
+node is the context at the end of the cheapest path to that node.
 
-Most edges are on no path that is nearly as cheap as the best. So the search omits edges whose total
-cost would exceed a limit even if the remaining bytes cost as little as possible (``lower_bound``).
-The limit is raised until no omitted edge can change the result, so the result is the same as
-without omissions.
+Most edges are not on any path that is nearly as cheap as the best. So the search has a cost limit.
+It omits an edge if the total cost would exceed the limit even with the lowest possible cost of the
+remaining bytes (``lower_bound``). The limit is raised until no omitted edge can change the result.
+So the result is the same as without omissions. Work and memory are proportional to the length of
+the stretch.
+
+This module knows how a line damages the shapes of frames; it does not know which frames are
+accepted (``decoder``).
 """
 
 from bisect import bisect_left
@@ -44,9 +47,9 @@ STEP: Final = 5.5
 If the search finds no path below this limit, it raises the limit and begins again.
 """
 BEYOND: Final = 0.025
-"""Half the step of the prices (0.05), added to the cost limit.
+"""A small amount that is added to the cost limit: half of 0.05, the step of all prices.
 
-A sum of prices therefore never equals the limit, and rounding errors have no effect.
+So a sum of prices never equals the limit, and rounding errors have no effect.
 """
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
@@ -73,7 +76,7 @@ _HEADLESS: Final = {
     0xFF: ((13, cost_model.HEADER_BYTE), (8, cost_model.HEADER_BYTE), (14, cost_model.HEADER_BYTE)),
     **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
 }
-"""Shapes of a frame that lost one byte of its header, by the header byte that is left."""
+"""Shapes of a frame that has lost one of its two header bytes, by the header byte that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 _BEGINNINGS: Final = (_HEADER, _TEXT)
@@ -81,7 +84,10 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 
 @value(frozen=True, slots=True)
 class Segment:
-    """A complete frame of the best interpretation, with the contexts before and after it.
+    """A complete frame of the best interpretation.
+
+    ``start``, ``end``: its position among the bytes. ``before``, ``after``: the contexts before and
+    after it.
 
     ``sure``: whether every other interpretation of the frame's first byte costs clearly more.
     """
@@ -95,7 +101,8 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""Start node, end node, price, the complete frame if the edge is one, and the context after it."""
+"""Start node, end node, and price. If the edge is a complete frame, also this frame and the context
+after it."""
 
 
 def read(
@@ -110,8 +117,8 @@ def read(
 ) -> list[Segment]:
     """Return the complete frames of the best interpretation of ``data``.
 
-    ``in_step``: whether a frame ended right before ``data``; ``closed``: whether the line was
-    closed, so that more bytes will never follow.
+    ``in_step``: whether an accepted frame ended right before ``data``. ``closed``: whether the line
+    was closed, so that no more bytes follow.
     """
     search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)

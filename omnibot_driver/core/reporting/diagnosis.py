@@ -4,9 +4,9 @@
 
 The levels are those of diagnostic_msgs:
 
-- ERROR: the robot cannot be used, or must not be used.
-- WARN: the robot can be used, but the operator should check something.
-- STALE: the driver does not know.
+* ERROR: the robot cannot be used, or must not be used.
+* WARN: the robot can be used, but the operator should check something.
+* STALE: the condition of this part is unknown.
 
 This module knows figures and times; it does not know how the figures are obtained.
 """

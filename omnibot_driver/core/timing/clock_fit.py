@@ -7,18 +7,18 @@ slope is the true period. Bytes that a read did not bring were sent after that r
 cannot be much lower either. The ticks are divided into blocks. Of each block, at most two points
 are kept:
 
-- *Latest*: the arrival with the smallest delay. This upper bound is always valid. After bursts,
+* *Latest*: the arrival with the smallest delay. This upper bound is always valid. After bursts,
   stalls and losses it is higher than necessary.
-- *Earliest*: a tick that a read did not bring, and the time of this read. This lower bound is too
+* *Earliest*: a tick that a read did not bring, and the time of this read. This lower bound is too
   high if the read was late, so the highest tenth of these bounds is left out. A bound that is far
   below the arrivals is of little use, and is not kept.
 
 The line is placed in one of two ways:
 
-- *Between*: in the middle of all bounds. Each latest point and each earliest point together limit
+* *Between*: in the middle of all bounds. Each latest point and each earliest point together limit
   the slope. If an adapter's timer hides the true arrival times for seconds, the error is at most
   half the distance between the bounds.
-- *Under*: as closely as possible under the latest points, along an edge of their lower convex hull.
+* *Under*: as closely as possible under the latest points, along an edge of their lower convex hull.
   This way is used if there are no earliest points, or if the bounds contradict each other because
   reads were late.
 
