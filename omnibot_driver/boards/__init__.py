@@ -27,12 +27,12 @@ PROFILES: Final = {
 DEFAULT: Final = "omnibot"
 
 Publish = Callable[[Any, int], None]
-"""Function that publishes a value of a type that only this board has; the stamp is in ns of ROS
-time."""
+"""Function that publishes one value. Only this board has values of this type. The second argument
+is the stamp in ns of ROS time."""
 
 
 class Profile(Protocol):
-    """The functions and values of a board's profile, which is a module."""
+    """The functions and values of a board's profile, which is a module and not a class."""
 
     SIMULATOR: str
     """Package of the simulated board, to be imported where it is used."""
@@ -53,11 +53,11 @@ class Profile(Protocol):
         """Return the kinematics of the wheels, from checked values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Create what only this board has: publishers, services and inputs on the node.
+        """Create the publishers, services and subscriptions on the node that only this board has.
 
-        Returns, by type of value, the functions that publish the values of ``Extra`` events.
-        ``call`` and ``command`` of the link give access to the session. The driver calls this once,
-        on the executor's thread, before bytes arrive.
+        Returns the functions that publish the values of ``Extra`` events, by type of value. The
+        methods ``call`` and ``command`` of ``link`` give access to the session. The driver calls
+        this once, on the executor's thread, before bytes arrive.
         """
 
 

@@ -24,7 +24,7 @@ SIMULATOR: Final = "omnibot_driver.simulator.fejemis"
 USB_BAUDRATE: Final = 115200
 """Baud rate that is set for the USB ports, whose real speed does not depend on this setting."""
 WHEEL_RADIUS_M, TRACK_M, WHEELBASE_M = 0.0775, 0.4, 0.42
-"""Wheel radius, track and wheelbase, in m, that are used if the user does not set them.
+"""Wheel radius, track and wheelbase in m that are used if the user does not set them.
 
 Only the track is in the manual.
 """
@@ -91,8 +91,8 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's own topics and services, and return its publishing functions.
 
-    Some topics show steering joint, orientation, magnetic field, battery and ranges. Other topics
-    and the services accept requests for brush, lift, lights and jobs.
+    The topics from the board are steering joint, orientation, magnetic field, battery and ranges.
+    Other topics and the services are for brush, lift, lights and jobs.
     """
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
 

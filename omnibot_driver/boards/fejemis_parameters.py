@@ -2,8 +2,8 @@
 
 """The parameters of a Fejemis, except those that all boards have. This module must not use ROS.
 
-Values that the two Teensys store are unset by default: the driver writes such a value only if the
-user sets it (`fejemis_values.py`).
+The two Teensys store some of these values themselves. Such a value is unset by default, and the
+driver writes it only if the user sets it (`fejemis_values.py`).
 """
 
 import math

@@ -53,7 +53,10 @@ SERVICES: Final = {
 
 
 class FejemisTopics:
-    """The board's own topics and services; ``publish`` maps types of readings to publishers."""
+    """The topics and services that only a Fejemis has.
+
+    ``publish``: for each type of reading, the method that publishes it.
+    """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -209,7 +212,7 @@ class FejemisTopics:
     def _lift(self, link: Any) -> Callable[..., None]:
         """Return the callback of ``lift_cmd``.
 
-        The callback obeys a command of 0 V in any state, however old the command is.
+        It obeys a command of 0 V in any state of the boards, however old the command is.
         """
 
         def lift(session: Session, message: Float32, now: float) -> None:

@@ -44,7 +44,7 @@ _WHEELS: Final = ("wheel_radii", "gear", "encoder_ticks")
 
 
 def require_two_ports(values: Mapping[str, Any]) -> None:
-    """Reject the same device for both Teensys, because each Teensy has its own port."""
+    """Raise ParameterError if both Teensys have the same device, because each has its own port."""
     port, front = (str(values[name]) for name in ("port", "front_port"))
     if port == front or (port.startswith("/") and _same(port, front)):
         raise ParameterError(
@@ -54,7 +54,10 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
 
 
 def require_whole_settings(values: Mapping[str, Any]) -> None:
-    """Reject a set parameter if another one of the same command to the board is unset."""
+    """Raise ParameterError if a command to the board lacks one of its values.
+
+    Several parameters are written with one command. So the user must set all of them or none.
+    """
     _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
     _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")
     offset = ("front_wheel_offset", "front_wheel_inverted")

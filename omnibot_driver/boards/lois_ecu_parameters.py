@@ -2,8 +2,8 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
-Settings that the board stores are unset by default: the driver writes such a setting only if the
-user gives a value.
+The board stores some of these values itself. Such a value is unset by default, and the driver
+writes it only if the user sets it.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest allowed rate of commands in a terminal mode, in Hz. A command has 14 characters, and the
+"""Largest allowed rate of commands in a terminal mode, in Hz. A command has 14 characters. The
 board can forward 34 such commands per second to the compass."""
 
 WHEELS: Final = (
@@ -163,8 +163,8 @@ _RANGES: Final = {
     "long_correction": (0.1, 10.0),
     "feed_forward": (0.0, 1000.0),
 }
-"""Smallest and largest value for each kind of setting: a negative gain is unstable, and Tn is a
-divisor."""
+"""Smallest and largest value for each kind of setting. A negative gain would be unstable, and Tn is
+a divisor, so it must not be 0."""
 
 
 _UNITS: Final = {"tn": "s", "td": "s"}
@@ -209,7 +209,7 @@ PERIODS: Final[Mapping[str, Stream]] = {
     "time_period": Stream.GPS_TIME,
     "date_period": Stream.GPS_DATE,
 }
-"""Messages that the board sends periodically, by the name of the parameter for the period."""
+"""Messages that the board sends periodically, by the name of the parameter that sets the period."""
 
 
 def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
@@ -237,7 +237,10 @@ SENT: Final = (
 
 
 def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """Reject a terminal mode without checksum: both are values of one setting of the board."""
+    """Raise ParameterError if a terminal mode is chosen and checksums are off.
+
+    In a terminal mode the board expects checksums, and would ignore a stop without one.
+    """
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
             "parameter 'terminal_mode' must be host while 'checksum' is false: in a terminal mode"
@@ -246,10 +249,10 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """Reject a command rate that is too high for a terminal mode.
+    """Raise ParameterError if the command rate is too high for a terminal mode.
 
-    Stop is sent at ``command_rate``, and the board forwards each Stop to a sensor whose line has
-    4800 baud. A higher rate would therefore delay Stop.
+    The driver sends Stop at ``command_rate``. The board forwards each Stop to a sensor whose line
+    has 4800 baud, so a higher rate would delay Stop.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
@@ -260,9 +263,11 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:
-    """Reject periods below ``SHORTEST_PERIOD_S``, and a ``ticks_period`` of 0 (off) or above 0.5 s.
+    """Raise ParameterError if the board cannot work with a period.
 
-    With a period near 0 the public firmware would always be sending, and would miss all commands.
+    A period must be 0 (off) or at least ``SHORTEST_PERIOD_S``: with a period near 0 the public
+    firmware would always be sending, and would miss all commands. ``ticks_period`` must not be 0,
+    and must be at most 0.5 s.
     """
     for name in PERIODS:
         period_s = values[name]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Services that start a record of the LOIS ECU; each answers when the record's file is written.
+"""Services that start a record of the LOIS ECU. Each answers when the record's file is written.
 
 This module only connects ROS to the session.
 """
@@ -37,8 +37,9 @@ NAMES: Final = {
 class Recorder:
     """The record services of one node.
 
-    ``values`` returns the present parameter values. ``publish`` has the functions that receive each
-    type of result.
+    ``values``: function that returns the present parameter values.
+
+    ``publish``: for each type of result, the function that receives it.
     """
 
     def __init__(self, node: Node, link: Any, values: Callable[[], Mapping[str, Any]]) -> None:

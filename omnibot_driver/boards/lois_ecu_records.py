@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Saving of a LOIS ECU's record as a CSV file, which is complete or does not exist.
+"""Saves a record of the LOIS ECU as a CSV file. The file is complete or does not exist.
 
-This module works on records and files, without ROS and without the board's lines.
+This module knows records and files; it knows neither ROS nor the board's lines.
 """
 
 import contextlib
@@ -19,17 +19,20 @@ from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.readings import RecordReading
 
 SATURATED: Final = 0xFFFF
-"""Count that the board reports for a tick whose time does not fit into 16 bits."""
+"""Timer count that the board reports if the time of an encoder tick does not fit into 16 bits."""
 
 Row = tuple[object, ...]
 
 
 def table(reading: RecordReading) -> Iterator[Row]:
-    """Yield the header, then one row for each sample; an unknown value is empty.
+    """Yield the header of the file, then one row for each sample; an unknown value is empty.
 
-    RPM: time from tick to tick in s, the speed calculated from this time, and the board's own
-    counts. Torque: counts of a 12 bit ADC, whose scale the board does not report. Heading: degrees
-    clockwise from magnetic north.
+    The columns depend on the kind of record:
+
+    * RPM: the time from tick to tick in s, the speed calculated from this time, and the board's
+      timer counts.
+    * Torque: counts of a 12 bit ADC. The board does not report their scale.
+    * Heading: degrees clockwise from magnetic north.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:
@@ -57,7 +60,7 @@ def table(reading: RecordReading) -> Iterator[Row]:
 
 
 def remark(reading: RecordReading) -> str:
-    """Return a sentence on what the file lacks; empty if the file is complete."""
+    """Return a sentence that says what is missing in the file; empty if nothing is missing."""
     if reading.record.kind is not RecordKind.RPM:
         return ""
     if reading.count_s is None:
@@ -79,9 +82,10 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 
 
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
-    """Write the record to ``path``; return False, and leave no file, if ``wanted`` returns False.
+    """Write the record to ``path``; return whether the file exists afterwards.
 
-    Raises OSError if the file cannot be written.
+    ``wanted``: called when the data is on the disk. If it returns False, no file is left. Raises
+    OSError if the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)

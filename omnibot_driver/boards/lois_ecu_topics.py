@@ -42,7 +42,10 @@ NOT_HEARD: Final = "no data from the board; connect it and switch it on, then ca
 
 
 class LoisEcuTopics:
-    """The board's own topics and services; ``publish`` maps types of readings to publishers."""
+    """The topics and services that only the LOIS ECU has.
+
+    ``publish``: for each type of reading, the function that publishes it.
+    """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -77,7 +80,7 @@ class LoisEcuTopics:
     def _make_what_the_modes_need(self) -> None:
         """Create the topics of the present modes; remove ``duty_cmd`` outside of duty mode.
 
-        Runs on the executor's thread.
+        This must be called on the executor's thread.
         """
         duty, terminal = (
             self._values["drive_mode"] == "duty",

@@ -2,24 +2,24 @@
 
 """The numbers of the command TIME, and when they may be sent.
 
-The server sets its clock to the full minute, and integrates the heading by this clock. This module
-knows times only.
+TIME sets the server's clock to the full minute: the server ignores the seconds. The server computes
+the heading with this clock, so the clock must not be set back during a drive. This module knows
+times only.
 """
 
 import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of a minute in which the driver sends TIME with the number of the next minute. That
-minute begins within 4 s."""
+"""Seconds of a minute in which the driver sends TIME with the number of the next minute. The next
+minute begins within 4 s, so the clock is at most 4 s fast."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second for TIME (UTC), or None if TIME must wait.
 
-    ``now_s``: this computer's time in s since 1970; ``may_set_back``: whether the clock may be set
-    back. If not, the next minute is sent shortly before it begins, so the clock is then up to 4 s
-    fast.
+    ``now_s``: this computer's time in s since 1970. ``may_set_back``: whether the server's clock
+    may be set back. If not, TIME must wait for the end of a minute.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of the MART controller that not every board has. This module does not use ROS."""
+"""The MART controller's own parameters, in addition to those of every board.
+
+This module does not use ROS.
+"""
 
 from typing import Final
 

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Topics and services that only the MART controller has; they connect ROS to the session."""
+"""Topics and services that only the MART controller has.
+
+This module only connects ROS to the session.
+"""
 
 import threading
 import time
@@ -43,7 +46,10 @@ NOT_AT_REST: Final = (
 
 
 class MartTopics:
-    """The board's own topics and services; ``publish`` maps types of readings to functions."""
+    """The topics and services that only the MART controller has.
+
+    ``publish``: for each type of reading, the method that publishes it.
+    """
 
     def __init__(self, node: Node, link: Any, values: Mapping[str, Any]) -> None:
         self._node, self._link, self._values = node, link, values
@@ -157,7 +163,7 @@ class MartTopics:
         return done
 
     async def _save(self, done: JobDone) -> tuple[bool, str]:
-        """Write the file in a separate thread, since a disk may be slow.
+        """Write the file in a separate thread, because the disk may be slow.
 
         Returns whether the file was written, and the message for the caller.
         """

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters that the OmniBot has and other boards need not have. Does not use ROS."""
+"""The OmniBot's own parameters, in addition to those of every board. This module does not use
+ROS."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -138,7 +139,7 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """Reject axis signs with which a goal pose has no consistent meaning.
+    """Raise ParameterError if a goal pose has no consistent meaning with these axis signs.
 
     If x or y alone is reversed, yaw is reversed too. So the sign of yaw must be the product of the
     signs of x and y.

@@ -16,7 +16,8 @@ BOARD: Final = Parameter(
     "Kind of motor board that the driver controls.",
     fixed=True,
 )
-"""Parameter that names the board. In a board's table, that board is its default and only choice."""
+"""Parameter that names the board. In the table of a board, the board's name is the default and the
+only choice."""
 
 LINE: Final = (
     Parameter(

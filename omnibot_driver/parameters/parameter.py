@@ -22,16 +22,24 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One row of the table. The default's type is the parameter's type.
+    """One row of the table.
 
-    ``unset``: whether the value is None unless one is given, because the board keeps its own value;
-    the default then only defines the type. ``low`` and ``high`` are inclusive. ``fixed``: whether
-    the value is given at start, and is read-only afterwards. ``calibrated``: whether a calibration
-    file may hold the value.
+    ``default``: the value if the user gives none. Its type is the parameter's type. The default of
+    a list has at least one item.
 
-    The default of a list has at least one item. Range and choices apply to each item. ``length`` is
-    the least and the largest number of items; without ``length``, a list has as many items as the
-    default.
+    ``low``, ``high``: smallest and largest allowed value, for a list of each item.
+
+    ``choices``: the allowed values, for a list of each item.
+
+    ``fixed``: whether the value is read-only after the start.
+
+    ``calibrated``: whether a calibration file may contain the value.
+
+    ``length``: smallest and largest number of items of a list; None if a list must have as many
+    items as the default.
+
+    ``unset``: whether the value is None if the user gives none, because the board keeps its own
+    value. Then the default only defines the type.
     """
 
     name: str
@@ -81,7 +89,10 @@ class Parameter:
         return ""
 
     def check(self, value: object) -> Value:
-        """Return the value in the parameter's own type; raise ParameterError if it is wrong."""
+        """Return the value in the parameter's own type.
+
+        Raises ParameterError if the value is wrong.
+        """
         if self.unset and value in (None, DUMPED_UNSET):
             return None
         if isinstance(self.default, list):
@@ -138,7 +149,7 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """Convert an integer such as 1 to a double, or 1.0 to an integer; keep other values."""
+    """Return 1 as 1.0 for a double, or 1.0 as 1 for an integer; return other values unchanged."""
     if kind is float and type(value) is int:
         return float(value)
     if kind is int and isinstance(value, float) and value.is_integer():

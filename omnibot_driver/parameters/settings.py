@@ -2,7 +2,8 @@
 
 """Settings of the core's session, made from checked parameter values.
 
-A parameter that is missing from a board's table has no meaning for that board, and gets a default.
+If a board's table lacks a parameter, the parameter has no meaning for this board. The settings then
+have a default in its place.
 """
 
 import math
@@ -24,7 +25,10 @@ NOISE: Final = OdometryNoise()
 
 
 def session_settings(values: Mapping[str, Any], wheels: Kinematics) -> SessionSettings:
-    """Return the session's settings; ``wheels`` are those of the board's profile."""
+    """Return the session's settings.
+
+    ``values``: the checked parameter values. ``wheels``: the kinematics of the board's profile.
+    """
     return SessionSettings(
         limits=SpeedLimits(
             linear_mps=values.get("max_linear_speed", 0.0),

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of one board's parameters: the common ones that the board can use, and the board's own.
+"""The table of one board's parameters: the common ones that the board can use, and its own.
 
-This module does not use ROS, and does not name any board. A board's profile makes its table from
-the board's traits and from the rows that it adds.
+A board's profile makes the table from the board's traits and from the board's own rows. This module
+does not use ROS, and does not name any board.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -61,8 +61,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""For each common parameter: the condition on a board's traits under which the board has the
-parameter. A parameter that is not listed has no condition."""
+"""The condition under which a board has a common parameter, by the parameter's name. The condition
+is on the board's traits. A parameter that is not listed has no condition."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -78,15 +78,20 @@ DISPENSABLE: Final = frozenset(
         "twist_angular_stddev",
     }
 )
-"""Common parameters that a board may omit. All other common parameters exist on each board whose
-traits they fit, because the driver reads them on such a board."""
+"""Common parameters that a board may omit. The driver reads all other common parameters on each
+board whose traits they fit, so a board must have them."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""Values of ``on_exit`` besides stop, with the request that a board must accept for each."""
+"""Values of ``on_exit`` besides stop, each with the request that a board must support for it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """All parameters of one board by section, and the checks of several values together."""
+    """All parameters of one board, by section.
+
+    ``checks``: checks that need the values of several parameters.
+
+    ``by_name``: all parameters by name.
+    """
 
     board: str
     sections: Mapping[str, Sequence[Parameter]]
@@ -108,7 +113,10 @@ class Table:
         return tuple(row.name for row in self.rows if row.calibrated)
 
     def check_all(self, given: Mapping[str, object]) -> dict[str, Value]:
-        """Return all values by name, given or default. Raises ParameterError for a wrong one."""
+        """Return all values by name: the given value, or the default.
+
+        Raises ParameterError if a name is unknown or a value is wrong.
+        """
         for name in given:
             if name not in self.by_name:
                 raise ParameterError(
@@ -132,11 +140,16 @@ def table(
 ) -> Table:
     """Return the table of a board with these traits.
 
-    ``own``: rows that only this board has, by section. ``without``: names in ``DISPENSABLE`` that
-    have no meaning for this board; rows that its traits do not need are left out anyway.
-    ``changed``: fields of common rows that differ, by the row's name
-    (``{"port": {"default": "udp://"}}``). ``checks``: checks between this board's values, in
-    addition to those of every board.
+    ``own``: rows that only this board has, by section.
+
+    ``without``: names in ``DISPENSABLE`` that have no meaning for this board. Rows that do not fit
+    its traits are left out in any case.
+
+    ``changed``: fields of common rows that differ for this board, by the row's name, for example
+    ``{"port": {"default": "udp://"}}``.
+
+    ``checks``: checks that need the values of several parameters, in addition to those of every
+    board.
     """
     changes = {
         "on_exit": {
@@ -194,7 +207,7 @@ def _require_two_frames(values: Mapping[str, Any]) -> None:
 
 
 def _require_ranges(values: Mapping[str, Any]) -> None:
-    """Reject a range sensor whose smallest distance is not below its largest one."""
+    """Raise ParameterError if a range sensor's smallest distance is not below its largest one."""
     for least in (name for name in values if name.endswith("_minimum")):
         most = f"{least.removesuffix('minimum')}maximum"
         if values[least] >= values[most]:
@@ -205,7 +218,10 @@ def _require_ranges(values: Mapping[str, Any]) -> None:
 
 
 def _require_possible_speeds(values: Mapping[str, Any]) -> None:
-    """Reject a ``max_*_speed`` above its ``fastest_*_speed``: odometry would reject such motion."""
+    """Raise ParameterError if a ``max_*_speed`` is above its ``fastest_*_speed``.
+
+    Odometry rejects motion above ``fastest_*_speed`` as impossible.
+    """
     for kind, unit in (("linear", "m/s"), ("angular", "rad/s")):
         commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
         if commanded in values and values[commanded] > values[possible]:
