@@ -76,16 +76,20 @@ def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transpor
 
 
 def table_for(given: Mapping[str, object]) -> Table:
-    """Return the parameters of the given board, or of the default one. Raises ParameterError."""
+    """Return the parameters of the board that ``given`` names, or else of the default board.
+
+    Raises ParameterError if there is no such board.
+    """
     name = given.get("board", DEFAULT)
     chosen = Parameter("board", DEFAULT, "", "", choices=tuple(PROFILES)).check(name)
     return load(str(chosen)).PARAMETERS
 
 
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
-    """Return every parameter's value, for the given board. Raises ParameterError.
+    """Return the values of all parameters of the given board.
 
-    The error names the boards that have the parameter, or the nearest name if none has it.
+    Raises ParameterError if a value is wrong, or if the board lacks a given parameter. The error
+    then names the boards that have this parameter, or the parameter with the nearest name.
     """
     table = table_for(given)
     for name in given:

@@ -100,8 +100,8 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
     """Create this board's own topics and services, and return its publishing functions.
 
-    The topics are GPS fix, GPS time, heading, e-stop button, sensor lines and duties. The services
-    are LED, balls and records.
+    The topics are GPS fix, GPS time, heading, e-stop button, text lines of sensors, and duties. The
+    services are LED, balls and records.
     """
     from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
 

@@ -187,7 +187,7 @@ def _setting(name: str, what: str) -> Parameter:
 SETTINGS: Final[Mapping[str, Setting]] = {
     f"{setting.name.lower()}": setting for setting in Setting if setting != Setting.RPM_LOW_PASS
 }
-"""Settings that the board stores, by the name of the parameter."""
+"""Settings that the board stores, by the name of their parameter."""
 _WORDS: Final = {
     "kp": "Gain Kp of the {} wheel's speed controller",
     "tn": "Integral time Tn of the {} wheel's speed controller",

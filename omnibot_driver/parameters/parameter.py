@@ -27,9 +27,9 @@ class Parameter:
     ``default``: the value if the user gives none. Its type is the parameter's type. The default of
     a list has at least one item.
 
-    ``low``, ``high``: smallest and largest allowed value, for a list of each item.
+    ``low``, ``high``: smallest and largest allowed value, or limits for each item of a list.
 
-    ``choices``: the allowed values, for a list of each item.
+    ``choices``: the allowed values, or the allowed items of a list.
 
     ``fixed``: whether the value is read-only after the start.
 
@@ -126,7 +126,6 @@ class Parameter:
 
     @property
     def _shape(self) -> str:
-        """Allowed shape of a list, in words."""
         things = "strings" if self.kind is str else "numbers"
         fewest, most = self.lengths
         count = NUMBERS[most] if most < len(NUMBERS) else str(most)
@@ -135,7 +134,6 @@ class Parameter:
         return f"{count} {things}" + (f", {self.allowed}" if self.allowed else "")
 
     def _may_be(self, value: Any) -> bool:
-        """Return whether the value is among the choices, or in the range."""
         if self.choices:
             return value in self.choices
         if self.low is None or self.high is None:

@@ -61,8 +61,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""The condition under which a board has a common parameter, by the parameter's name. The condition
-is on the board's traits. A parameter that is not listed has no condition."""
+"""By the name of a common parameter: a function that returns whether a board with these traits has
+the parameter. A parameter that is not listed has no such condition."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",

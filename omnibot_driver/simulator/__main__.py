@@ -2,8 +2,8 @@
 
 """Command line that runs a simulated board in real time, with its ports and a console on stdin.
 
-Knows arguments, signals and the console. Must not know the byte protocol or the internals of any
-board.
+This module knows arguments, signals and the console. It must not know the byte protocol or the
+internals of any board.
 """
 
 import argparse
@@ -126,7 +126,10 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 
 @contextmanager
 def _signals_as_readable() -> Iterator[int]:
-    """Yield a descriptor that SIGINT and SIGTERM make readable; these signals do nothing else."""
+    """Yield a descriptor that becomes readable when SIGINT or SIGTERM arrives.
+
+    These signals have no other effect.
+    """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     old_writer = signal.set_wakeup_fd(writer)

@@ -2,8 +2,8 @@
 
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-The transports know descriptors and bytes, but not threads or boards. Every failure is a LinkError
-whose text says what to do.
+Every failure is a LinkError whose text says what to do. The transports know descriptors and bytes;
+they know neither threads nor boards.
 """
 
 from collections.abc import Mapping
@@ -12,24 +12,28 @@ from typing import Final, Protocol
 from omnibot_driver.core.packets import Packet, Packets
 
 READ_TIMEOUT_S: Final = 0.2
-"""Longest wait of a ``read``, in s, even if ``interrupt`` cannot end the ``read``."""
+"""Longest time in s for which ``read`` waits, even on a port where ``interrupt`` cannot end it."""
 WRITE_TIMEOUT_S: Final = 0.2
 NONE_MISSING: Final[Mapping[int, str]] = {}
-"""Value of ``missing`` for a transport that is either completely open or closed."""
+"""Value of ``missing`` for a transport whose lines are either all open or all closed."""
 
 
 class LinesChanged(Exception):
-    """One of several lines was lost or reopened; ``Transport.missing`` has the missing lines."""
+    """One of several lines was lost or opened again. ``Transport.missing`` shows which are
+    missing."""
 
 
 class Transport(Protocol):
-    """A connection to a board, open from construction (which raises LinkError) to ``close``."""
+    """A connection to a board, which is open from its construction until ``close``.
+
+    The constructor raises LinkError if the connection cannot be opened.
+    """
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """File descriptors by channel; another process may inherit them to write the same bytes.
+        """File descriptors by channel. Another process may inherit them, and write to the board.
 
-        None if descriptors cannot be inherited. The item of a missing line is None.
+        The result is None if descriptors cannot be inherited. The item of a missing line is None.
         """
 
     @property
@@ -42,7 +46,7 @@ class Transport(Protocol):
 
     @property
     def overruns(self) -> int | None:
-        """Number of times the kernel has lost bytes since the opening; None without a counter."""
+        """How often the kernel has lost bytes since the opening; None if it does not count this."""
 
     def read(self) -> Packet:
         """Wait for a packet and return it; return an empty packet if none arrives for a while.
@@ -52,13 +56,15 @@ class Transport(Protocol):
         """
 
     def write(self, packets: Packets) -> None:
-        """Write all packets. On LinkError, what was written but not yet sent is discarded.
+        """Write all packets; discard packets for a missing line.
 
-        Packets for a missing line are discarded.
+        Raises LinkError if a line is lost. Then bytes that were written but not sent yet are
+        discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write the bytes that are accepted at once, perhaps none; return the number of bytes."""
+        """Write only the bytes that are accepted without waiting; return the number of these
+        bytes."""
 
     def interrupt(self) -> None:
         """End a ``read`` that waits in another thread, if this kind of port allows it."""

@@ -2,8 +2,8 @@
 
 """One open serial port or pyserial URL: the only module that knows pyserial.
 
-It reads and writes bytes and turns every failure into a LinkError whose sentence says what to do.
-It must not know threads or boards.
+It reads and writes bytes. Every failure is a LinkError whose sentence says what to do. This module
+knows ports; it knows neither threads nor boards.
 """
 
 import contextlib
@@ -32,8 +32,8 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""Socket options: a network peer that acknowledges nothing for five seconds is regarded as lost; an
-idle peer is probed every second."""
+"""Options of a network socket. A peer that acknowledges nothing for five seconds is regarded as
+lost. While the line is idle, the peer is checked every second."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Major device numbers of pseudo-terminals in Linux."""
 
@@ -41,11 +41,11 @@ PSEUDO_TERMINALS: Final = range(136, 144)
 class SerialPort:
     """A ``Transport`` of one channel of bytes: an open port, used by this process alone.
 
-    ``parameter`` is the parameter that names the port, for error messages.
+    ``parameter``: the parameter that names the port, for error messages.
 
-    Linux raises DTR and RTS when the first program opens a port. This class leaves both lines
-    raised when it closes the port. A board that restarts when a line is raised therefore restarts
-    at most once after it is plugged in.
+    Linux raises the lines DTR and RTS when the first program opens a port. This class leaves both
+    raised when it closes the port. So a board that restarts when a line is raised restarts at most
+    once after it is plugged in.
     """
 
     ends_with_us = False
@@ -83,7 +83,7 @@ class SerialPort:
 
     @property
     def overruns(self) -> int | None:
-        """Number of times the kernel has lost bytes since the opening; None without a counter."""
+        """How often the kernel has lost bytes since the opening; None if it does not count this."""
         count = None if self._descriptor is None else overruns(self._descriptor)
         return None if count is None else count - self._overruns_before
 
@@ -170,7 +170,7 @@ class SerialPort:
 
 
 def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
-    """Read all available bytes, in two system calls where pyserial needs five."""
+    """Read all available bytes. This takes two system calls; pyserial needs five."""
     for ready, _ in arrivals.poll(1e3 * READ_TIMEOUT_S):
         if ready != port.fd:
             os.read(ready, 1000)  # pyserial's ``cancel_read``
@@ -186,9 +186,9 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes; unlike pyserial, sleep until there is room.
+    """Write all bytes, and sleep while the port has no room. Pyserial would not sleep.
 
-    Raises TimeoutError after ``WRITE_TIMEOUT_S``.
+    Raises TimeoutError if the port has no room for ``WRITE_TIMEOUT_S``.
     """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:
@@ -206,7 +206,7 @@ def _write_whole(descriptor: int, data: bytes) -> None:
 
 
 def _explain(url: str, parameter: str, error: Exception) -> str:
-    """Return what is wrong with this port, and what to do."""
+    """Return a sentence that says why this port cannot be opened, and what to do."""
     code = error.errno if isinstance(error, OSError) else None
     if isinstance(error, ValueError) and "baud rate" in str(error):
         return f"{url} cannot be set to this speed: {error}; check the parameter `baudrate`"
@@ -250,7 +250,7 @@ def _explain(url: str, parameter: str, error: Exception) -> str:
 
 
 def _owner(path: str) -> str:
-    """Return the process that holds the lock on this file, in brackets; empty if unknown."""
+    """Return the process that has locked this file, in brackets; empty if it is unknown."""
     with contextlib.suppress(OSError, ValueError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"

@@ -2,8 +2,8 @@
 
 """Several lines of bytes as one transport; each line is one channel.
 
-If a line is missing or blocked, the others are still read and written. Only this line is opened
-again, while the others stay open. When the set of present lines has changed, ``read`` raises
+If a line is missing or blocked, the others are still read and written. The transport opens the
+missing line again, while the others stay open. When a line is lost or open again, ``read`` raises
 LinesChanged.
 """
 
@@ -20,7 +20,7 @@ from omnibot_driver.transports.wake_up import WakeUp
 
 FULL: Final = f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
 RETRY_S: Final = 0.5
-"""Time between two attempts to open a missing line, in s. The attempts do not disturb the other
+"""Time in s between two attempts to open a missing line. The attempts do not disturb other
 lines."""
 
 
@@ -38,11 +38,14 @@ class Several:
     """A ``Transport`` of lines with one channel each, which are polled together."""
 
     def __init__(self, openers: Sequence[Opener], retry_s: float = RETRY_S) -> None:
-        """Open the lines. Raises LinkError if none can be opened, or one cannot be polled."""
+        """Open the lines.
+
+        Raises LinkError if no line can be opened, or if a line does not support ``poll``.
+        """
         self._retry_s = retry_s
         self._lines = [Line(opener) for opener in openers]
         self._writing = threading.Lock()
-        """Lock for the bytes still to be written, and for the set of open lines."""
+        """Lock for the bytes that are not written yet, and for the set of open lines."""
         self._ready: list[tuple[int, int]] = []
         self._arrivals = select.poll()
         self._channels: dict[int, int] = {}
@@ -62,9 +65,9 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Descriptors of all lines; None for a missing line, even if it is still open.
+        """Descriptors of all lines, by channel; None for a missing line, even if it is still open.
 
-        If another process had a copy of the descriptor, the driver could not open the line again.
+        If another process had a copy of that descriptor, the driver could not open the line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -80,12 +83,15 @@ class Several:
 
     @property
     def overruns(self) -> int | None:
-        """Number of times the kernel lost bytes of open lines; None if a line has no counter."""
+        """How often the kernel has lost bytes of the open lines, all lines added.
+
+        It is None if the kernel does not count this for one of the lines.
+        """
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """Return the bytes received on one line. Lines that have bytes are read in turn.
+        """Return bytes that were received on one line. Lines that have bytes are read in turn.
 
         Raises LinesChanged when a line is lost or open again, and LinkError when all are missing.
         """
@@ -115,7 +121,8 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """Write to each line its packets; bytes that are not accepted at once follow later."""
+        """Write each packet to its line. Bytes that the line does not accept at once follow
+        later."""
         now = time.monotonic()
         with self._writing:
             for line, data in self._shared_out(packets):
@@ -126,7 +133,7 @@ class Several:
             self._wake_up.ring()
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write to each line the bytes that it accepts at once; return their number."""
+        """Write to each line only the bytes that it accepts at once; return their number."""
         with self._writing:
             return sum(
                 line.port.write_if_room(((0, data),))
@@ -149,7 +156,7 @@ class Several:
         return [line.port for line in self._lines if line.port is not None]
 
     def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
-        """Yield each line with all its bytes; lines come in the order of their first packets."""
+        """Yield each line with all its bytes, in the order of the first packet for each line."""
         for channel in dict.fromkeys(channel for channel, _ in packets):
             own = tuple(packet for packet in packets if packet[0] == channel)
             yield self._lines[channel], joined(own)
@@ -181,9 +188,9 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write waiting bytes to lines with room, and watch for room on lines where bytes remain.
+        """Write waiting bytes to lines with room, and let ``poll`` watch the others for room.
 
-        A line without room for ``WRITE_TIMEOUT_S`` is regarded as missing.
+        A line that has no room for ``WRITE_TIMEOUT_S`` is regarded as missing.
         """
         with self._writing:
             for line in self._lines:
@@ -225,8 +232,9 @@ class Several:
 class Line:
     """One of several lines.
 
-    ``trouble`` is the reason why the line is missing, or empty. ``waits`` are the bytes that the
-    line has not accepted yet.
+    ``trouble``: the reason why the line is missing; empty if it is present.
+
+    ``waits``: the bytes that the line has not accepted yet.
     """
 
     def __init__(self, opener: Opener) -> None:
@@ -237,7 +245,7 @@ class Line:
         self.retry_at = 0.0
         self.waits = b""
         self.watched = False
-        """Whether ``poll`` watches for room to write."""
+        """Whether ``poll`` reports when the line has room."""
         self._full_since = 0.0
 
     def begin(self, port: ByteLine) -> None:
@@ -249,7 +257,7 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write ``data`` after the waiting bytes; return False if bytes have waited for too long.
 
-        To a missing line that is still open, write only the bytes that it accepts at once.
+        If the line is missing but still open, only the bytes that it accepts at once are written.
         """
         if self.port is None:
             return True
@@ -262,9 +270,9 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if some remain after ``WRITE_TIMEOUT_S``.
+        """Write waiting bytes; return False if some of them have waited for ``WRITE_TIMEOUT_S``.
 
-        In that case, these bytes, and bytes that were written but not sent yet, are discarded.
+        Then these bytes are discarded, and also bytes that were written but not sent yet.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

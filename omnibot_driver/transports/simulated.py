@@ -3,8 +3,8 @@
 """``sim://``: a simulated board inside this process, as a transport.
 
 Options follow a question mark: ``sim://?seed=1&lose=0.001``. The board starts when the transport is
-opened, and ends with it. This module knows the name of the simulated board's package, but not
-the meaning of its bytes.
+opened, and ends when it is closed. This module knows the name of the simulated board's package; it
+does not know the meaning of the board's bytes.
 """
 
 import threading
@@ -21,24 +21,25 @@ from omnibot_driver.simulator.common.wired import Line
 from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S
 
 UNREAD_DATAGRAMS: Final = 256
-"""Largest number of unread datagrams: about as many small ones as a Linux socket holds."""
+"""Largest number of unread datagrams. A Linux socket holds about as many small datagrams."""
 
 
 class SimulatedTransport:
-    """A board in real time whose channels are in memory.
+    """A simulated board in real time, whose channels are in memory.
 
-    ``simulator`` is the full name of the package of the simulated board. Raises LinkError if the
-    URL is wrong. ``read`` and ``close`` raise RuntimeError if the board's thread has died, which
-    only a defect can cause.
+    ``simulator``: full name of the package of the simulated board.
+
+    Raises LinkError if the URL is wrong. ``read`` and ``close`` raise RuntimeError if the board's
+    thread has died, which only a defect of the simulator can cause.
     """
 
     missing = NONE_MISSING
     overruns: int | None = None
-    """None, because a channel in memory does not have a counter of lost bytes."""
+    """None, because a channel in memory does not count lost bytes."""
     ends_with_us: bool = True
     """Always True: nothing outside this process receives what is written."""
     descriptors: tuple[int, ...] | None = None
-    """None, because another process could not inherit the memory."""
+    """None, because another process cannot inherit a channel in memory."""
 
     def __init__(self, url: str, simulator: str) -> None:
         self._url = url
@@ -105,7 +106,7 @@ class InProcessBoard(RunningBoard[SimulatedBoard]):
         return len(waiting) if self._has_datagrams(channel) else sum(map(len, waiting))
 
     def write(self, packet: Packet) -> None:
-        """Queue a packet for the board, which reads it at its next tick at the latest."""
+        """Queue a packet for the board, which receives it at its next tick at the latest."""
         self._inbox.put(packet)
 
     def read(self, timeout_s: float | None) -> Packet:

@@ -2,9 +2,9 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-A packet is one datagram. The sockets receive datagrams only from the address to which they write. A
-host that is absent, or on which nothing listens, is treated as a silent board and not as an error.
-The host may answer again later, so the sockets stay open.
+A packet is one datagram. Each socket receives only datagrams from the address to which it writes.
+If the host is absent, or does not listen on a port, it is treated as a silent board and not as an
+error. The host may answer again later, so the sockets stay open.
 """
 
 import contextlib
@@ -28,7 +28,10 @@ UNREACHABLE: Final = (errno.ECONNREFUSED, errno.EHOSTUNREACH, errno.ENETUNREACH,
 
 
 class UdpPorts:
-    """A ``Transport`` with one connected socket per channel; ``channels`` is their number."""
+    """A ``Transport`` with one connected socket for each channel.
+
+    ``channels``: the number of channels.
+    """
 
     ends_with_us = False
     missing = NONE_MISSING
@@ -57,7 +60,7 @@ class UdpPorts:
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
-        """Descriptors of the connected sockets; each write is one datagram."""
+        """Descriptors of the connected sockets. Each write to one of them sends one datagram."""
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
@@ -92,7 +95,8 @@ class UdpPorts:
             raise failed
 
     def write_if_room(self, packets: Packets) -> int:
-        """Write the datagrams that are accepted at once; return the number of bytes."""
+        """Write the datagrams that are accepted without waiting; return the number of their
+        bytes."""
         taken = 0
         for channel, data in packets:
             with contextlib.suppress(OSError):
@@ -112,7 +116,7 @@ class UdpPorts:
         self._wake_up.close()
 
     def _connect(self, channels: int) -> None:
-        """Connect all sockets to one address of the host name."""
+        """Connect the sockets of all channels to the same address of the host."""
         family, kind, protocol, _, (address, _, *rest) = socket.getaddrinfo(
             self._host, self._port, type=socket.SOCK_DGRAM
         )[0]

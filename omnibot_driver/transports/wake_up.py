@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A pipe that ends a thread's wait for arrivals when another thread writes into it.
+"""A pipe with which one thread ends the wait of another thread.
 
-This module knows one pair of descriptors, but not what the thread waits for.
+This module knows one pair of descriptors; it does not know what the thread waits for.
 """
 
 import contextlib
@@ -10,19 +10,25 @@ import os
 
 
 class WakeUp:
-    """A pipe whose ``descriptor`` a thread polls. Raises OSError if a pipe cannot be opened."""
+    """A pipe. One thread waits for its ``descriptor``, and other threads can end this wait.
+
+    Raises OSError if a pipe cannot be opened.
+    """
 
     def __init__(self) -> None:
         self.descriptor, self._far = os.pipe()
         os.set_blocking(self._far, False)
 
     def ring(self) -> None:
-        """Wake the waiting thread, or else end its next wait at once; any thread may call this."""
+        """Wake the waiting thread. If no thread waits, the next wait ends at once.
+
+        Any thread may call this method.
+        """
         with contextlib.suppress(OSError):  # full, so a wake-up is pending; or closed
             os.write(self._far, b"\0")
 
     def answer(self) -> None:
-        """Consume the wake-up, so that the next wait does not end at once."""
+        """Remove the wake-up from the pipe, so that the next wait does not end at once."""
         os.read(self.descriptor, 1000)
 
     def close(self) -> None:

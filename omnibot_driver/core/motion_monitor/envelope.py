@@ -17,8 +17,8 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
-"""Largest allowed ratio of speed to set-point. It is above 1 because users measure the scales by
-hand, and controllers overshoot."""
+"""Largest allowed ratio of speed to set-point. It is above 1 because users measure the scales of
+commands by hand, and because controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """``NOISE_MPS``, ``NOISE_RADPS``: speed in m/s and yaw rate in rad/s outside the hull that are
@@ -30,8 +30,8 @@ lets the robot roll.
 SIDEWAYS: Final = 0.1
 """Deviation that is allowed in any direction, as a fraction of the commanded speed or yaw rate.
 
-The heading is uncertain, and wheels differ. Their error is independent of the noise, so the
-allowance is the square root of the sum of both squares.
+Its causes are an uncertain heading and unequal wheels. This deviation and the noise are
+independent, so their squares are added.
 """
 OVERSHOOT: Final = 0.15
 """Overshoot that is allowed in any direction, as a fraction of the change of the set-point.
@@ -52,8 +52,8 @@ CHANGING_RADPS_PER_MPS: Final = 0.4
 accelerate differently, so the robot turns a little during the change."""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
-"""Factor that converts a yaw rate in rad/s to a speed in m/s, so that the noises of both are
-equal."""
+"""Factor that converts a yaw rate in rad/s to a speed in m/s. It converts ``NOISE_RADPS`` to
+``NOISE_MPS``."""
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
@@ -95,8 +95,8 @@ def outside(
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
     """Return whether the motion is near a set-point or between two successive set-points.
 
-    Such motion is inside the envelope. Nearly all motion is such motion, and this check is quick.
-    So it is made before the exact check by ``outside``.
+    Such motion is inside the envelope. This check is quick, and its result is True for nearly all
+    motion. So the caller makes it before the exact check by ``outside``.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]

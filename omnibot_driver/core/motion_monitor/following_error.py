@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The following error: the distance that a robot moves outside its envelope without interruption.
+"""The following error: how far a robot has moved outside its envelope without interruption.
 
 The motion monitor reports a fault when the error exceeds a limit. One displacement alone cannot
 exceed the limit, because its data may be damaged. A short jerk does not exceed it either, because
@@ -18,8 +18,9 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s before a displacement from which set-points are compared with the robot's speed. If the
-robot is clearly slower than all these set-points, something is assumed to hold the robot."""
+"""A displacement is compared with the set-points during the displacement and in this time before
+it, in s. If the robot is clearly slower than all of them, something is assumed to hold the
+robot."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55

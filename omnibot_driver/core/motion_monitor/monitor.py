@@ -2,8 +2,9 @@
 
 """The motion monitor: compares the robot's displacements with its set-points.
 
-All velocities are in the board's own axes. All times are stamps of displacements. This module knows
-neither bytes nor how a robot is stopped. docs/internals/motion_monitor.md explains the thresholds.
+All velocities are in the board's own axes. All times are on the clock that stamps the
+displacements. This module knows neither bytes nor how a robot is stopped.
+docs/internals/motion_monitor.md explains the thresholds.
 """
 
 import math
@@ -34,8 +35,8 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time in s for which a robot must be at rest to prove that it has obeyed Stop. If the robot moves
-after that, its last command is not the cause."""
+"""A robot that has been at rest for this time, in s, has certainly obeyed Stop. If it moves later,
+its last command is not the cause."""
 STOPS_S: Final = 5.0
 """Time in s for which the command policy repeats Stop if the robot keeps moving."""
 
@@ -139,9 +140,9 @@ class MotionMonitor:
     def count_refused(self, count: int, now: float) -> Fault | None:
         """Return the fault that rejected displacements show, or None.
 
-        The outlier filter rejects a displacement that no robot can make. ``REFUSED_IN_A_ROW`` of
-        them without an accepted one show a fault. ``count``: number of displacements that were
-        rejected since the driver began.
+        The outlier filter rejects a displacement that no robot can make. ``REFUSED_IN_A_ROW``
+        rejected displacements, without an accepted one between them, show a fault. ``count``:
+        number of displacements that were rejected since the driver began.
         """
         self._refused = count
         if count < self._refused_before + REFUSED_IN_A_ROW:
@@ -162,8 +163,8 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: mean twist of the displacement. ``seconds``: its duration, which ended at
-        ``stamp_s``. If the heading is unknown, the direction of the linear velocity is not checked.
+        ``motion``: mean twist of the displacement. ``seconds``: its duration. ``stamp_s``: when it
+        ended. If the heading is unknown, the direction of the linear velocity is not checked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -209,8 +210,8 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        If the robot was at rest after its last command, a person may be pushing it. Then the
-        intervals between two Stops grow.
+        If the robot was at rest after its last command, a person may be pushing it. In that case
+        Stop is sent at longer and longer intervals.
         """
         if not self._error.outside:
             self._stood_s += seconds

@@ -2,8 +2,9 @@
 
 """The history of set-points, and the velocities of the robot that they explain.
 
-A robot follows a set-point late, and leaves it smoothly. After a set-point is replaced, it explains
-its full velocity for ``HELD_S``, and an ever smaller part of it afterwards.
+A robot follows a set-point late, and leaves it smoothly. For ``HELD_S`` after a set-point is
+replaced, the robot may still have its full velocity. Afterwards the robot may have an ever smaller
+part of it. The set-point explains these velocities.
 
 This module knows velocities in the board's own axes, and times; it does not know how the robot
 moves.
@@ -20,8 +21,8 @@ CommandedTwist = BodyTwist | None
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 Velocity = tuple[float, float, float]
-"""The three values of a BodyTwist as a tuple. The monitor creates many of them, and a tuple is
-created more quickly."""
+"""The three values of a BodyTwist as a tuple. The monitor creates many of them, and Python creates
+tuples more quickly."""
 
 HELD_S: Final = 0.3
 """Time in s for which a robot may keep the full velocity of a replaced set-point.
@@ -34,11 +35,11 @@ FADING_S: Final = 0.2
 A robot that follows its set-points with a time constant of up to 0.35 s stays inside the envelope.
 """
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point is ignored. Then it explains less than 2 % of its
-velocity."""
+"""Time in s after which a replaced set-point is ignored. The robot may then have less than 2 % of
+its velocity."""
 UNKNOWN_S: Final = 0.8
-"""Time in s after the first known set-point in which earlier, unknown commands may still move the
-robot."""
+"""Time in s after the first known set-point during which earlier, unknown commands may still move
+the robot."""
 HISTORY_S: Final = 3.0
 """Length of the history in s. A displacement is older than this only if the computer has
 stalled."""

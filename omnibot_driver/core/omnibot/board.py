@@ -187,7 +187,6 @@ class OmniBot:
         return before + self._translation.readings(found, self._decoder.skipped, now)
 
     def _decode_pieces(self) -> list[Reading]:
-        """Decode the waiting pieces of an IMU frame one by one, and return their readings."""
         pieces, self._pieces = self._pieces, []
         readings: list[Reading] = []
         for data, now in pieces:

@@ -29,7 +29,7 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 
 # Damage by the line.
 ONE_BYTE: Final = 5.5
-"""Cost of a frame that lost or gained one byte; about one frame in 250 does so."""
+"""Cost of a frame that lost or gained one byte. About one frame in 250 is damaged in this way."""
 TWO_BYTES: Final = 8.5
 """Cost of a frame that lost or gained two bytes.
 
@@ -40,8 +40,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of assuming that a frame gained bytes, if a header follows right after the length of
-an undamaged frame."""
+"""Extra cost of assuming that a frame gained bytes, if a header is found where an undamaged frame
+would end."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
@@ -66,7 +66,7 @@ BAD_TEXT: Final = 4.0
 KNOWN_GAP: Final = 11.0
 """Cost of a pause within a frame, on a line that so far paused only between frames.
 
-The cost is too high to accept the frame at once, but low enough to accept it on more evidence.
+With this cost, the decoder does not accept the frame at once, but accepts it on more evidence.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""

@@ -2,7 +2,7 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-The protocol has no checksum. The two bytes of a header are also the most common readings of a gyro
+The protocol has no checksum. Read as a word, a header is one of the most common readings of a gyro
 at rest. So a header alone proves nothing. The bytes around a frame decide whether the decoder
 accepts it:
 
@@ -231,7 +231,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether the last byte held may begin another frame, as arrival times show.
+        """Return whether arrival times allow that the last byte held begins another frame.
 
         ``start``, ``length``: position and length in bytes of the last frame held. ``due``: whether
         the board may send another frame right after it.
@@ -258,7 +258,6 @@ class FrameDecoder:
         return False
 
     def _take(self, walk: Walk, count: int, after: Context, found: list[Frame]) -> None:
-        """Accept the first ``count`` frames of ``walk``. ``after``: the context after them."""
         if not count:
             return
         self.statistics.frames += count
@@ -303,7 +302,7 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """Yield the pieces up to the first undecided one, each with whether to accept it.
+        """Yield each decided piece with whether to accept it, up to the first undecided one.
 
         A piece is decided if later bytes cannot change the result. A piece that ends at or before
         the position ``until`` has waited long enough, so it is decided as well.
@@ -331,7 +330,6 @@ class FrameDecoder:
             yield piece, sure
 
     def _drop(self, count: int) -> None:
-        """Discard the first ``count`` held bytes, which are not frames."""
         if not count:
             return
         self._damaged_at_s = self.last_arrival_s

@@ -61,8 +61,8 @@ class Walk:
     ``lessons``: the frames from which the expectation will learn. Each entry is the number of
     frames before it, the frame, and the last IMU frame before it.
 
-    ``known``: pairs of a number of frames and the context after this number of frames. The context
-    is a tuple of the fields of a Context. Not all numbers have an entry.
+    ``known``: the context at some places. Each entry is a number of frames, and the fields of the
+    Context after them.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")

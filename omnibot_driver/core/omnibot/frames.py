@@ -145,7 +145,8 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 def measure(data: bytes | bytearray, at: int) -> int:
     """Return the length in bytes of the frame that begins at position ``at``.
 
-    INCOMPLETE if more bytes may complete a frame, NO_FRAME if no frame begins with these bytes.
+    The result is INCOMPLETE if more bytes may complete a frame, and NO_FRAME if no frame begins
+    with these bytes.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)

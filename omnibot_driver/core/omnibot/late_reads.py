@@ -39,17 +39,17 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Largest difference in s between a delay and a whole number of ticks at which lost bytes may be
-the cause of the delay."""
+"""Lost bytes delay frames by whole ticks. If a delay differs from a whole number of ticks by more
+than this time, in s, lost bytes are not its cause."""
 INTO_TICK_S: Final = 1e-3
 """A delta or pose begins about this time, in s, after its tick began: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
-"""Largest difference in s between the delays of two punctual reads, even with a USB adapter."""
+"""The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Tolerance in s for the arrival time of bytes, compared with the time that follows from the baud
-rate. Within it, bytes are regarded as arriving at the pace of the line."""
+"""Bytes arrive at the pace of the line if their arrival times differ by less than this time, in s,
+from those that follow from the baud rate."""
 FEW_BYTES: Final = 2
-"""Number of bytes up to which the pace of their arrival cannot be measured."""
+"""The pace at which bytes arrive can be measured only with more bytes than this."""
 TICKS_TO_PROVE: Final = 2
 """Number of late ticks, after a first late tick, that prove lost bytes.
 

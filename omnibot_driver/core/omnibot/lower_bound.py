@@ -57,10 +57,9 @@ def least_costs(data: bytes) -> list[float]:
 
 
 def _undamaged(data: bytes) -> dict[int, int]:
-    """Return where the undamaged frames end that follow one another from each possible start.
+    """Return, for each possible start of a frame, where the undamaged frames from there end.
 
-    Keys are the positions in ``data`` where a frame may begin, in descending order. Values are the
-    positions where the chain of undamaged frames ends.
+    Keys and values are positions in ``data``. The keys are in descending order.
     """
     size = len(data)
     ends: dict[int, int] = {}

@@ -43,8 +43,8 @@ TIMES: Final = 4.0
 deltas.
 
 The deltas since the last pose are added to that pose, once in the configured frame and once in the
-other frame. Each sum has a distance from the new pose. In the configured frame, the distance must
-be above ``CLEARLY_M``, in m, and above ``TIMES`` times the distance in the other frame.
+other frame. Each sum has a distance from the new pose. The pose contradicts the configured frame if
+the first distance is above ``CLEARLY_M``, in m, and above ``TIMES`` times the second distance.
 """
 
 FEWEST_DELTAS: Final = 10

@@ -18,8 +18,8 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Largest difference in s between the elapsed time and the time that the counter shows, at which no
-restart is assumed.
+"""A restart is assumed if the elapsed time and the time that the counter shows differ by more than
+this time, in s.
 
 The possible drift of the board's clock is added to this limit. The limit is about twice the largest
 error of arrival times, 0.24 s. This error occurs when the host's buffer is full (4096 bytes, 2.4 s)
@@ -28,12 +28,11 @@ and lacks one byte in ten.
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and so of the time that the counter shows.
 
-After a silence of minutes, the error may be seconds. Then the counter hardly shows whether the
-board restarted, but the board's pose does.
+After a silence of minutes, the error may be seconds. Then the counter is not reliable evidence of a
+restart, but the board's pose is.
 """
 EARLY_S: Final = 0.2
-"""Time in s by which the time since a restart, as the counter shows it, may exceed the elapsed
-time.
+"""After a restart, the counter may show at most this much more time, in s, than has elapsed.
 
 The elapsed time is too short if the last delta before the restart was read late. A restart of the
 board takes longer than this tolerance.

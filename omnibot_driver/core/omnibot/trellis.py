@@ -42,7 +42,7 @@ SURE: Final = 3.5
 """A frame is sure if each other interpretation of its first byte costs at least this much more.
 Each of them is then at least 30 times less likely."""
 STEP: Final = 5.5
-"""Difference between the first cost limit of the search and the lower bound of the cost.
+"""First cost limit of the search, above the lower bound of the cost.
 
 If the search finds no path below this limit, it raises the limit and begins again.
 """

@@ -123,10 +123,10 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """Return the sentence as a list if the previous call had an empty one, else an empty list.
+        """Return the sentence as a list if the sentence of the previous call was empty.
 
-        Pass an empty sentence while the sentence's condition does not hold. So each time that the
-        condition begins to hold, it is reported once.
+        Else return an empty list. The caller passes an empty sentence while the condition for the
+        sentence does not hold. So each time that the condition begins to hold, it is reported once.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []

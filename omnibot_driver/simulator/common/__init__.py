@@ -2,5 +2,5 @@
 
 """Code that all simulated boards share: real time, the lines to a board, and faults of these lines.
 
-Must not know any particular board.
+This package must not know any particular board.
 """

@@ -2,7 +2,7 @@
 
 """Interfaces between a simulated board and the code that runs, connects or selects it.
 
-Values and protocols only. Must not know any particular board.
+This module contains only values and protocols. It must not know any particular board.
 """
 
 import argparse
@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 Packet = tuple[int, bytes]
-"""Index of the channel, and the bytes; a complete datagram if the channel carries datagrams."""
+"""Index of the channel, and the bytes. If the channel carries datagrams, the bytes are one complete
+datagram."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,8 +20,8 @@ class Channel:
     """One connection between a board and the computer.
 
     name: name of the channel on its board; empty if the board has only one channel.
-    parameter: the driver's parameter that names the port of the channel; empty if another channel's
-        port determines this port (the next UDP port).
+    parameter: the driver's parameter that names the port of the channel. It is empty if the port
+        follows from another channel's port, because it is the next UDP port.
     datagrams: True for UDP, False for a serial line.
     """
 
@@ -30,11 +31,14 @@ class Channel:
 
 
 class SimulatedBoard(Protocol):
-    """A board with its robot. Pure: the same settings and input give the same output."""
+    """A board with its robot.
+
+    A simulated board is pure: the same settings and input give the same output.
+    """
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Connections of the board; a packet refers to a connection by its index."""
+        """Connections of the board. The index of a packet is an index of this tuple."""
 
     @property
     def tick_s(self) -> float:
@@ -44,8 +48,9 @@ class SimulatedBoard(Protocol):
         """Receive data that was sent to the board.
 
         data: one datagram, or bytes of a serial line, in chunks of any size.
-        now: arrival time in s, by any monotonic clock. The next ``advance`` returns the board's
-            reply.
+        now: arrival time in s, by any monotonic clock.
+
+        The next ``advance`` returns the board's reply.
         """
 
     def advance(self) -> list[Packet]:
@@ -58,8 +63,8 @@ class SimulatedBoard(Protocol):
     def facts(self) -> Mapping[str, object]:
         """State of the robot and the board, as values that JSON can represent.
 
-        Always contains ``x_m``, ``y_m`` and ``yaw_rad``: the true pose relative to the pose at
-        construction, with the yaw unwrapped.
+        It always contains ``x_m``, ``y_m`` and ``yaw_rad``. They are the true pose relative to the
+        pose at construction, with the yaw unwrapped.
         """
 
 
@@ -67,12 +72,19 @@ class SimulatorModule(Protocol):
     """The names that the package of a simulated board must define."""
 
     TITLE: str
-    """Name of the board, as in "A simulated ... board listens on"."""
+    """Name of the board in the sentence "A simulated ... board listens on"."""
     CHANNELS: tuple[Channel, ...]
     """Channels of each board of this kind."""
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
-        """Add the board's own options; ``--seed`` and the line faults are common to all boards."""
+        """Add the options of this board to the parser.
+
+        Options that all boards have, such as ``--seed`` and the faults of the line, are added
+        elsewhere.
+        """
 
     def from_arguments(self, arguments: argparse.Namespace) -> SimulatedBoard:
-        """Return the board that the options describe; ``arguments.seed`` is its random seed."""
+        """Return the board that the options describe.
+
+        ``arguments.seed`` is the seed of its random numbers.
+        """

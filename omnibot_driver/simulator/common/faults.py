@@ -2,7 +2,7 @@
 
 """A faulty serial line: it loses bytes, one by one or in bursts, and flips bits.
 
-Knows bytes and probabilities. Must not know what the bytes mean.
+This module knows bytes and probabilities. It must not know what the bytes mean.
 """
 
 from collections import Counter
@@ -16,8 +16,9 @@ LONGEST_BURST = 200
 class LineFaults:
     """Probability of each fault, per byte.
 
-    lose: the byte is lost. burst: the byte and up to 199 bytes after it are lost. flip: one bit of
-    the byte changes.
+    lose: the byte is lost.
+    burst: the byte and up to 199 bytes after it are lost.
+    flip: one bit of the byte changes.
     """
 
     lose: float = 0.0
@@ -29,9 +30,9 @@ _GOOD = LineFaults()
 
 
 class FaultyLine:
-    """A serial line with random faults, which do not depend on how the bytes are split into chunks.
+    """A serial line with random faults.
 
-    The same bytes and seed always give the same faults.
+    The same bytes and seed always give the same faults, however the bytes are split into chunks.
 
     lost, flipped: numbers of bytes lost and changed so far.
     """

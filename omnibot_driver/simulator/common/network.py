@@ -2,7 +2,7 @@
 
 """A faulty network: it loses, duplicates, delays and reorders datagrams.
 
-Knows datagrams, probabilities and board time. Must not know what the datagrams mean.
+This module knows datagrams, probabilities and board time. It must not know what the datagrams mean.
 """
 
 import heapq
@@ -15,8 +15,10 @@ from random import Random
 class NetworkFaults:
     """Faults of a network, per datagram and in both directions.
 
-    lose, duplicate: probabilities. delay_s: longest delay in s. The delay of each copy is random
-    and uniformly distributed, so datagrams may arrive out of order.
+    lose: probability that a datagram is lost.
+    duplicate: probability that a datagram arrives twice.
+    delay_s: longest delay in s. The delay of each copy is random and uniformly distributed, so
+        datagrams may arrive in another order.
     """
 
     lose: float = 0.0
@@ -28,7 +30,9 @@ _GOOD = NetworkFaults()
 
 
 class NetworkPath:
-    """One direction of a network. Equal datagrams, times and seeds give equal faults.
+    """One direction of a network.
+
+    The same datagrams, times and seed always give the same faults.
 
     lost, duplicated: numbers of datagrams lost and duplicated so far.
     """

@@ -2,8 +2,9 @@
 
 """Options common to all simulated boards, on the command line and in a sim:// URL.
 
-Each option is declared once, for both uses. Knows the names, values and effects of options. Must
-not know what runs the board, nor any particular board: a board's own options come from its package.
+Each option is declared once, for both uses. A board's own options come from its package. This
+module knows the names, values and effects of options. It must not know what runs the board, nor any
+particular board.
 """
 
 import argparse
@@ -31,7 +32,10 @@ class _Parser(argparse.ArgumentParser):
 
 
 def load(module: str) -> SimulatorModule:
-    """Import and return the package of a simulated board; ``module``: its full name."""
+    """Import and return the package of a simulated board.
+
+    ``module``: the full name of the package.
+    """
     return cast(SimulatorModule, import_module(module))
 
 
@@ -126,7 +130,10 @@ def _add_rate(parser: argparse.ArgumentParser, name: str, effect: str) -> None:
 
 
 def chance(text: str) -> float:
-    """Return the probability in an argument; raise ArgumentTypeError for anything else."""
+    """Return the probability that the argument ``text`` states.
+
+    Raises ArgumentTypeError if the text is not a number from 0 to 1.
+    """
     value = _number(text)
     if not 0.0 <= value <= 1.0:
         raise argparse.ArgumentTypeError(

@@ -2,8 +2,8 @@
 
 """A simulated board in real time: the thread that advances it tick by tick.
 
-Knows the clock and the board's ``receive`` and ``advance``. Must not know how packets are
-transported, nor what they mean.
+This module knows the clock and the board's ``receive`` and ``advance``. It must not know how
+packets are transported, nor what they mean.
 """
 
 import threading
@@ -22,7 +22,7 @@ UNREAD_LIMIT = 4095
 """Number of unread bytes that a Linux terminal holds; further bytes are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""Longest delay of the thread, in s, after which it runs the missed ticks. After a longer delay it
+"""If the thread is late by at most this time, in s, it runs the missed ticks. If it is later, it
 skips them."""
 
 _JOIN_S = 5.0
@@ -31,9 +31,11 @@ _JOIN_S = 5.0
 class RunningBoard(ABC, Generic[B]):
     """Runs a board in a thread from ``start`` to ``stop``; its packets pass through ``lines``.
 
-    ``dropped`` counts the bytes that the driver did not read in time. Other threads may access
-    ``board`` only while they hold ``lock``. ``stop``, ``check`` and ``wait_for`` raise RuntimeError
-    if the board's thread has died.
+    ``dropped``: number of bytes that the driver did not read in time.
+
+    ``board``: other threads may access it only while they hold ``lock``.
+
+    ``stop``, ``check`` and ``wait_for`` raise RuntimeError if the board's thread has died.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:
@@ -56,7 +58,10 @@ class RunningBoard(ABC, Generic[B]):
 
     @property
     def facts(self) -> dict[str, object]:
-        """The board's facts, and counts of dropped bytes and line faults; hold ``lock`` to read."""
+        """The board's facts, and the numbers of dropped bytes and of faults of the lines.
+
+        The reader must hold ``lock``.
+        """
         met = sum((line.counts for line in self._wired.lines), Counter())
         names = dict.fromkeys(name for line in self._wired.lines for name in line.counts)
         return {
@@ -83,9 +88,9 @@ class RunningBoard(ABC, Generic[B]):
             raise RuntimeError("the simulated board's thread died") from self._error
 
     def wait_for(self, predicate: Callable[[B], bool], timeout_s: float) -> bool:
-        """Wait until ``predicate``, evaluated under the lock after each tick, is true.
+        """Wait until ``predicate`` is true; return whether this happened within ``timeout_s``.
 
-        Return whether it became true within ``timeout_s``.
+        The predicate is evaluated after each tick, while ``lock`` is held.
         """
         with self._ticked:
             held = self._ticked.wait_for(

@@ -2,8 +2,8 @@
 
 """A simulated board in real time for other programs: each channel has its own port.
 
-Knows the ports that carry the channels, and waits for all of them at once. Must not know what
-packets mean.
+This module knows the ports that carry the channels, and waits for all of them at once. It must not
+know what packets mean.
 """
 
 import os
@@ -44,12 +44,13 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    Each serial channel has a pseudo-terminal. ``links`` are paths of symbolic links to the
-    pseudo-terminals: one path for each, or one path for all, to which a hyphen and the channel's
-    name are appended. Each datagram channel has a UDP port: the first one is ``udp_port`` (0: any
-    free port), the others follow it.
+    Each serial channel has a pseudo-terminal, and each datagram channel has a UDP port.
 
-    Entering raises OSError if a link or a port is unavailable; its text explains why.
+    links: paths of symbolic links to the pseudo-terminals. One path for each; or one path for all,
+        to which a hyphen and the channel's name are appended.
+    udp_port: number of the first UDP port, 0 for any free port. The others follow it.
+
+    Entering the context raises OSError if a link or a port is unavailable. The text explains why.
     """
 
     def __init__(
@@ -67,7 +68,7 @@ class ServedBoard(RunningBoard[B]):
 
     @property
     def addresses(self) -> list[str]:
-        """Values of the driver's port parameters by channel: a path, or udp://127.0.0.1:PORT."""
+        """Values of the driver's port parameters, by channel: a path, or udp://127.0.0.1:PORT."""
         return [carrier.address for carrier in self._carriers]
 
     @property
@@ -129,7 +130,7 @@ class PtyBoard(ServedBoard[B]):
 def open_carriers(
     channels: Sequence[Channel], links: Sequence[str | Path] = (), udp_port: int = 0
 ) -> list[Carrier]:
-    """Open one carrier for each channel. Raises OSError."""
+    """Open one carrier for each channel. Raises OSError if one cannot be opened."""
     names = iter(_one_for_each([c.name for c in channels if not c.datagrams], links))
     with ExitStack() as opened:
         sockets = open_sockets(sum(channel.datagrams for channel in channels), udp_port)

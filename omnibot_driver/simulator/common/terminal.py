@@ -2,7 +2,7 @@
 
 """A pseudo-terminal that carries a serial channel of a simulated board.
 
-Knows file descriptors. Must not know what the bytes mean.
+This module knows file descriptors. It must not know what the bytes mean.
 """
 
 import array
@@ -16,14 +16,14 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 
 
 class Terminal:
-    """A new pseudo-terminal; the driver opens ``address``, the simulator uses ``descriptor``.
+    """A new pseudo-terminal. The driver opens ``address``, the simulator uses ``descriptor``.
 
     The terminal stays open when the driver closes the port. If more than ``UNREAD_LIMIT`` bytes are
-    unread, further bytes are lost, as on a UART whose kernel buffer is full. ``link`` is the path
-    of a symbolic link to the terminal, made here and removed by ``close``.
+    unread, further bytes are lost, as on a UART whose kernel buffer is full.
 
-    Raises FileExistsError if ``link`` exists, unless it is a dead link or a link to a
-    pseudo-terminal; such a link is replaced.
+    ``link``: path of a symbolic link to the terminal. It is made here and removed by ``close``. A
+    dead link, or a link to a pseudo-terminal, is replaced. Raises FileExistsError if the path
+    exists and is anything else.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:
@@ -41,7 +41,7 @@ class Terminal:
             raise
 
     def receive(self) -> list[bytes]:
-        """Return the bytes received; call it when ``descriptor`` is readable."""
+        """Return the bytes received. Call this only when ``descriptor`` is readable."""
         return [os.read(self.descriptor, 4096)]
 
     def send(self, data: bytes) -> int:

@@ -2,7 +2,7 @@
 
 """UDP sockets that carry the datagram channels of a simulated board.
 
-Knows sockets. Must not know what the datagrams mean.
+This module knows sockets. It must not know what the datagrams mean.
 """
 
 import contextlib
@@ -10,14 +10,15 @@ import errno
 import socket
 
 HOST = "127.0.0.1"
-"""Loopback address, so that a simulated robot cannot be driven over the network."""
+"""Loopback address. So a simulated robot cannot be driven over the network."""
 
 LARGEST = 65_535
 _TRIES = 100
 
 
 class UdpSocket:
-    """A socket bound to ``address``. It sends to the address that sent the last datagram."""
+    """A socket bound to ``address``. It sends to the sender of the last datagram that it
+    received."""
 
     def __init__(self, bound: socket.socket) -> None:
         bound.setblocking(False)
@@ -36,7 +37,10 @@ class UdpSocket:
         return datagrams
 
     def send(self, data: bytes) -> int:
-        """Send a datagram to the driver; return 0 if no address is known, or on an error."""
+        """Send a datagram to the driver, and return the number of bytes that were sent.
+
+        The result is 0 if the driver's address is not known yet, or if an error occurs.
+        """
         if self._peer is None:
             return 0
         try:
@@ -50,9 +54,9 @@ class UdpSocket:
 
 
 def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
-    """Open ``count`` sockets on consecutive ports from ``port`` on; 0 stands for any free port.
+    """Open ``count`` sockets on consecutive ports, beginning with ``port``.
 
-    Raises OSError.
+    If ``port`` is 0, any free ports are used. Raises OSError if the ports are not free.
     """
     if not 0 <= port <= LARGEST - count + 1:
         raise OSError(

@@ -2,7 +2,8 @@
 
 """A board with its lines, in board time: each packet passes through a line, which may be faulty.
 
-Pure, like the board. Knows channels and lines. Must not know real time, nor what packets mean.
+Like the board, this module is pure: the same settings and input give the same output. It knows
+channels and lines. It must not know real time, nor what packets mean.
 """
 
 from collections.abc import Sequence
@@ -24,9 +25,10 @@ def good_line(channel: Channel) -> Line:
 
 
 class WiredBoard(Generic[B]):
-    """A board and one line for each of its channels, in order; lines without faults by default.
+    """A board and one line for each of its channels, in order.
 
-    Raises ValueError if the lines do not match the channels.
+    Without ``lines``, all lines are without faults. Raises ValueError if the lines do not match the
+    channels.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:

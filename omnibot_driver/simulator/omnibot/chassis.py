@@ -2,8 +2,8 @@
 
 """Kinematics of the three omni wheels (manual, Control equation and Odometry equation).
 
-Knows the kinematics and how a displacement changes a pose. It does not know the scales by which the
-firmware converts commands. Must not know encoder counts, time, or whose pose it is.
+This module knows the kinematics, and how a displacement changes a pose. It knows neither encoder
+counts, nor time, nor whose pose it is, nor the scales of commands.
 """
 
 from math import cos, pi, sin
@@ -17,7 +17,7 @@ Wheels = tuple[float, float, float]
 
 
 class PlanarPose(NamedTuple):
-    """A pose in metres and radians; the yaw is unwrapped."""
+    """A pose in m and rad. The yaw is unwrapped."""
 
     x_m: float
     y_m: float
@@ -26,7 +26,8 @@ class PlanarPose(NamedTuple):
     def moved(self, dx_body_m: float, dy_body_m: float, dyaw_rad: float) -> "PlanarPose":
         """Return the pose after a displacement in the body frame, in m and rad.
 
-        The displacement is rotated by the mean heading of the step (manual, Odometry equation).
+        The displacement is rotated by the heading in the middle of the step (manual, Odometry
+        equation).
         """
         heading_rad = self.yaw_rad + dyaw_rad / 2
         c, s = cos(heading_rad), sin(heading_rad)
@@ -51,9 +52,10 @@ def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) 
 
 
 def body_from_rims(rims: Wheels, base_radius_m: float) -> tuple[float, float, float]:
-    """Return the body twist (or displacement) for rim speeds (or distances): the odometry matrix.
+    """Return the body twist (or displacement) for rim speeds (or distances) of wheels A, B, C.
 
-    Linear values are in m/s (or m), the last one is in rad/s (or rad).
+    This is the manual's odometry matrix. Linear values are in m/s (or m), the last one is in rad/s
+    (or rad).
     """
     a, b, c = rims
     return (

@@ -2,20 +2,22 @@
 
 """The board's firmware: its modes, the 100 Hz control loop, and when each frame is sent.
 
-Pure: bytes in, one tick at a time, bytes out; the same settings and input give the same output.
-Knows the manual's state machine and control equations. Must not know ports or real time.
+The firmware receives bytes, advances by one tick, and returns bytes. The same settings and input
+always give the same output. This module knows the manual's state machine and control equations. It
+must not know ports or real time.
 
-Assumptions where the manual says nothing, or contradicts itself:
-- The control loop runs from the end of the boot, also while paused (motors off), so the first
-  25 Hz difference after a pause includes motion during the pause. The output periods are counted
-  from the end of the boot.
-- For the difference frame, the list of modes has 10 Hz, but the frame table has 25 Hz: the setting
+In some places the manual says nothing, or contradicts itself. There, this module assumes:
+
+- The control loop runs from the end of the boot, and also while the board is paused (motors off).
+  So the first 25 Hz difference after a pause includes motion during the pause. The output periods
+  are counted from the end of the boot.
+- For the difference frame, the list of modes has 10 Hz, but the frame table has 25 Hz. The setting
   ``delta_period_s`` decides.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
-- With the switch on positional control (see ``position``), the goal determines the wheels' targets.
+- With the switch on positional control, the goal determines the wheels' targets (``position``).
 - A control frame whose mode the manual does not name is consumed and ignored.
-- A setting selects how commands are found among the bytes (see ``receivers``).
+- A setting selects how commands are found among the bytes (``receivers``).
 """
 
 from collections import deque
@@ -81,12 +83,13 @@ class SimulatedBoard:
     """An OmniBot board with its robot.
 
     tick: number of control ticks of 10 ms since construction.
-    mode: current mode. estopped: whether an emergency stop is in effect.
-    commands: commands that the board obeyed, newest last, without motion commands that it refused
-        because of a latched emergency stop.
+    mode: current mode.
+    estopped: whether an emergency stop is in effect.
+    commands: commands that the board obeyed, newest last. Motion commands that it refused because
+        of a latched emergency stop are not included.
     sent: frames and texts that the board sent, newest last.
-    received: all bytes that reached the board's serial port, also during the boot; beyond a million
-        bytes the older half is discarded.
+    received: all bytes that reached the board's serial port, also during the boot. At more than a
+        million bytes, the older half is discarded.
     """
 
     channels = CHANNELS
@@ -140,18 +143,21 @@ class SimulatedBoard:
         return self._odometry.reported
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Hold the robot by hand: tilt it by these angles (rad), turn it left at this rate (rad/s).
+        """Hold the robot by hand.
 
-        Only the IMU senses the tilt and the turn; the true pose does not change.
+        The arguments are the tilt in rad, and the rate in rad/s at which the robot is turned left.
+        Only the IMU senses the tilt and the turn. The true pose does not change.
         """
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
     def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:
-        """Push the robot from now on, along its own axes (see ``world.Force``)."""
+        """Push the robot along its own axes, from now on. ``world.Force`` explains the
+        arguments."""
         self._world.force = Force(x_pwm, y_pwm, turning_pwm)
 
     def grip(self, vx_mps: float = 0.0, vy_mps: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Force this twist on the robot against its motors; a zero twist holds it in place."""
+        """Force this twist on the robot against its motors. A zero twist holds the robot in
+        place."""
         self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
 
     def let_go(self) -> None:
@@ -175,11 +181,11 @@ class SimulatedBoard:
         }
 
     def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
-        """Receive bytes, in chunks of any size; each command takes effect at once.
+        """Receive bytes, in chunks of any size. Each command takes effect at once.
 
-        at_s: arrival time of the first byte, in s by any monotonic clock (default: the time of the
-            last tick). The other bytes follow without a pause. Only a receiver that detects idle
-            gaps uses this time.
+        at_s: arrival time of the first byte, in s by any monotonic clock. The default is the time
+            of the last tick. The other bytes follow without a pause. Only a receiver that detects
+            idle gaps uses this time.
         channel: ignored, because the board has only one channel.
         """
         self.received += data
@@ -221,7 +227,7 @@ class SimulatedBoard:
         return b"".join(sent)
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick; return the bytes sent as one packet, or an empty list."""
+        """Advance by one tick; return the sent bytes as a list of one packet, or an empty list."""
         data = self.step()
         return [(0, data)] if data else []
 
@@ -276,7 +282,7 @@ class SimulatedBoard:
     # Control
 
     def _control(self) -> None:
-        """Run one pass of the 100 Hz block (manual, Odometry equation and Wheel control)."""
+        """Run one pass of the 100 Hz control loop (manual, Odometry equation and Wheel control)."""
         encoders = self._world.encoders
         a, b, c = (new - old for new, old in zip(encoders, self._encoders, strict=True))
         self._encoders = encoders

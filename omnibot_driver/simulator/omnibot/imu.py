@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MPU6050 as it is mounted, by default upside down; ranges ±2 g and ±250 °/s.
+"""The MPU6050 as it is mounted, by default upside down, with the ranges ±2 g and ±250 °/s.
 
-Knows the sensor's scales, axes, bias and noise. Must not know the frame layout. The lever arm
-between the sensor and the body's origin is ignored (at 0.5 rad/s it would add less than 0.01 m/s²).
+This module knows the sensor's scales, axes, bias and noise. It must not know the frame layout. The
+distance between the sensor and the body's origin is ignored. At 0.5 rad/s it would add less than
+0.01 m/s².
 """
 
 from math import cos, degrees, sin, sqrt
@@ -69,7 +70,10 @@ class Mpu6050:
 
 
 def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
-    """Return the sensor's axes in body coordinates, after fixed-axis roll, pitch and yaw in rad."""
+    """Return the sensor's axes in body coordinates.
+
+    ``roll``, ``pitch``, ``yaw``: turns about fixed axes, in rad, in this order.
+    """
     sr, cr, sp, cp, sy, cy = sin(roll), cos(roll), sin(pitch), cos(pitch), sin(yaw), cos(yaw)
     return (
         (cy * cp, sy * cp, -sp),

@@ -12,7 +12,10 @@ CommandKind = Literal["velocity", "pose", "wheels", "estop", "start", "pause", "
 
 @dataclass(frozen=True, slots=True)
 class ReceivedCommand:
-    """A command that the board obeyed after ``tick`` ticks; a state letter has zeros as values."""
+    """A command that the board obeyed after ``tick`` ticks.
+
+    values: the three words of a control frame; zeros for a state letter.
+    """
 
     tick: int
     kind: CommandKind

@@ -2,12 +2,13 @@
 
 """One wheel: a motor with its encoder, and the firmware's speed controller for it.
 
-Knows the 100 Hz tick and the controller gains of the manual. All speeds are in encoder counts per
-tick, all efforts in PWM steps. Must not know commands, geometry or the wire.
+All speeds are in encoder counts per tick, all efforts in PWM steps. The manual does not describe
+the motor. The model is first order with dry friction and a dead zone, driven by a 12-bit PWM. By
+default a steady speed needs 46 PWM steps per count per tick. So the manual's feed-forward of 40
+supplies seven eighths of the effort, and the integrator supplies the rest.
 
-The manual does not describe the motor. The model is first order with dry friction and a dead
-zone, driven by a 12-bit PWM. By default a steady speed needs 46 PWM steps per count per tick, so
-the manual's feed-forward of 40 supplies seven eighths of the effort and the integrator the rest.
+This module knows the 100 Hz tick and the controller gains of the manual. It must not know commands,
+geometry or the wire.
 """
 
 from collections import deque
@@ -20,7 +21,7 @@ PWM_LIMIT = 4095.0
 DEAD_ZONE_PWM = 60.0
 """Largest effort that leaves a wheel at rest, in PWM steps."""
 STICKING_SPEED = 0.3
-"""Speed, in counts per tick, below which a wheel stops if its effort is within the dead zone."""
+"""Speed in counts per tick. A slower wheel stops if its effort is within the dead zone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +62,7 @@ class Motor:
         self._on_the_way = deque([0.0] * constants.delay_ticks)
         self.speed = 0.0
         self.position = 0.5
-        """Counts turned so far, with fraction; starts in the middle of an encoder step."""
+        """Counts turned so far, not rounded. The wheel starts in the middle of an encoder step."""
 
     @property
     def encoder(self) -> int:
@@ -69,9 +70,9 @@ class Motor:
         return floor(self.position)
 
     def advance(self, pwm: float, load_pwm: float = 0.0) -> float:
-        """Turn for one tick under a constant effort; return the counts turned, with fraction.
+        """Turn for one tick under a constant effort; return the counts turned, not rounded.
 
-        ``load_pwm`` is added to the effort, without the motor's delay.
+        load_pwm: effort of an outside force, which acts without the motor's delay.
         """
         constants, start = self._constants, self.speed
         self._on_the_way.append(pwm)
@@ -92,7 +93,7 @@ class Motor:
         return turned
 
     def turn(self, counts: float, pwm: float) -> None:
-        """Turn by ``counts`` in one tick by an outside force, regardless of the effort."""
+        """Turn by ``counts`` in one tick by an outside force, whatever the motor's effort is."""
         self._on_the_way.append(pwm)
         self._on_the_way.popleft()
         self.speed = counts
@@ -100,11 +101,11 @@ class Motor:
 
 
 class WheelController:
-    """The manual's PI loop (Wheel control), with its feed-forward outside the accumulator.
+    """The manual's PI controller (Wheel control). The feed-forward is not part of the accumulator.
 
-    u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
+    u(k) = Kff v(k) + w(k), w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    While u is saturated, the integral term is not added if it would increase the saturation.
+    While u is saturated, the integral term is added only if it reduces the saturation.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

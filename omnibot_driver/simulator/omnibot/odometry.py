@@ -2,11 +2,12 @@
 
 """The firmware's odometry from its encoders (manual, Odometry equation).
 
-Knows encoder counts, the geometry assumed by the firmware, and the units of the 25 Hz frame. Must
-not know modes, time, or the true pose of the robot.
+The 25 Hz frame contains the motion since the frame before. Each such difference is computed from
+unrounded values and then rounded. A host that sums the differences therefore also sums the rounding
+errors.
 
-A 25 Hz difference is computed from unrounded values and then rounded, each one independently of the
-others. Rounding errors therefore accumulate in a host that sums the differences.
+This module knows encoder counts, the robot's dimensions as the firmware assumes them, and the units
+of the 25 Hz frame. It must not know modes, time, or the true pose of the robot.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import PlanarPose, body_from_rims
@@ -15,7 +16,7 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 class Odometry:
-    """The board's own pose in its earth frame, and the part of its motion not yet sent."""
+    """The board's own pose in its earth frame, and the motion since the last 25 Hz frame."""
 
     _body_unsent: tuple[float, float, float]
     _counts_unsent: Triple
@@ -27,7 +28,7 @@ class Odometry:
 
     @property
     def reported(self) -> BoardPose:
-        """The board's own pose, in mm and mrad as in the 5 Hz frame."""
+        """The board's own pose, in mm and mrad as in the 5 Hz pose frame."""
         return BoardPose(*(1000 * value for value in self.pose))
 
     def integrate(self, counts: Triple) -> None:
@@ -43,7 +44,10 @@ class Odometry:
         self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
 
     def difference(self) -> Triple:
-        """Return the values of the next 25 Hz frame, and begin a new difference."""
+        """Return the motion since the last 25 Hz frame, and begin a new difference.
+
+        The result is in the units of this frame.
+        """
         words = self._counts_unsent
         if self._settings.frame == "body":
             words = _tenths(self._body_unsent)

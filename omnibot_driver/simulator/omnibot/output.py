@@ -2,7 +2,8 @@
 
 """The board's output other than IMU frames: odometry frames, and the text while it is paused.
 
-Knows periods, sequence numbers and the number in the text. Must not know the board's modes.
+This module knows periods, sequence numbers and the number in the text. It must not know the board's
+modes.
 """
 
 from omnibot_driver.simulator.omnibot.motors import TICK_S
@@ -15,7 +16,7 @@ TICKS_PER_TEXT = 100
 
 
 class Output:
-    """The output of a board since its boot, at which all sequence numbers begin at zero."""
+    """The output of a board since its boot. At the boot, all sequence numbers are zero."""
 
     def __init__(self, settings: BoardSettings) -> None:
         self._byte_order = settings.pose_byte_order

@@ -2,8 +2,8 @@
 
 """Positional control: driving to a commanded pose.
 
-The manual says only that the switch selects this control; the rest is assumed. Knows the units of a
-commanded pose and how fast the robot drives to the pose. Must not know wheels.
+The manual says only that the switch selects this control; the rest is assumed. This module knows
+the units of a commanded pose, and how fast the robot drives to the pose. It must not know wheels.
 """
 
 from math import cos, hypot, sin
@@ -13,12 +13,13 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 from omnibot_driver.simulator.omnibot.wire import Triple
 
 SPEED_PER_WAY = 2.0
-"""Speed divided by the distance from the goal, in 1/s; the speed is limited to FASTEST_MPS and
-FASTEST_RADPS."""
+"""Speed divided by the distance from the goal, in 1/s. The speed is limited to ``FASTEST_MPS`` and
+``FASTEST_RADPS``."""
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
-"""Distance from the goal, in m, and angle from it, in rad, up to which the robot does not move."""
+"""If the distance from the goal, in m, is not larger than this, the robot does not drive. If the
+angle from the goal, in rad, is not larger than this, the robot does not turn."""
 
 
 def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
@@ -30,7 +31,7 @@ def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
 
 
 def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
-    """Return the twist straight to the goal: body x and y in m/s, yaw rate in rad/s.
+    """Return the twist straight to the goal: along body x and y in m/s, and the yaw rate in rad/s.
 
     The robot turns while it drives. The heading is unwrapped: if the goal's heading is a full turn
     away, the robot makes this full turn.

@@ -3,16 +3,16 @@
 """The firmware's receiver: takes bytes, and returns the commands that they complete.
 
 The manual shows the layout of a command, but not how the firmware finds it among the bytes.
-Therefore several receivers exist, and a driver must be safe with each of them. Knows control
-frames, letters and the time of a byte. Must not know modes or motion.
+Therefore several receivers exist, and a driver must be safe with each of them. This module knows
+control frames, letters and the time of a byte. It must not know modes or motion.
 
-- A ``Framing`` is a pure function. Its arguments are the bytes held so far, a new byte, and the
-  pause before it in s. It returns the bytes held now, the control frame that the byte completes
-  (or None), and whether the byte may belong to a frame.
+- A ``Framing`` is a function without state. Its arguments are the bytes held so far, a new byte,
+  and the pause before this byte in s. It returns the bytes held now, the control frame that the
+  byte completes (or None), and whether the byte may belong to a frame.
 - A setting decides whether state letters act only between control frames, or anywhere. If anywhere,
   each byte that is a letter acts, and the frame around it continues.
 - After power-up the receiver discards three arbitrary bytes as its wake-up. A setting decides
-  whether bytes that arrive during the boot are lost, or are among these three.
+  whether bytes that arrive during the boot are lost, or count as wake-up bytes.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,8 @@ from omnibot_driver.simulator.omnibot.wire import (
 )
 
 WAKE_UP_BYTES: Final = 3
-"""Manual, Serial Command: "Serial initialization: 3 arbitrary byte"."""
+"""Number of bytes that wake the receiver (manual, Serial Command: "Serial initialization: 3
+arbitrary byte")."""
 IDLE_GAP_S: Final = 0.005
 """Pause after which the receiver ``idle_gap`` discards an incomplete frame, in s."""
 
@@ -46,7 +47,7 @@ _NOTHING: Final[Step] = (b"", None, False)
 def counting(held: bytes, byte: int, pause_s: float) -> Step:
     """Find frames by counting seven bytes after FF FE, without a timeout.
 
-    A header is also found in FF FF FE: its last two bytes.
+    In FF FF FE, the last two bytes are recognised as a header.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         held = b""
@@ -56,7 +57,10 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``, but discard the byte after FF unless it is FE."""
+    """Find frames like ``counting``, but discard the byte after FF unless it is FE.
+
+    So the header in FF FF FE is missed.
+    """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
     return counting(held, byte, pause_s)
@@ -71,7 +75,7 @@ def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
     Bytes of an accepted frame are searched again, so an FF FE within a frame may begin another
-    frame. A byte may belong to a frame if an FF FE is among the last nine bytes.
+    frame. While an FF FE is among the last nine bytes, the new byte may belong to a frame.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -109,8 +113,8 @@ COUNTING: Final = ReceiverKind()
 class CommandReceiver:
     """The receiver from one power-up to the next.
 
-    held, last_at_s: the bytes kept for the framing, and the arrival time of the last byte; the
-        framing has no other state.
+    held: the bytes that the framing keeps.
+    last_at_s: arrival time of the last byte. The framing has no other state.
     to_swallow: number of wake-up bytes still expected.
     """
 
@@ -123,15 +127,16 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """Process a byte that arrives during the boot: it is lost or part of the wake-up."""
+        """Process a byte that arrives during the boot: it is lost, or is one of the wake-up
+        bytes."""
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
         """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        Without ``control_frames``, control frames are not recognised, and each of their bytes may
-        act as a state letter.
+        If ``control_frames`` is False, control frames are not recognised. Then each of their bytes
+        may act as a state letter.
         """
         if self.to_swallow:
             self.to_swallow -= 1

@@ -2,9 +2,9 @@
 
 """The serial protocol from the board's side: layouts of the frames it sends and receives.
 
-Knows the byte layouts of the manual (sections Serial Command and Serial Data Output), written from
-the manual alone. Must not know modes or motion, nor how a command is found among the bytes, and
-shares no code with the driver's codec.
+This module is written from the manual alone (sections Serial Command and Serial Data Output), and
+shares no code with the driver's codec. It knows byte layouts. It must not know modes or motion, nor
+how a command is found among the bytes.
 """
 
 import struct
@@ -45,7 +45,7 @@ class ControlMode(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ControlFrame:
-    """A complete control data frame; ``mode`` may be a number that the manual does not name."""
+    """A complete control data frame. ``mode`` may be a number that the manual does not name."""
 
     mode: int
     values: Triple
@@ -73,7 +73,7 @@ def pose_frame(
 
 
 def paused_text(count: int) -> bytes:
-    """Encode the 1 Hz system info; ``count`` is a uint8."""
+    """Encode the text that the board sends at 1 Hz while paused. ``count`` is a uint8."""
     return b"Paused: %d \n" % count
 
 

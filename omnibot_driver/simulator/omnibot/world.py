@@ -2,8 +2,8 @@
 
 """The robot on the floor: how it truly moves when the motors turn.
 
-Knows motors, true wheel sizes, slip and the true pose. Must not know what the firmware assumes,
-commands or sends. The firmware reads only the encoders and the IMU.
+The firmware reads only the encoders and the IMU of this robot. This module knows motors, true wheel
+sizes, slip and the true pose. It must not know what the firmware assumes, commands or sends.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ SLIP_CORRELATION_M = 0.1
 class TruePose:
     """The robot's true pose, and its twist along its own axes.
 
-    In m, rad (unwrapped), m/s and rad/s; the pose is zero at construction.
+    Units are m, rad, m/s and rad/s. The yaw is unwrapped. The pose is zero at construction.
     """
 
     x_m: float
@@ -41,7 +41,7 @@ class TruePose:
 
 
 class Held(NamedTuple):
-    """State of a robot held by hand: roll and pitch in rad (REP-103), and turn rate in rad/s."""
+    """How a person holds the robot: roll and pitch in rad (REP-103), and turn rate in rad/s."""
 
     roll_rad: float = 0.0
     pitch_rad: float = 0.0
@@ -86,9 +86,10 @@ class World:
         self._slope_pwm = settings.slope_pwm
         self.held = Held()
         self.force = Force()
-        """Current force on the robot, by a person or a bump."""
+        """Current force on the robot, caused for example by a person or by a bump in the floor."""
         self.gripped: Twist | None = None
-        """Twist that a person stronger than the motors imposes; None if the robot moves freely."""
+        """Twist that a person forces on the robot against its motors; None if the robot moves
+        freely."""
         self.acceleration = (0.0, 0.0)
         """Acceleration of the body's origin over the last tick, along body x and y, in m/s²."""
 
@@ -113,7 +114,10 @@ class World:
         return a, b, c
 
     def advance(self, pwm: Wheels) -> None:
-        """Advance by one tick with these efforts of the three controllers, in PWM steps."""
+        """Advance by one tick.
+
+        ``pwm``: the efforts of the three controllers, in PWM steps.
+        """
         rims_m = self._turn_wheels(self._wired(pwm))
         if self._mean_slip:
             self._slip = [self._wander(*now) for now in zip(self._slip, rims_m, strict=True)]
@@ -128,7 +132,7 @@ class World:
         )
 
     def _wired(self, pwm: Wheels) -> list[float]:
-        """Return the efforts that reach the motors A, B, C through the wiring."""
+        """Return the efforts that reach the motors of wheels A, B, C, as the motors are wired."""
         reached = [0.0] * 3
         for effort, (motor, sign) in zip(pwm, self._wiring, strict=True):
             reached[motor] += sign * effort
@@ -148,7 +152,7 @@ class World:
         ]
 
     def _loads(self) -> Wheels:
-        """Return the efforts that a slope and a pushing force add at the rims of wheels A, B, C."""
+        """Return the efforts that slope and push add at the rims of wheels A, B, C."""
         x, y, turning = self.force
         if self._slope_pwm:
             x += self._slope_pwm * cos(self._pose.yaw_rad)
@@ -162,8 +166,8 @@ class World:
     def _wander(self, slip: float, rim_m: float) -> float:
         """Return the wheel's slip after ``rim_m`` of rim motion.
 
-        The slip drifts around the mean slip, with a standard deviation of half the mean, within
-        0..1.
+        The slip varies around the mean slip, with a standard deviation of half the mean. It stays
+        within 0 and 1.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)
