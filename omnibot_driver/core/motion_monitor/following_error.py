@@ -2,9 +2,9 @@
 
 """The following error: how far a robot has moved outside its envelope without interruption.
 
-The motion monitor reports a fault when the error exceeds a limit. One displacement alone cannot
-exceed the limit, because its data may be damaged. A short jerk does not exceed it either, because
-the jerk ends too soon.
+The envelope is the set of velocities that recent set-points allow. The motion monitor reports a
+fault when the error exceeds a limit. One displacement alone cannot exceed the limit, because its
+data may be damaged. A short jerk does not exceed it either, because the jerk ends too soon.
 
 This module knows velocities in the board's own axes, and times; it does not know which fault an
 error shows.

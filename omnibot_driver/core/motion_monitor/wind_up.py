@@ -65,11 +65,11 @@ class WindUp:
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Return whether the wind-up explains motion outside the envelope; subtract this motion.
+        """Return whether the wind-up explains motion outside the envelope.
 
-        Motion in any direction is explained if it is shorter than ``way_m``. ``way_mps``,
-        ``turn_radps``: speed and yaw rate outside the envelope. ``seconds``: how long the motion
-        lasted.
+        Motion in any direction is explained if it is shorter than ``way_m``. In any case, the
+        motion is subtracted from ``way_m``. ``way_mps``, ``turn_radps``: speed and yaw rate outside
+        the envelope. ``seconds``: how long the motion lasted.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds

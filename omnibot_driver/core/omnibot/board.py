@@ -2,8 +2,8 @@
 
 """The OmniBot as a ``core.board.Board``: decodes its bytes, and encodes requests to it.
 
-Source: the board's manual ver. 0.3. The module ``translation`` describes the data from the board,
-``command_encoder`` the commands to it.
+Source: the board's manual ver. 0.3. The module ``translation`` describes the data from the board.
+The module ``command_encoder`` describes the commands to the board.
 """
 
 import math
@@ -158,9 +158,9 @@ class OmniBot:
         )
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the accelerometer's range; empty if ``gravity_mps2`` is near gravity.
+        """Return advice on the accelerometer's range; empty if the range seems to be right.
 
-        ``gravity_mps2``: specific force at rest in m/s².
+        ``gravity_mps2``: measured specific force at rest, in m/s², which should be near gravity.
         """
         return gravity_advice(gravity_mps2, self._settings.imu.accel_range_g)
 

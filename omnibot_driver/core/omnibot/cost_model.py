@@ -272,8 +272,8 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the last byte of this frame may belong to the next header.
 
-    This is impossible if the byte is not part of any header. If the last word of an IMU frame is
-    the same as in the IMU frame before it, only the byte FF may belong to the next header.
+    This is impossible if the byte is not part of any header. It is also impossible for an IMU frame
+    whose last word is the same as in the IMU frame before, unless the byte is FF.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

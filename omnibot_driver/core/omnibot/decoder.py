@@ -7,9 +7,9 @@ at rest. So a header alone proves nothing. The bytes around a frame decide wheth
 accepts it:
 
 * *In step* means that the frame begins right after an accepted one. The decoder returns it as soon
-  as its last byte arrives, unless evidence speaks against it. Such evidence is that the bytes after
-  it do not begin like a frame, that its content is a spike, that the line was idle within it, or
-  that its last byte may belong to the next header.
+  as its last byte arrives, unless evidence speaks against it. There is such evidence if the bytes
+  after it do not begin like a frame, or if its content is a spike. Other evidence is that the line
+  was idle within it, or that its last byte may belong to the next header.
 * *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
   cost, which is the sum of the evidence against it (``cost_model``). The decoder returns a frame of
   the cheapest interpretation when every interpretation without this frame costs clearly more.
@@ -53,8 +53,8 @@ SHORTEST_RUN: Final = DELTA_LENGTH
 CALM_S: Final = 10.0
 """Time in s without damage after which a line is regarded as one that loses few bytes.
 
-On such a line, the decoder needs less evidence before it assumes that the last byte of a frame is
-not the first byte of the next header.
+The last byte of a frame may be the first byte of the next header, if bytes were lost. On a line
+that loses few bytes, the decoder needs less evidence that this is not the case.
 """
 FRAMES_TO_SETTLE: Final = 3
 """An uncertain frame is discarded when this number of certain frames has followed it."""
@@ -250,7 +250,7 @@ class FrameDecoder:
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept all frames of ``walk`` except the last two, because odd bytes follow these.
 
-        The result is always False: it is the result of ``_walk``.
+        The result is always False, so that ``_walk`` can return it.
         """
         believed = len(walk.frames) - 2
         if believed > 0:

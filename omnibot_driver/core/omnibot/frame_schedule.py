@@ -85,7 +85,8 @@ class FrameSchedule:
         return lost
 
     def hear_imus(self, count: int) -> None:
-        """Record ``count`` IMU frames in a row, without other frames or losses between them."""
+        """Record that the board has sent ``count`` IMU frames in a row, and nothing between
+        them."""
         self._imus += count
         if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0

@@ -46,8 +46,8 @@ INTO_TICK_S: Final = 1e-3
 PUNCTUAL_S: Final = 1e-3
 """The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Bytes arrive at the pace of the line if their arrival times differ by less than this time, in s,
-from those that follow from the baud rate."""
+"""Bytes arrive at the pace of the line if their times of arrival agree with the baud rate, within
+this time in s."""
 FEW_BYTES: Final = 2
 """The pace at which bytes arrive can be measured only with more bytes than this."""
 TICKS_TO_PROVE: Final = 2
@@ -90,8 +90,8 @@ class Gap(NamedTuple):
 
     ``first``, ``before``: the pause is before one of the bytes from ``first`` to ``before`` - 1.
 
-    ``price``: if the line was idle, the cost of assuming that a frame was sent partly before and
-    partly after the pause.
+    ``price``: cost of assuming that a frame was sent partly before and partly after the pause. It
+    applies only if the line was idle.
 
     ``pause_s``: time in s between the two reads.
     """

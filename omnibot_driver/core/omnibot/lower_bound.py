@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
+"""A lower bound for what the interpretation of the remaining bytes costs, found from headers alone.
 
 From a header on, undamaged frames follow one another, up to a place where no frame begins. There,
 either a frame is damaged, or a run of unexplained bytes (a bad run) begins. A damaged frame covers
-at most ``REACH`` bytes and costs at least ``DAMAGE``. A bad run costs more per byte. So the
-smallest possible number of damaged frames is known before any content is judged.
+at most ``REACH`` bytes and costs at least ``DAMAGE``. A bad run costs more per byte. So the headers
+show the smallest possible number of damaged frames, before any content is judged.
 
 This module knows the shapes of frames and the lowest prices; it does not know what is searched
 (``trellis``).
@@ -29,8 +29,8 @@ _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    An incomplete frame at the end costs nothing, because more bytes may follow. An edge of the
-    graph never costs less than the difference of the least costs at its two ends.
+    An incomplete frame at the end costs nothing, because more bytes may follow. From the start of
+    an edge to its end, the least cost decreases by at most the price of the edge.
     """
     size = len(data)
     ends = _undamaged(data)

@@ -71,7 +71,7 @@ class ModeTracker:
         self.imus_to_come = self._imus_alone
 
     def hear(self, frame: Frame) -> None:
-        """Update the mode by what a received frame shows."""
+        """Update the mode: a received frame shows in which mode the board is."""
         if isinstance(frame, ImuFrame):
             self.hear_imus(1)
         elif isinstance(frame, PausedFrame):
@@ -82,7 +82,10 @@ class ModeTracker:
             self.apply(Happening.HEARD_MOTION)
 
     def hear_imus(self, count: int) -> None:
-        """Update the mode by ``count`` IMU frames in a row, at most ``imus_to_come``."""
+        """Update the mode after a row of IMU frames.
+
+        ``count``: number of these frames, at most ``imus_to_come``.
+        """
         self.imus_to_come -= count
         if not self.imus_to_come:
             self.apply(Happening.HEARD_IMU_ALONE)

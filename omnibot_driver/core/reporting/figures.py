@@ -90,8 +90,8 @@ class SessionFigures:
 
     ``skew_ppm``: how much faster the board's clock runs than the host's, in ppm.
 
-    ``task``: name, elapsed time and time limit of a long task of the board, as text; empty if the
-    board does not work on such a task.
+    ``task``: name, elapsed time and time limit of the board's long task, as text; empty without a
+    long task.
     """
 
     state: str

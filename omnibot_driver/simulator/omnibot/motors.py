@@ -103,7 +103,7 @@ class Motor:
 class WheelController:
     """The manual's PI controller (Wheel control). The feed-forward is not part of the accumulator.
 
-    u(k) = Kff v(k) + w(k), w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
+    u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
     While u is saturated, the integral term is added only if it reduces the saturation.
     """

@@ -56,12 +56,15 @@ LETTERS = {int(letter): letter for letter in StateLetter}
 
 
 def imu_frame(accel: Triple, gyro: Triple) -> bytes:
-    """Encode the 14 bytes of the 100 Hz frame from raw sensor counts (int16)."""
+    """Encode the 14 bytes of the 100 Hz frame from raw sensor counts, which are int16."""
     return _IMU.pack(0xFF, 0xFA, *accel, *gyro)
 
 
 def delta_frame(difference: Triple, seq: int) -> bytes:
-    """Encode the 9 bytes of the 25 Hz frame from 0.1 mm, 0.1 mm and 0.1 mrad (int16)."""
+    """Encode the 9 bytes of the 25 Hz frame.
+
+    difference: x and y in 0.1 mm, and yaw in 0.1 mrad, or the counts of the three wheels, as int16.
+    """
     return _DELTA.pack(0xFF, 0xFB, *difference, seq)
 
 
