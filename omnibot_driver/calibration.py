@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: measured values of this robot, in YAML, read at start.
+"""The calibration file: measured values of one robot in YAML, which the driver reads at start.
 
-A save replaces the file completely or not at all. The new file also has the names that the driver
-does not use, but not the comments.
+``save`` replaces the file completely or not at all. It keeps the names that the driver does not
+use, but loses the comments.
 """
 
 import contextlib
@@ -22,9 +22,9 @@ RECORDED: Final = ("imu_rpy", "step")
 
 
 def locate(file: str) -> Path:
-    """Return the path of the file, with ``~`` resolved.
+    """Return the path of the file, with ``~`` replaced by the home folder.
 
-    Raises ParameterError for an unknown home folder.
+    Raises ParameterError if the home folder does not exist.
     """
     try:
         return Path(file).expanduser()
@@ -36,9 +36,10 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """Return the file's values of this board's calibrated parameters; empty without a file.
+    """Return the values that the file has for this board's calibrated parameters.
 
-    Raises ParameterError, with a remedy, for a file that cannot be read or has a wrong value.
+    The result is empty if the file does not exist. Raises ParameterError, with a remedy, if the
+    file cannot be read or has a wrong value.
     """
     content = _read(path)
     try:
@@ -52,15 +53,21 @@ def load(path: Path, table: Table) -> dict[str, Value]:
 
 
 def names(path: Path) -> list[str]:
-    """Return all names in the file, whether the driver reads them or not; empty without a file."""
+    """Return all names in the file, even those that the driver does not read.
+
+    The result is empty if the file does not exist. Raises ParameterError if the file cannot be
+    read.
+    """
     return [str(name) for name in _read(path)]
 
 
 def save(path: Path, values: Mapping[str, Any]) -> None:
-    """Put these values into the file and keep its other values. Raises ParameterError or OSError.
+    """Write these values into the file, and keep its other values.
 
-    A concurrent reader finds either the old file or the new one, and so does the next start after a
-    power failure. Comments in the file are lost; a symbolic link to it is kept.
+    A program that reads the file meanwhile gets either the old content or the new content. Even
+    after a power failure, the file has one of these two. Comments are lost. If ``path`` is a
+    symbolic link, the link is kept and the file behind it is replaced. Raises ParameterError if the
+    present file cannot be read, and OSError if the new file cannot be written.
     """
     import tempfile  # takes 1 MB, and few drivers ever save
 

@@ -2,11 +2,13 @@
 
 """Serialise measurements to CDR as rclpy does, and parse velocity commands from CDR.
 
-No ROS message objects are needed. CDR, the format in which DDS serialises messages, aligns every
-number to its own size, like a C struct on a 64-bit machine, so Python's ``struct`` with native
-alignment writes it. A string is a length and its bytes with a NUL; a sequence is a length and its
-elements. ``difference`` checks whether this layout is right on the present machine: it compares the
-bytes with rclpy's own.
+CDR is the format in which DDS sends messages. This module writes it without ROS message objects,
+which saves processor time.
+
+CDR aligns every number to its own size, like a C struct on a 64-bit machine. So Python's ``struct``
+with native alignment can write it. A string is its length, then its bytes and a NUL. A sequence is
+its length, then its elements. ``difference`` compares the result with rclpy's own bytes, because
+this layout may not be right on every machine.
 """
 
 import itertools
@@ -30,7 +32,8 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.messages import MessageSettings, Wheels
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
-"""The encapsulation header of little-endian CDR; alignment is counted from the byte after it."""
+"""First four bytes of every message in little-endian CDR. Alignment is counted from the byte after
+them."""
 STAMP: Final = "iI"
 TWIST: Final = struct.Struct("<4s6d").unpack_from
 NO_TURN: Final = (0.0, 0.0, 0.0, 1.0)
@@ -38,7 +41,10 @@ AT_REST: Final = (0.0,) * 6
 
 
 class Serializer:
-    """A serialiser of IMU, odometry and joint state messages with fixed settings; stamps in ns."""
+    """Makes the bytes of IMU, odometry and joint state messages, with fixed settings.
+
+    ``stamp_ns``: stamp of a message, in ns since the epoch of the clock.
+    """
 
     def __init__(self, settings: MessageSettings) -> None:
         frame, values = _text(settings.imu_frame)
@@ -105,10 +111,10 @@ class Serializer:
 
 
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
-    """Parse a serialised geometry_msgs/Twist; return its planar part and whether it is planar.
+    """Return the planar part of a serialised geometry_msgs/Twist, and whether it has no other part.
 
-    Raises CommandRefused for NaN or infinity, and for bytes that are not a Twist (a middleware
-    might deliver such bytes).
+    Raises CommandRefused for NaN or infinity. Raises it also for bytes that are not a Twist,
+    because a middleware might deliver such bytes.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
@@ -124,9 +130,9 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
 
 
 class Messages:
-    """A Serializer that returns rclpy messages instead of bytes.
+    """A replacement for Serializer that returns rclpy messages instead of bytes.
 
-    The driver uses it on a machine on which rclpy's bytes differ from those of Serializer.
+    The driver uses it on a machine on which the bytes of Serializer differ from rclpy's own.
     """
 
     def __init__(self, settings: MessageSettings) -> None:
@@ -146,7 +152,10 @@ class Messages:
 
 
 def difference(settings: MessageSettings) -> str:
-    """Return a message type whose bytes differ from rclpy's own; empty if all types agree."""
+    """Return the name of a message type that Serializer writes differently from rclpy.
+
+    The result is empty if Serializer writes all types like rclpy.
+    """
     reading = ImuEstimate(0.0, (1.1, -2.2, 3.3), (-4.4, 5.5, -6.6))
     noise = Covariance(1.2, 2.3, 3.4, 4.5, 5.6, 6.7)
     tangent, twist = Pose(7.7, -8.8, 9.9), BodyTwist(0.1, -0.2, 0.3)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Callbacks of topics that command the robot: they pass each message, with its age, to the link.
+"""Callbacks for the topics that command the robot: they pass each message on to the link.
 
-A command that has expired in transit, or that was sent while this process was stalled, is refused.
+A command is refused if it expired in transit, or was sent while this process was stalled.
 """
 
 import contextlib
@@ -29,12 +29,15 @@ def obeying(
     is_stop: Callable[[Any], bool] = lambda _message: False,
     moves_base: bool = True,
 ) -> Callable[[Any, MessageInfo], None]:
-    """Return a callback that passes each message to ``action``; the link reports a refusal.
+    """Return a callback that passes each message to ``action``, with the session of the link.
 
-    ``expires_s`` returns the age in s at which a command expires. ``may_be_old`` returns True for a
-    message whose transit time does not matter. ``is_stop`` returns True for a message that stops
-    the robot; its age and a stall of this process do not matter. ``moves_base``: whether the
-    commands move the base, and not another part of the robot.
+    If a command is refused, the link reports the refusal.
+
+    * ``expires_s``: returns the age, in s, at which a command expires.
+    * ``may_be_old``: returns True for a message whose time in transit does not matter.
+    * ``is_stop``: returns True for a message that stops the robot. Neither the age of this message
+      nor a stall of this process matters.
+    * ``moves_base``: whether the commands move the base, and not another part of the robot.
     """
     transit = Transit()
 

@@ -27,7 +27,11 @@ NOT_OURS: Final = re.compile(
 
 
 def declare(node: Node) -> dict[str, Any]:
-    """Declare all parameters and return their values at start. Raises ParameterError."""
+    """Declare all parameters on the node, and return their values at start.
+
+    Values in the calibration file replace those that the user has given. Raises ParameterError if a
+    value is not allowed.
+    """
     given = {
         name: override.value
         for name, override in node._parameter_overrides.items()
@@ -46,10 +50,11 @@ def declare(node: Node) -> dict[str, Any]:
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
-    """Return the driver's parameter values after a change; ``values`` are those before the change.
+    """Return the values of all the driver's parameters after a change.
 
-    Each value is converted to its parameter's own type. ROS accepts an integer for a real
-    parameter; without the conversion, a message would publish that integer as 0.
+    ``values`` are the values before the change. Each value is converted to the type of its
+    parameter. ROS accepts an integer for a real parameter, and without the conversion a message
+    would publish that integer as 0.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})
@@ -63,8 +68,8 @@ def _ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, 
 def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, parameters.Value]:
     """Return the parameters that the calibration file sets, and log their names.
 
-    Warnings are logged for a missing file, and for names in the file that the driver does not read.
-    Without the first warning, a misspelt path would look like a file that does not exist yet.
+    A warning is logged if the file does not exist, because its path may be misspelt. Another
+    warning is logged for names in the file that the driver does not read.
     """
     found, names = calibration.load(path, table), calibration.names(path)
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]
@@ -91,7 +96,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
 def _check(
     node: Node, table: parameters.Table, changed: list[rclpy.Parameter]
 ) -> SetParametersResult:
-    """Return whether the changed values are valid, each alone and all values together."""
+    """Return whether the changed values are valid, each by itself and together with all others."""
     for item in changed:
         if item.type_ is rclpy.Parameter.Type.NOT_SET and item.name in table.by_name:
             reason = f"parameter '{item.name}' cannot be deleted; give it another value"

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Diagnostics: the figures of the link, judged and published on ``/diagnostics`` once a second.
+"""Diagnostics: a report on the link, the board and the commands, once a second on ``/diagnostics``.
 
-diagnostic_updater publishes the diagnostics where it is installed. Otherwise this module publishes
-an equal message: same topic, names, levels, hardware id and period. The timer runs on the steady
-clock, so simulated time does not stop it.
+If diagnostic_updater is installed, it publishes the report. Otherwise this module publishes an
+equal message, with the same topic, names, levels, hardware id and period. The timer uses the steady
+clock, so it does not stop with simulated time.
 """
 
 import time
@@ -28,9 +28,10 @@ Publish = Callable[[Sequence[Status]], None]
 class Diagnostics:
     """The publisher of the diagnostics of one link.
 
-    ``refusals`` is called for each message and returns the number of refused commands and the last
-    refusal. ``hardware_id`` distinguishes robots. ``to_check``: advice to the user on what to check
-    when the driver cannot decode the board's data.
+    * ``refusals``: is called for each report, and returns the number of refused commands and the
+      reason for the last refusal.
+    * ``hardware_id``: text that distinguishes this robot from others.
+    * ``to_check``: what the user should check if the driver cannot decode the board's data.
     """
 
     def __init__(
@@ -69,7 +70,10 @@ def _alone(node: Node, hardware_id: str) -> Publish:
 
 
 def _through_updater(node: Node, hardware_id: str) -> tuple[Publish, float] | None:
-    """Return a publisher that uses diagnostic_updater, and its period in s; None without it."""
+    """Return a function that publishes with diagnostic_updater, and its period in s.
+
+    Return None if diagnostic_updater is not installed.
+    """
     try:
         from diagnostic_updater import Updater
     except ImportError:

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver process: signals, executor and exit code. Does not know what the node does."""
+"""The driver process: it starts the node, waits for the end, and returns an exit code.
+
+This module knows signals and the executor; it does not know what the node does.
+"""
 
 import os
 import select
@@ -35,9 +38,11 @@ SETUP: Final = (
 class Ending:
     """Lets the main thread wait until the driver must end: at a signal or a call of ``begin``.
 
-    The wait uses a pipe: Python writes a signal's number into it, whichever thread receives the
-    signal. A thread that waits for a lock can miss a signal, and a signal handler must not use a
-    lock at all. ``defect`` is the exception that ended the driver, or None.
+    The main thread reads from a pipe. Python writes the number of each signal into this pipe,
+    whichever thread receives the signal. A lock cannot replace the pipe: a thread that waits for a
+    lock can miss a signal, and a signal handler must not use a lock.
+
+    ``defect``: the exception that ended the driver, or None.
     """
 
     def __init__(self) -> None:
@@ -50,7 +55,10 @@ class Ending:
                 signal.signal(number, lambda *_: None)
 
     def begin(self, defect: BaseException | None = None) -> None:
-        """End the driver; with a defect the exit code is 1. Any thread may call this."""
+        """End the driver. Any thread may call this.
+
+        ``defect``: the exception that ends the driver, if any. With a defect the exit code is 1.
+        """
         self.defect = self.defect or defect
         os.write(self._wake, b"\0")
 
@@ -65,11 +73,13 @@ class Ending:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the driver until a signal in ``STOPPED_BY``, a shutdown of its ROS context, or a defect.
+    """Run the driver until it must end, and return the exit code of the process.
 
-    Returns the exit code: 0 after a request to end, or for help; 1 after a defect; 2 if the driver
-    cannot start.
-    The main thread only waits, so a signal takes effect however busy the executor is, and a second
+    The driver ends at a signal in ``STOPPED_BY``, at a shutdown of its ROS context, or after a
+    defect. The exit code is 0 after a request to end and for help, 1 after a defect, and 2 if the
+    driver cannot start.
+
+    The main thread only waits. So a signal takes effect even if the executor is busy, and a second
     signal cannot interrupt the shutdown.
     """
     args = sys.argv if args is None else args
@@ -159,7 +169,10 @@ def _run(ending: Ending, args: list[str]) -> None:
 
 
 def _set_deadline() -> None:
-    """Have the process end if the shutdown takes too long; the guard then stops the robot."""
+    """End the process if the shutdown takes longer than ``LONGEST_END_S``.
+
+    The guard then stops the robot.
+    """
 
     def give_up() -> None:
         try:

@@ -2,15 +2,16 @@
 
 """The guard: a separate process that stops the robot when the driver no longer can.
 
-It shares the driver's open lines (serial ports or connected sockets), and receives a heartbeat on
-its standard input. When the heartbeat ceases, or the driver has ended, the guard repeats the stop
-command for a second, or until the heartbeat returns. If the last heartbeat said that the e-stop is
-latched, it repeats the emergency stop instead. It works with any board, and imports very little, so
-that it is small and starts quickly.
+The guard shares the driver's open lines (serial ports or connected sockets). The driver sends a
+heartbeat to the standard input of the guard. If the heartbeat ceases, or the driver has ended, the
+guard repeats the stop command for a second, or until the heartbeat returns. If the last heartbeat
+said that the e-stop is latched, the guard repeats the emergency stop instead. The guard works with
+any board. It imports very little, so that it is small and starts quickly.
 
-`keeper.py` starts it as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists the bytes to
-write and their descriptors, in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. When these commands
-change, the driver sends ``=STOP EMERGENCY_STOP`` and a newline between two heartbeats.
+`keeper.py` starts the guard as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets
+in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``: the descriptor of a line, and the bytes to write to
+it. If these stop commands change, the driver sends ``=STOP EMERGENCY_STOP`` and a newline between
+two heartbeats.
 """
 
 import _signal as signal  # type: ignore[import-not-found]  # ``signal`` itself brings ``enum``
@@ -25,9 +26,9 @@ LATCHED_BEAT = b"e"
 """Heartbeat of a driver whose e-stop is latched."""
 WORDS = b"="
 END = b"\n"
-"""End of a message that begins with ``WORDS`` and replaces both stop commands."""
+"""End of a message that begins with ``WORDS``. Such a message replaces both stop commands."""
 BYE = b"!"
-"""Message by which the driver ends the guard after the driver itself has stopped the robot."""
+"""Message that ends the guard. The driver sends it after it has stopped the robot itself."""
 LIMIT_S = 0.5
 """Time without a heartbeat, in s, after which the guard assumes that the driver hangs."""
 TIMES = 20
@@ -44,7 +45,10 @@ Words = list[tuple[int, bytes]]
 
 
 def watch(stop: Words, emergency_stop: Words) -> None:
-    """Watch the driver to its end; send the stop if the driver hangs, or ends without ``BYE``."""
+    """Watch the driver until it ends, and stop the robot if necessary.
+
+    This is necessary if the driver hangs, or if it ends without ``BYE``.
+    """
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
     while True:
@@ -69,7 +73,10 @@ def watch(stop: Words, emergency_stop: Words) -> None:
 
 
 def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
-    """Split input into all heartbeats, the last complete stop commands, and an incomplete rest."""
+    """Split the input into its heartbeats, the newest stop commands and an incomplete rest.
+
+    The stop commands are the text of the last complete message that begins with ``WORDS``.
+    """
     beats = given = b""
     while WORDS in heard:
         before, _, after = heard.partition(WORDS)
@@ -82,7 +89,7 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int]) -> None:
-    """Write the stop ``TIMES`` times, or until one of the descriptors ``until`` is readable."""
+    """Write ``last_words`` ``TIMES`` times, or until a descriptor in ``until`` has input."""
     lines = {line for line, _ in last_words}
     for line in lines:
         drop_what_waits(line)
@@ -101,7 +108,10 @@ def speak(last_words: Words, until: list[int]) -> None:
 
 
 def drop_what_waits(line: int) -> None:
-    """Discard unsent output: motion commands on their way must not delay the stop."""
+    """Discard the output that the line has not sent yet.
+
+    Otherwise the stop would have to wait until earlier motion commands are sent.
+    """
     # contextlib would take a tenth of the guard's memory
     try:  # noqa: SIM105
         termios.tcflush(line, termios.TCOFLUSH)
@@ -110,7 +120,7 @@ def drop_what_waits(line: int) -> None:
 
 
 def words(argument: str) -> Words:
-    """Return the packets in an argument or message of `keeper.py`: descriptors and bytes."""
+    """Return the packets in a text of the form ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``."""
     each = (word.split(":") for word in argument.split(",") if word)
     return [(int(descriptor), bytes.fromhex(data)) for descriptor, data in each]
 

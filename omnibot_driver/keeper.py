@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver's side of `guard.py`: keeps a guard process beside an open port.
+"""The driver's side of `guard.py`: keeps a guard process running while a port is open.
 
-This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It must
-not know threads or boards; its user calls ``beat`` from the thread that the guard must watch.
+This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It does
+not know threads or boards. Its user calls ``beat`` from the thread that the guard must watch.
 """
 
 import contextlib
@@ -28,22 +28,23 @@ guard that always ends at once."""
 HANGS_AFTER: Final = 50
 """Number of unread heartbeats at which the guard is regarded as hung."""
 MOST_DYING: Final = 3
-"""Number of killed guards that have not ended yet, at which the driver starts no further guard."""
+"""Limit for the number of killed guards that have not ended yet. At this number, the driver does
+not start another guard."""
 LEAVES_WITHIN_S: Final = 0.5
 DIES_WITHIN_S: Final = 1.0
-"""Longest wait for a killed guard to end, in s. A guard that takes longer is in an
-uninterruptible sleep, and the driver does not wait for its end."""
+"""Longest wait for a killed guard to end, in s. A guard that takes longer is in an uninterruptible
+sleep, so the driver stops waiting."""
 SPEAKS_WITHIN_S: Final = guard.TIMES * guard.PACE_S + 1.5
-"""Longest wait for a guard to repeat the stop and end, in s. It includes the time in which a slow
-guard process starts."""
+"""Longest wait, in s, for a guard to repeat the stop and end. It includes the time that a slow
+guard process needs to start."""
 
 
 class Keeper:
-    """A guard process for open lines, from construction until ``end``.
+    """The guard process for a set of open lines, from construction until ``end``.
 
-    ``descriptors``: file descriptors of the lines, by channel; None for a missing line. ``stop``:
-    packets that the guard sends; ``emergency_stop``: packets that it sends instead while the e-stop
-    is latched.
+    * ``descriptors``: file descriptor of each line, by channel. None for a line that is not open.
+    * ``stop``: packets that the guard sends to stop the robot.
+    * ``emergency_stop``: packets that the guard sends instead while the e-stop is latched.
     """
 
     def __init__(
@@ -63,10 +64,10 @@ class Keeper:
         self._start()
 
     def beat(self, now: float, *, latched: bool = False) -> str:
-        """Send a heartbeat; call this every ``BEAT_S``, neither more nor less often.
+        """Send the guard a heartbeat. Call this every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence the first time that the guard does not work, and an empty string at all
-        other times. Does not wait for any process.
+        Returns a sentence for the user when the guard fails for the first time, otherwise an empty
+        string. The call does not wait for any process.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -94,8 +95,8 @@ class Keeper:
     def end(self, *, stopped: bool) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        ``stopped``: whether the robot is known to be stopped; otherwise the guard first sends its
-        stop.
+        ``stopped``: whether the robot is known to be stopped. If not, the guard sends its stop
+        command before it ends.
         """
         self._restart_at = math.inf
         if stopped:

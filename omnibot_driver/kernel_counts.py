@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Counts of the Linux kernel: losses of a serial port, and the time a thread waited to run.
+"""Two figures of the Linux kernel: losses of a serial port, and the time a thread waited to run.
 
-Each function returns None where the kernel has no such count.
+Each function returns None if the kernel does not have this figure.
 """
 
 import fcntl
@@ -11,16 +11,19 @@ from pathlib import Path
 from typing import Final
 
 TIOCGICOUNT: Final = 0x545D
-"""Request of asm-generic/ioctls.h; Python's ``termios`` does not have it on every platform."""
+"""Number of the ioctl request that reads the counts, from asm-generic/ioctls.h. Python's
+``termios`` does not have it on every platform."""
 _COUNTS: Final = struct.Struct("20i")
 _OVERRUN, _BUFFER_OVERRUN = 7, 10
-"""Indices in ``serial_icounter_struct`` of the overruns of the receiver and of the tty's buffer."""
+"""``_OVERRUN``, ``_BUFFER_OVERRUN``: positions in ``serial_icounter_struct`` of two counts:
+overruns of the receiver, and of the tty's buffer."""
 
 
 def overruns(descriptor: int) -> int | None:
-    """Return how often the kernel has lost bytes of the port; None without a count.
+    """Return how often the kernel has lost bytes of the port; None if the kernel does not count.
 
-    Pseudo-terminals and sockets lose no bytes and have no count; some USB adapters have no count.
+    Pseudo-terminals and sockets have no count, because they do not lose bytes. Some USB adapters do
+    not have a count either.
     """
     try:
         counts = _COUNTS.unpack(fcntl.ioctl(descriptor, TIOCGICOUNT, bytes(_COUNTS.size)))

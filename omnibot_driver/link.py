@@ -2,13 +2,15 @@
 
 """The threads that serve a port and a session, and the shutdown of the driver.
 
-The *reader* opens the port, waits for bytes, hands them to the session and delivers the results at
-once, on its own thread. No timer and no other thread delays a measurement between the wire and the
-listener. The *pacer* sleeps until something is due (a repeated command, a timeout, a retry), so the
-watchdog does not depend on an executor. The pacer also sends the guard its heartbeat. These threads
-and every caller use one lock. Events that the pacer and callers cause are delivered by the
-*teller*, so a slow listener delays neither the pacer nor a caller. All events are delivered in the
-order in which they occurred under that lock.
+* The *reader* opens the port and waits for bytes. It passes them to the session and delivers the
+  results at once, on its own thread. So no timer and no other thread delays a measurement.
+* The *pacer* sleeps until something is due: a repeated command, a timeout or a retry. So the
+  watchdog does not depend on an executor. The pacer also sends the guard its heartbeat.
+* The *teller* delivers the events that the pacer and callers of the link cause. So a slow listener
+  delays neither the pacer nor a caller.
+
+The threads and all callers use one lock. All events are delivered in the order in which they
+occurred under that lock.
 """
 
 import threading
@@ -27,16 +29,17 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longest wait for a thread to end, in s; longer than a guard takes to repeat Stop."""
+"""Longest wait for a thread to end, in s. A guard takes less time to repeat Stop."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown for a proof that the robot is at rest, in s; longer for a board whose
-proof takes longer. Afterwards the guard repeats Stop."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board's proof takes
+longer, the driver waits that long. Without a proof, the guard then repeats Stop."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown for a proof that the robot is at rest, in s, without a guard process."""
+"""Longest wait at shutdown, in s, if no guard process can repeat Stop. It replaces
+``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
-"""Longest wait for a second proof that the robot is at rest, in s; longer for a board whose proof
-takes longer. The driver sends nothing during this wait. The second proof therefore shows that the
-board received the last Stop undamaged."""
+"""Longest wait, in s, for a second proof that the robot is at rest. If a board's proof takes
+longer, the driver waits that long. The driver sends nothing during this wait, so the second proof
+shows that the board received the last Stop undamaged."""
 
 T = TypeVar("T")
 
@@ -44,15 +47,20 @@ T = TypeVar("T")
 class Link:
     """One session on one port, which is opened again whenever it is lost.
 
-    ``opener`` opens the transport, whose name for the user is ``port``. ``guard``: whether a
-    separate process sends the board's stop commands when this process cannot. ``deliver`` gets the
-    session's events. ``refused`` gets the reason why a command was refused. ``report`` gets a
-    sentence whenever the port, or one of its lines, cannot be opened or is lost, and None when the
-    port and all its lines are open. ``on_read`` and ``on_write`` get each packet that was read or
-    written. These functions are called one at a time, in the order of the events, on the reader's
-    thread or on another thread.
+    * ``opener``: opens the transport.
+    * ``port``: name of the port in messages to the user.
+    * ``guard``: whether a separate process sends the board's stop commands when this process
+      cannot.
+    * ``deliver``: receives the session's events.
+    * ``report``: receives a sentence when the port, or one of its lines, cannot be opened or is
+      lost. Receives None when the port and all its lines are open.
+    * ``refused``: receives the reason whenever a command is refused.
+    * ``on_read``, ``on_write``: receive each packet that was read or written.
+    * ``failed``: receives the exception that ended a thread. Only a defect can cause such an
+      exception.
 
-    ``failed`` gets the exception that ended a thread, which only a defect can cause.
+    All of these functions except ``opener`` and ``failed`` are called one at a time, in the order
+    of the events. They run on the reader's thread or on another thread.
     """
 
     def __init__(
@@ -144,8 +152,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether this call has sent Stop and ended the threads. If the port was lost while
-        the robot drove, the reader sends Stop if it can open the port again. Afterwards ``stands``
+        If the port was lost while the robot drove, the reader tries once more to open it and send
+        Stop. Returns whether this call has sent Stop and ended the threads. Afterwards, ``stands``
         is True if the board has shown that the robot is at rest.
         """
         with self._shared.lock:
@@ -183,7 +191,7 @@ class Link:
         return self._shared.stood
 
     def _stop_for_good(self) -> None:
-        """Stop the robot and wait until it is at rest; the caller holds the lock.
+        """Stop the robot and wait until it is at rest. The caller holds the lock.
 
         The lock is released during the wait, so that the pacer can repeat Stop.
         """

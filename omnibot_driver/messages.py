@@ -39,7 +39,8 @@ from omnibot_driver.core.reporting.status import Status
 from omnibot_driver.parameters import RANGE_TYPES
 
 UNMEASURED_VARIANCE: Final = 1e6
-"""Variance of z, roll and pitch, which planar odometry lacks, and of an unknown twist."""
+"""Variance of values that are not measured: z, roll and pitch of planar odometry, and an unknown
+twist."""
 RADIATION: Final = dict(zip(RANGE_TYPES, (Range.ULTRASOUND, Range.INFRARED), strict=True))
 """Value of ``radiation_type`` in sensor_msgs/Range, by the type of the sensor."""
 SHORTEST_QUATERNION: Final = 1e-3
@@ -47,16 +48,20 @@ MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""State of the wheels: sum of the robot's displacements along its own axes (m, rad), unwrapped
-wheel angles in rad, wheel rates in rad/s (empty if unknown)."""
+"""State of the wheels, in three parts.
+
+* Sum of the robot's displacements along its own axes, in m and rad.
+* Angle of each wheel, in rad. It counts all turns.
+* Rate of each wheel, in rad/s. Empty if unknown.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MessageSettings:
-    """Frames, standard deviations (SI units) and wheels that messages are made with.
+    """What messages contain besides measurements: frames, standard deviations and wheels.
 
-    Frame names include the prefix. Without an IMU, the name of the IMU frame is the prefix alone,
-    and the IMU's standard deviations are 0.
+    The names of the frames include the prefix. The standard deviations are in SI units. For a board
+    without an IMU, ``imu_frame`` is the prefix alone, and the IMU's standard deviations are 0.
     """
 
     odom_frame: str
@@ -150,7 +155,7 @@ def unturned(kinematics: Kinematics) -> Wheels:
 
 
 def turned(before: Wheels, estimate: OdometryEstimate, kinematics: Kinematics) -> Wheels:
-    """Return the wheels' state after ``estimate``, from the state ``before``."""
+    """Return the state of the wheels after ``estimate``, given their state ``before``."""
     rolled, rolling, (then, angles, _) = estimate.rolled, estimate.rolling, before
     way = BodyTwist(rolled.x_m - then.x_m, rolled.y_m - then.y_m, rolled.yaw_rad - then.yaw_rad)
     angles = tuple(map(add, angles, kinematics.wheel_rates(way)))
@@ -168,7 +173,7 @@ def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) 
 def diagnostic_message(
     statuses: Sequence[Status], stamp: Time, node_name: str, hardware_id: str
 ) -> DiagnosticArray:
-    """Return a ``/diagnostics`` message with names as diagnostic_updater makes them."""
+    """Return a ``/diagnostics`` message, with names of statuses as in diagnostic_updater."""
     return DiagnosticArray(
         header=Header(stamp=stamp),
         status=[
@@ -201,11 +206,14 @@ def is_planar(twist: Any) -> bool:
 
 
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
-    """Return the planar pose of a geometry_msgs/PoseStamped; z must be finite, but is ignored.
+    """Return the planar pose of a geometry_msgs/PoseStamped. Its z must be finite, but is ignored.
 
-    Raises CommandRefused for a frame that is neither ``odom_frame`` nor empty, for a value that is
-    not finite, and for an orientation that is not a quaternion near unit length or is tilted by
-    more than ``MOST_TILT_RAD``.
+    Raises CommandRefused in these cases:
+
+    * The frame is neither ``odom_frame`` nor empty.
+    * A value is not finite.
+    * The length of the quaternion is below ``SHORTEST_QUATERNION``, or above its inverse.
+    * The orientation is tilted by more than ``MOST_TILT_RAD``.
     """
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):
@@ -232,7 +240,10 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 
 
 def age(stamp: Time, now_ns: int) -> float:
-    """Return the age of a stamp in s at ``now_ns`` of the same clock; 0 for a zero stamp."""
+    """Return the age of a stamp, in s; 0 for a stamp of zero.
+
+    ``now_ns``: present time of the clock that made the stamp, in ns.
+    """
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
 
@@ -254,12 +265,12 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return wall clock minus steady clock, in ns.
+    """Return the time of the wall clock minus that of the steady clock, in ns.
 
-    The wall clock was read between two readings of the steady clock, ``before_ns`` and
-    ``after_ns``. The function returns ``known_ns``, the offset so far, unless the readings
-    contradict it. So a pause of the thread between the readings causes no jitter, but a step of the
-    wall clock takes effect at once.
+    The caller has read three clocks in this order: the steady clock (``before_ns``), the wall clock
+    (``wall_ns``), and the steady clock again (``after_ns``). If these readings allow the old offset
+    ``known_ns``, it is returned unchanged. So a pause of the thread between the readings does not
+    change the offset, but a step of the wall clock changes it at once.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The ROS node: topics, services and parameters connected to a link and its session.
+"""The ROS node: it connects topics, services and parameters to a link and its session.
 
-Nothing is computed here. Measurements are published by the link's reader thread as they arrive. The
-executor sleeps unless a timer, a message, a service call or a parameter wakes it.
+This module does not compute anything. The link's reader thread publishes the measurements as they
+arrive. The executor sleeps unless a timer, a message, a service call or a parameter wakes it.
 """
 
 import math
@@ -38,9 +38,9 @@ LOOK_EVERY_S = WARN_EVERY_S = 2.0
 
 
 class OmniBotDriver(Node):
-    """The driver node. Raises ParameterError when it cannot start with the given parameters.
+    """The driver node. Raises ParameterError if it cannot start with the given parameters.
 
-    ``end`` is called when the driver has to end, with the defect or None.
+    ``end`` is called when the driver has to end. Its argument is the defect, or None.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class OmniBotDriver(Node):
         )
 
     def close(self) -> None:
-        """Stop the robot and close the port; ROS entities remain until ``destroy_node``."""
+        """Stop the robot and close the port. Topics and services remain until ``destroy_node``."""
         if not self._link.close(self._values["on_exit"]):
             if self._link.unstopped:
                 self.get_logger().warning(

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Calls that several threads queue, and that are made in the order of the events that caused them.
+"""A queue of calls to listeners, which several threads fill and empty.
 
-A thread puts a call while it holds the lock under which the event occurred, and delivers after it
-has released that lock, so a slow listener delays no command. One thread delivers at a time; another
-thread that wants to deliver meanwhile leaves its calls to the first thread. This module knows
-threads; it does not know what is delivered.
+The calls are made in the order of the events that caused them. A thread queues a call while it
+holds the lock under which the event occurred. It makes the queued calls after it has released that
+lock, so a slow listener does not delay commands. Only one thread makes calls at a time. A second
+thread that wants to make calls leaves them to the first. This module knows threads; it does not
+know what is delivered.
 """
 
 import threading
@@ -14,13 +15,14 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls at which a thread that delivers must wait for the listener."""
+"""Number of queued calls from which ``deliver`` waits for the listener. With fewer queued calls, it
+leaves them to the thread that makes calls now."""
 
 Delivery = Callable[[], object]
 
 
 class Outbox:
-    """A queue of calls. ``put`` appends a call; ``deliver`` and ``serve`` make the calls."""
+    """A queue of calls. ``put`` appends a call. ``deliver`` and ``serve`` make the calls."""
 
     def __init__(self) -> None:
         self._waiting: deque[Delivery] = deque()
@@ -29,27 +31,30 @@ class Outbox:
         self._closed = False
 
     def put(self, delivery: Delivery) -> None:
-        """Queue the next call without blocking. Hold the lock under which the event occurred."""
+        """Append a call, without waiting.
+
+        The caller must hold the lock under which the event occurred.
+        """
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
-        """Return whether the caller may deliver directly; this is cheaper than ``put`` and
-        ``deliver``.
+        """Return whether the caller may call the listener directly, without the queue.
 
-        During this call, hold the lock under which the event occurred. If it returns True,
-        ``release`` must follow.
+        This is cheaper than ``put`` and ``deliver``. The caller must hold the lock under which the
+        event occurred. If ``claim`` returns True, the caller must call ``release`` after the
+        delivery.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a claim, after the delivery has succeeded or failed."""
+        """End a claim. Call this whether the delivery has succeeded or failed."""
         self._delivering.release()
         if self._waiting:
             self.deliver()
 
     @property
     def full(self) -> bool:
-        """Whether ``MOST_WAITING`` calls wait; dispensable calls should then not be queued."""
+        """Whether ``MOST_WAITING`` calls wait. Then do not queue calls that can be omitted."""
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
@@ -68,7 +73,7 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Let the thread of ``serve`` make the waiting calls, so that the caller is not delayed."""
+        """Let the ``serve`` thread make the waiting calls, so that the caller is not delayed."""
         if self._waiting:
             self._handed_over.set()
 
@@ -80,6 +85,6 @@ class Outbox:
             self.deliver()
 
     def close(self) -> None:
-        """Let ``serve`` make the calls that still wait, and then return."""
+        """Make ``serve`` return after it has made the calls that still wait."""
         self._closed = True
         self._handed_over.set()

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Log lines that never block the process. Knows descriptors; must not know what is printed.
+"""Standard output and standard error that never block the process.
 
-rclpy holds the interpreter's lock while it writes a log line. A terminal that is stopped by ctrl-S,
-or a pipe without a reader, would freeze every thread, the watchdog included, and the robot would
-continue with its last command. Output therefore passes through a pipe that drops lines when it is
-full, and does not block.
+rclpy holds the interpreter's lock while it writes a log line. If the user stops the terminal with
+ctrl-S, or if nothing reads a pipe, this write would block every thread, even the watchdog. The
+robot would continue with its last command. So all output passes through a pipe that drops lines
+when it is full, instead of blocking. This module knows descriptors; it does not know what is
+printed.
 """
 
 import contextlib
@@ -62,9 +63,9 @@ class UnblockedOutput:
 
 
 def _fill_gaps() -> None:
-    """Open /dev/null on those of the descriptors 0 to 2 that are closed.
+    """Open /dev/null on each of the descriptors 0 to 2 that is closed.
 
-    Otherwise the port would get the number of a closed standard output, and the log would be sent
+    Otherwise the port might get the number of a closed standard output, and the log would be sent
     to the board.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
@@ -73,7 +74,7 @@ def _fill_gaps() -> None:
 
 
 def _redirect(descriptor: int) -> int:
-    """Put the writing end of a pipe in this descriptor's place; return the reading end."""
+    """Replace this descriptor with the writing end of a new pipe, and return the reading end."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     os.dup2(writing, descriptor)

@@ -2,8 +2,8 @@
 
 """Publication of the session's events: measurements and states on topics, notices in the log.
 
-Calls come one at a time, in the order of the events (`outbox.py` ensures that), so the state that
-is published last is the present one. Measurements come from the link's reader.
+`outbox.py` calls the methods of this module one at a time, in the order of the events. So the state
+that is published last is the present one. Measurements are published on the reader's thread.
 """
 
 import contextlib
@@ -33,7 +33,8 @@ from omnibot_driver.qos import LATCHED
 from omnibot_driver.transforms import transform_publisher
 
 RAW_DEPTH: Final = 1000
-"""Queue depth of raw bytes; a recorder that is delayed for seconds still gets every byte."""
+"""Queue depth of the topics with raw bytes. A recorder that is delayed for seconds still gets every
+byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 
 
@@ -88,12 +89,12 @@ class Publishing:
             Extra: self._publish_extra,
         }
         self.extras: Mapping[type, Callable[[Any, int], None]] = {}
-        """Functions that publish the values that only this board has, by type of value. Each
+        """For each type of value that only this board has: the function that publishes it. The
         function gets the value and its stamp in ns."""
 
     @property
     def settings(self) -> messages.MessageSettings:
-        """Frames and covariances of messages."""
+        """Frames, standard deviations and wheels that messages are made with."""
         return self._settings
 
     @settings.setter
@@ -123,7 +124,7 @@ class Publishing:
             self._handlers[type(event)](event, offset_ns)
 
     def publish(self, events: Sequence[Event], clock_offset_ns: int) -> None:
-        """Publish events whose stamps are ``clock_offset_ns`` behind ROS time."""
+        """Publish events. ``clock_offset_ns`` is added to their stamps, which gives ROS time."""
         if self._over:
             return
         for event in events:
@@ -134,7 +135,10 @@ class Publishing:
         self._show(StateChanged(*self._session.shown))
 
     def report_port(self, trouble: str | None) -> None:
-        """Report that the port is open, cannot be opened, or was lost."""
+        """Log that the port is open, or why it is not open.
+
+        ``trouble``: the reason, as a sentence. None if the port is open.
+        """
         if trouble is None:
             if self._is_news(text := f"port {self._port} is open"):
                 self._node.get_logger().info(text)
@@ -145,7 +149,10 @@ class Publishing:
             self._node.get_logger().error(f"{trouble} (retrying)")
 
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
-        """Publish with stamps of a simulated clock, which may jump back, and is 0 at first."""
+        """Publish events with stamps of a simulated clock.
+
+        This clock is 0 at first, and measurements are not published then. It may also jump back.
+        """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
             self._stamped_ns = {}
@@ -162,15 +169,15 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """Record that ROS is shutting down; asking ROS at each event would take too much time."""
+        """Record that ROS is shutting down. Asking ROS at each event would take too much time."""
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Record whether time is simulated; asking ROS at each event would take a microsecond."""
+        """Record whether time is simulated. Asking ROS at each event would take a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
-        """Return a function that publishes packets, with one topic for each channel."""
+        """Return a function that publishes packets, those of each channel on a topic of its own."""
         publishers = [
             self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
             for name in self._channels
@@ -223,9 +230,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text was not logged since the driver last decoded data of the board.
+        """Return whether this text was not logged since valid data last arrived from the board.
 
-        A port that is lost and opened again and again is therefore reported once.
+        So a port that is lost and opened again and again is reported once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

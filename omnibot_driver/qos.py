@@ -11,6 +11,6 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 DEEP: Final = QoSProfile(depth=1000)
 """Quality of service of messages and calls that must not be lost while the driver is busy.
 
-A queue of the usual depth 10 would drop the oldest messages. For example, the message of a button's
-press would be lost when ten later messages wait.
+A queue of the usual depth 10 drops its oldest message when more messages wait. For example, the
+message that a button was pressed would be lost after ten later messages.
 """

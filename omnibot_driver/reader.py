@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The reader's work: open the port, wait for bytes, hand them to the session, deliver at once.
+"""The work of the reader thread: it reads the port, and passes the bytes to the session.
 
-No timer and no other thread delays a measurement between the wire and the listener. A port that is
-lost is opened again and gets a new guard process. When the reader ends the use of a port, for any
-reason, it first sends a stop to the robot.
+The reader delivers measurements at once, on its own thread, so no timer and no other thread delays
+them. It opens a lost port again, with a new guard process. Before it ends the use of a port, for
+any reason, it stops the robot.
 """
 
 import math
@@ -29,12 +29,16 @@ LONGEST_WAIT_S: Final = 2.0
 
 
 class Reader:
-    """The work of the reader thread, ``serve``, and its counts.
+    """The work of the reader thread, which runs ``serve``, and its counts.
 
-    ``opener`` and the arguments after it are those of ``Link``. ``trouble`` is the reason why the
-    port, or one of its lines, is not open. ``opened`` counts the openings of the port,
-    ``received_bytes`` counts bytes, and ``overruns`` counts the kernel's losses on this port (None
-    if the kernel has no count).
+    ``opener`` and the arguments after it are those of ``Link``.
+
+    * ``trouble``: why the port, or one of its lines, is not open, as a sentence. Empty if all are
+      open.
+    * ``opened``: how often the port was opened.
+    * ``received_bytes``: number of bytes that were received.
+    * ``overruns``: how often the kernel has lost bytes since the port was last opened. None if the
+      kernel does not count.
     """
 
     def __init__(
@@ -61,7 +65,7 @@ class Reader:
         self._unguarded_told = False
 
     def serve(self) -> None:
-        """Serve the port until the link closes."""
+        """Open and read the port until the link closes. Open it again whenever it is lost."""
         # A lost port is opened once more at the end, to stop a robot that was driving.
         while not (leaving := self._closing.is_set()) or self.opened:
             try:
@@ -105,7 +109,7 @@ class Reader:
         self._outbox.deliver()
 
     def _attach_anew(self, port: Transport) -> None:
-        """Begin a new connection on the lines that are open, after one was lost or reopened."""
+        """Begin a new connection, because a line of the board was lost or connected."""
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
@@ -162,9 +166,9 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Let the session act on received bytes; the caller holds the lock.
+        """Let the session act on received bytes. The caller holds the lock.
 
-        The measurements in these bytes have been handled before.
+        The measurements in these bytes have been delivered before.
         """
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
@@ -184,7 +188,7 @@ class Reader:
     def _detach(self, port: Transport, *, comes_back: bool) -> None:
         """Stop the robot, then end the use of the port.
 
-        ``comes_back``: whether the reader tries to open the port again.
+        ``comes_back``: whether the reader will try to open the port again.
         """
         with self._lock:
             if self._shared.write_error is None:

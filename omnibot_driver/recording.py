@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Recorded bytes in place of a port: ``replay://bag?speed=10`` reads a rosbag2.
+"""A recording in place of a port: the URL ``replay://bag?speed=10`` names a rosbag2.
 
-This module knows the URL and the library rosbags, which reads bags without ROS. It must not know
+This module knows the URL, and the library rosbags, which reads bags without ROS. It does not know
 when the bytes are needed, or what they mean.
 """
 
@@ -23,10 +23,12 @@ RAW_NAME: Final = "/raw_rx"
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording in one bag (a folder or a single file), with one topic for each channel.
+    """A recording of a board's bytes, in one bag.
 
-    ``speed`` is the factor of the playback speed; infinity plays as fast as possible. ``delay_s``
-    is the time until playback begins, in s.
+    * ``path``: the bag, which is a folder or a single file.
+    * ``topics``: the topic of each channel.
+    * ``speed``: factor of the playback speed. Infinity plays as fast as possible.
+    * ``delay_s``: time until playback begins, in s.
     """
 
     path: Path
@@ -35,7 +37,7 @@ class Recording:
     delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, Packet]]:
-        """Yield each packet as (time in ns by the recorder's clock, packet).
+        """Yield pairs of a time and a packet. The time is that of the recorder's clock, in ns.
 
         Raises LinkError if the bag cannot be read to its end.
         """
@@ -61,9 +63,10 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that the URL names; its board has these channels.
+    """Return the recording that the URL names.
 
-    Raises ParameterError, which says what is wrong with the URL or the bag.
+    ``channels``: names of the board's channels. The bag must have a topic for each of them. Raises
+    ParameterError, which says what is wrong with the URL or the bag.
     """
     location, _, query = url[len(SCHEME) :].partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session fed from a recording: the counterpart of `Link` for recorded bytes.
+"""A session that is fed from a recording: the counterpart of `Link` for recorded bytes.
 
-The only clock is the recording's. The session gets each chunk of bytes at the time at which it was
-received, and ``tick`` is called whenever ``wake_at`` is reached. The session's output therefore
-depends on the recording alone, and not on this machine or on the playback speed. The bytes that the
-session would write are discarded.
+The session's time is that of the recording. The session gets each packet at the time at which the
+packet was received, and ``tick`` is called whenever ``wake_at`` is reached. So the session's output
+depends on the recording alone, not on this machine or on the playback speed. Packets that the
+session would send are discarded.
 """
 
 import threading
@@ -32,10 +32,14 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    ``deliver`` gets the session's events and the time of day, in ns, at which the session's time is
-    zero. ``refused`` gets the reason why a command was refused. ``report`` gets None when the
-    recording begins. These functions are called one at a time, in the order of the events.
-    ``failed`` gets the exception that ended the thread, which only a defect can cause.
+    * ``deliver``: receives the session's events, and the time of day, in ns, at which the session's
+      time is zero.
+    * ``report``: receives None when the recording begins.
+    * ``refused``: receives the reason whenever a command is refused.
+    * ``failed``: receives the exception that ended the thread. Only a defect can cause such an
+      exception.
+
+    All of these functions except ``failed`` are called one at a time, in the order of the events.
     """
 
     def __init__(
@@ -62,7 +66,7 @@ class Replay:
         self._thread = threading.Thread(target=self._guard, name="omnibot-replay", daemon=True)
 
     def start(self) -> None:
-        """Begin to play after the recording's delay."""
+        """Start the thread, which begins to play after the recording's delay."""
         self._thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
@@ -95,7 +99,7 @@ class Replay:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass the command ``wish`` to the session by ``call``; it moves no robot."""
+        """Pass the command ``wish`` to the session. Nothing is sent to a robot."""
         self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> bool:

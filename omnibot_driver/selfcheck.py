@@ -2,9 +2,9 @@
 
 """Advice on settings of the computer and of other nodes that disturb the driver.
 
-This module checks the adapter of an open port, the clock, nodes of the same name and publishers of
-another type. It reads sysfs, and does not use pyserial, ROS or a board. Obstacles to opening a
-port, such as its permissions, are reported by ``transports``.
+This module checks the adapter of an open port, the clock, nodes of the same name, and publishers of
+another type. It reads sysfs; it does not use pyserial, ROS or a board. If a port cannot be opened,
+for example because of its permissions, ``transports`` reports the reason.
 """
 
 from collections.abc import Iterable
@@ -28,7 +28,7 @@ def core_kind() -> str:
 
 
 def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
-    """Return a warning if the adapter's latency timer is too long; empty without such a timer."""
+    """Return a warning if the latency timer of the USB adapter is too long; otherwise empty."""
     device = Path(port).resolve().name
     try:
         text = (sysfs / "class/tty" / device / "device/latency_timer").read_text(encoding="ascii")
@@ -68,7 +68,10 @@ def waiting_advice(port: str, now_ns: int) -> str:
 
 
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
-    """Return a warning if another node of this full name publishes on this node's topic."""
+    """Return a warning if another node has this full name; otherwise empty.
+
+    ``publishers``: those of a topic on which every node of this name publishes.
+    """
     names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in publishers]
     if names.count(name) < 2:
         return ""

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One session and its open port, which threads share under one lock; all events keep their order.
+"""One session and its open port, which several threads share under one lock.
 
-After each input to the session, ``settle`` writes the due packets, gives the guard the present stop
-command, and queues the events in the outbox. This module starts no thread and opens no port.
+After each input to the session, ``settle`` writes the packets that are due, gives the guard the
+present stop commands, and queues the events in the outbox. So all events keep their order. This
+module starts no thread and opens no port.
 """
 
 import math
@@ -31,10 +32,13 @@ T = TypeVar("T")
 class SharedSession:
     """A session, its open port, and the lock that protects both.
 
-    Hold ``lock`` to use anything but ``call``, ``command`` and ``blocked``. ``changed`` is a
-    condition on this lock. ``port`` is the open port and ``keeper`` its guard, each None if absent.
-    ``write_error`` is the error after which nothing more is written to the port. ``deliver``,
-    ``refused`` and ``on_write`` are those of ``Link``.
+    Only ``call``, ``command`` and ``blocked`` may be used without holding ``lock``.
+
+    * ``changed``: condition of this lock, on which the pacer and the shutdown wait.
+    * ``port``: the open port, or None.
+    * ``keeper``: keeper of the guard process for this port, or None.
+    * ``write_error``: the error after which nothing more is written to the port, or None.
+    * ``deliver``, ``refused``, ``on_write``: as in ``Link``.
     """
 
     def __init__(
@@ -57,8 +61,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """State in which the link leaves the board when it ends."""
         self.told = False
-        """Whether the last Stop was written to every line when the link ended, or later to a port
-        that was lost while the robot drove."""
+        """Whether the last Stop was written to every line. It is written when the link ends, or
+        later if the port was lost while the robot drove."""
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
@@ -68,9 +72,9 @@ class SharedSession:
         self._pacing_until = self._beat_at = -math.inf
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Call ``action`` with the session and the time in s; return the result of ``action``.
+        """Call ``action`` with the session and the time in s, and return the result of ``action``.
 
-        The resulting packets are written before ``call`` returns; another thread delivers the
+        The resulting packets are written before ``call`` returns. Another thread delivers the
         events.
         """
         try:
@@ -92,13 +96,14 @@ class SharedSession:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass ``wish``, the motion that a sender wants, to the session by ``action``.
+        """Pass ``wish``, the motion that a sender wants, to the session by calling ``action``.
 
-        ``sent_ns``: the possible times of day, in ns, at which the command was sent.
-        ``moves_base``: whether ``wish`` is a motion of the base. Only then is the motion interlock
-        informed of a refusal. Raises CommandRefused for a command that waited while this process
-        was stalled. Each refusal is also delivered, in its place among the events, unless the
-        outbox is full.
+        * ``sent_ns``: the possible times of day, in ns, at which the command was sent.
+        * ``moves_base``: whether ``wish`` is a motion of the base. Only then does a refusal affect
+          the motion interlock.
+
+        Raises CommandRefused for a command that waited while this process was stalled. Each refusal
+        is also passed to ``refused``, in the order of the events, unless the outbox is full.
         """
         try:
             with self.lock:
@@ -176,7 +181,7 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Stop the robot if this process was stalled; return whether this process was stalled."""
+        """Stop the robot if this process was stalled, and return whether it was."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:
@@ -186,7 +191,7 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer, which runs the watchdog, is alive; send the guard a heartbeat."""
+        """Record that the pacer runs, and with it the watchdog. Send a heartbeat if one is due."""
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of stalls of this process: SIGSTOP, a swapped-out or suspended host, a hanging thread.
+"""Detection of stalls: times in which this process, or its watchdog, did not run.
 
-During a stall the watchdog does not run either, and commands keep arriving. When the process runs
-again, commands that were sent meanwhile must not be obeyed. Callers pass the time of
-``boot_time_s``, and the watchdog's thread calls ``passed`` to show that it runs. This module must
-not know threads or commands.
+A stall can come from SIGSTOP, from a swapped-out or suspended host, or from a thread that hangs.
+During a stall commands keep arriving. After the stall, the driver must not obey the commands that
+were sent during it. Every time ``now`` is a time of ``boot_time_s``. This module knows times; it
+does not know threads or commands.
 """
 
 import math
@@ -36,13 +36,14 @@ def boot_time_ns() -> int:
 
 
 class StallDetector:
-    """The state of the present stall and the end of the last one.
+    """Knows whether this process is stalled now, and when the last stall ended.
 
-    The watchdog's thread calls ``passed``; every thread calls ``begun`` before it acts.
-    ``outlived_by`` is never True while ``begun`` would report a stall.
+    The watchdog's thread calls ``passed`` to show that it runs. Other threads call ``begun`` before
+    they act, to learn of a stall. ``outlived_by`` is never True while ``begun`` would report a
+    stall.
 
     All times are kept by the steady clock, so a step of the time of day does not change them. Each
-    call of ``passed`` measures the difference of the time of day from the steady clock.
+    call of ``passed`` measures the difference between the time of day and the steady clock.
     """
 
     def __init__(self) -> None:
@@ -54,7 +55,10 @@ class StallDetector:
         """Time of day at which the steady clock showed 0, in ns."""
 
     def begun(self, now: float) -> float:
-        """Return the length of a stall so far, in s, at the first call in the stall; else 0."""
+        """Return the length of the present stall so far, in s; 0 without a stall.
+
+        Each stall is reported only once: a second call during the same stall returns 0.
+        """
         length_s = now - self._passed_at
         if self._begun or length_s < STANDSTILL_S:
             return 0.0
@@ -62,7 +66,7 @@ class StallDetector:
         return length_s
 
     def passed(self, now: float, wall_ns: int) -> None:
-        """Record that the watchdog's thread runs; ``wall_ns`` is the time of day in ns."""
+        """Record that the watchdog's thread runs. ``wall_ns`` is the time of day, in ns."""
         if self._begun:
             self._begun = False
             if now >= self._over_at + LATEST_S:  # else commands from that stall may still arrive
@@ -75,7 +79,7 @@ class StallDetector:
     def outlived_by(self, sent_ns: int, now: float) -> bool:
         """Return False for a command that may have been sent before or during a recent stall.
 
-        ``sent_ns`` is the time of day at which the command was sent, in ns.
+        ``sent_ns``: time of day at which the command was sent, in ns.
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The publisher of ``/tf`` if tf2_ros is installed; otherwise a warning is logged."""
+"""The publisher of ``/tf``. It needs tf2_ros, and logs a warning if tf2_ros is missing."""
 
 from collections.abc import Callable
 from typing import Any, Final
@@ -15,7 +15,10 @@ MISSING: Final = (
 
 
 def transform_publisher(node: Node) -> Callable[[TransformStamped], Any] | None:
-    """Return a function that publishes a transform. Without tf2_ros, warn and return None."""
+    """Return a function that publishes a transform.
+
+    If tf2_ros is not installed, log a warning and return None.
+    """
     try:
         from tf2_ros import TransformBroadcaster
     except ImportError as error:

@@ -2,23 +2,25 @@
 
 """Transit time of a command without a stamp, from the time at which the middleware sent it.
 
-The sender's clock may be off by any amount, so a delay shows only in comparison with other
-messages. For each message, the difference between our clock at its arrival and the sender's clock
-at its sending is known. The message with the smallest difference was in transit for the shortest
-time. That difference is taken as the offset of the two clocks; the excess of any other message is
-its delay. The time that a message waited in this process is known exactly, by our own clock.
+The sender's clock may be off by any amount, so a single message does not show its delay. Messages
+of one sender must be compared. For each message, this module computes a difference: the time of our
+clock when the message arrived, minus the time of the sender's clock when it was sent. The message
+with the smallest difference was in transit for the shortest time. Its difference is taken as the
+offset of the two clocks. The delay of any other message is its difference minus this offset. The
+time that a message waited in this process is known exactly, by our own clock.
 
-Clocks can step. Our clock is read twice, as time of day and as a steady clock, which gives two
-differences. If our time of day and the sender's step together (one host, or NTP everywhere), only
-the difference of the steady clock changes. If our time of day steps alone, only the difference of
-the time of day changes. So the smaller of the two delays is used. A sender whose clock alone is set
-back seems to be late from then on. When all of its messages have been late for ``HEALS_AFTER_S``,
-the smallest difference among these messages becomes its offset. A real delay that lasts as long
-cannot be distinguished from this case.
+Clocks can step. So each difference is computed twice, by our time of day and by our steady clock,
+and the smaller of the two delays is used. If our time of day and the sender's clock step together
+(one host, or NTP everywhere), the difference by our time of day does not change. If our time of day
+steps alone, the difference by our steady clock does not change.
 
-The middleware numbers the messages of each sender. It does not report who sent a message. But a
-message whose number is not above a sender's last number comes from another sender. This module does
-not read a clock, and does not use ROS.
+If a sender's clock alone is set back, all later messages of that sender seem to be late. When all
+of its messages have been late for ``HEALS_AFTER_S``, the smallest difference among them becomes its
+offset. A real delay that lasts as long cannot be distinguished from this case.
+
+The middleware numbers the messages of each sender, but does not report who sent a message. A
+message whose number is not above a sender's last number must come from another sender. This module
+does not read a clock, and does not use ROS.
 """
 
 import math
@@ -29,32 +31,35 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between two late messages that belong to one series of late messages."""
+"""Longest pause, in s, between two late messages of one series. After a longer pause, a late
+message begins a new series."""
 LARGEST_DRIFT: Final = 5e-4
-"""Largest assumed drift between two clocks, in s/s. A crystal is off by a tenth of this value, and
-NTP corrects a clock at most at this rate."""
+"""Largest assumed drift between two clocks, in s per s. A crystal is off by a tenth of this value,
+and NTP corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which a sender is a less likely source of a message that seems early than of a message
-that seems late by the same time."""
+"""A message is assigned to the sender that it fits best. A message that is 1 s too early for a
+sender fits it as badly as a message that is this number of seconds too late."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages of a sender of which at least one is assumed to have had almost no delay. With
-fewer messages, all of them may have been delayed; then the estimated send time of the next message
-is too late."""
+"""Number of messages after which the offset of a sender is regarded as known, because at least one
+of them had almost no delay. With fewer messages, all of them may have been delayed. Then the
+estimated send time of the next message is too late."""
 
 Differences = tuple[float, float]
-"""Our clock at a message's arrival minus the sender's clock at its sending, in s: by our time of
-day, and by our steady clock."""
+"""Time of our clock when a message arrived, minus the time of the sender's clock when it was sent.
+The first number, in s, is by our time of day. The second is by our steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
     """One message and its times, in ns.
 
-    ``sent_ns`` is the time of day by its sender's clock. ``received_ns`` is the time of day by our
-    clock when the message came in, ``now_ns`` the present time of day, and ``steady_ns`` the
-    present time of a steady clock. ``number`` counts its sender's messages; None if the middleware
-    does not count them.
+    * ``sent_ns``: time of day by the sender's clock when the message was sent.
+    * ``received_ns``: time of day by our clock when the message came in.
+    * ``now_ns``: present time of day by our clock.
+    * ``steady_ns``: present time of a steady clock.
+    * ``number``: number of this message among its sender's messages. None if the middleware does
+      not count them.
     """
 
     sent_ns: int
@@ -66,10 +71,12 @@ class Arrival:
 
 @dataclass(frozen=True, slots=True)
 class Delay:
-    """The age of a message: ``total_s`` since the sending, including ``waited_s`` in our own queue.
+    """The age of a message, and the time at which it was sent.
 
-    ``sent_ns`` holds the possible times at which the message was sent, by our time of day in ns.
-    There are two of them until enough messages of the sender have arrived.
+    * ``total_s``: time since the message was sent, in s.
+    * ``waited_s``: part of this time in which the message waited in our own queue, in s.
+    * ``sent_ns``: possible times of day at which the message was sent, by our clock, in ns. There
+      are two of them until enough messages of the sender have arrived.
     """
 
     total_s: float
@@ -94,15 +101,16 @@ class Delay:
 
 
 class Transit:
-    """The estimator of the delays of messages on one topic, from all senders."""
+    """Estimates the delays of messages on one topic, from all senders."""
 
     def __init__(self) -> None:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """Return the delay of this message; above ``longest_s`` the message is regarded as late.
+        """Return the delay of this message.
 
-        The first message of each sender is taken to have no delay.
+        If the delay exceeds ``longest_s``, the message is regarded as late. The first message of
+        each sender is assumed to have had no delay in transit.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -144,7 +152,7 @@ class _Sender:
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """Return a number that is smaller the more likely this sender sent the message."""
+        """Return how badly the message fits this sender; 0 if it fits perfectly."""
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)
