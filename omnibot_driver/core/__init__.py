@@ -1,7 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver without ROS, ports, threads or clocks: bytes and times in, values out.
+"""The core of the driver: it converts bytes and times into values.
 
-Nothing in here does input or output. This package holds what all boards have in common; each board
-has a package of its own below it.
+The core does no input or output, and does not use ROS, threads or clocks. The modules here are
+common to all boards. Each board has a package of its own in this folder.
 """

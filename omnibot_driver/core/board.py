@@ -2,10 +2,10 @@
 
 """The interface between the driver and a motor board: what to implement to add a board.
 
-A ``Board`` decodes bytes into readings (measurements in SI units, independent of the encoding)
-and encodes requests as packets. It tracks the mode that the board seems to be in, and makes the
-actuator that encodes motion orders. It does not know ROS or ports, and reads no clock: every
-``now`` is the host's steady time, in s.
+A ``Board`` decodes bytes into readings: measurements in SI units, independent of the encoding. It
+encodes requests as packets, and tracks the mode that the board seems to be in. It also makes the
+actuator, which encodes motion orders. A ``Board`` does not know ROS or ports, and reads no clock:
+every ``now`` is the host's steady time, in s.
 """
 
 import math
@@ -65,7 +65,7 @@ class BoardFigures:
 
 
 class ReadingClock(Protocol):
-    """A clock that stamps a board's readings, in s of the host's steady clock."""
+    """Computes the stamps of a board's readings, in s of the host's steady clock."""
 
     @property
     def skew_ppm(self) -> float:
@@ -77,17 +77,16 @@ class ReadingClock(Protocol):
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return one stamp for each reading from a call of ``Board.receive`` or ``elapse``.
+        """Return one stamp for each reading, in the order of the readings.
 
-        The stamps are in the order of the readings. ``now`` is when the readings arrived; ``edge``
-        is ``Board.edge`` after that call.
+        The readings come from one call of ``Board.receive`` or ``Board.elapse``. ``now`` is the
+        time at which they arrived. ``edge`` is ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
-        """Return the stamp of a reading that arrived alone; faster than a call of ``stamps``.
+        """Return the stamp of a reading that arrived alone. This is faster than ``stamps``.
 
-        Return None, and change nothing, if the stamp is uncertain; the caller then calls ``stamps``
-        instead.
+        If the stamp is uncertain, return None and change nothing. The caller then calls ``stamps``.
         """
 
 
@@ -95,18 +94,19 @@ class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
     Implement every method that has only a docstring here. The other methods are optional: their
-    defaults suit a board that does not need them. A request raises RequestRefused if the present
-    mode forbids it.
+    defaults suit a board that does not need them. Methods for requests, such as ``pause``, raise
+    RequestRefused if the board's present mode forbids the request.
     """
 
     traits: Traits
     """Capabilities of this kind of board."""
 
     settings: Any
-    """Settings of this board that its data does not reveal; may be replaced at any time."""
+    """Settings of this board that its data does not show. They may be replaced at any time."""
 
     clock: ReadingClock | None = None
-    """Clock for readings that carry the board's time. None: stamps come from ticks or arrivals."""
+    """Clock for readings that carry the board's time. None if the readings do not carry a time. The
+    driver then computes stamps from the board's ticks, or from times of arrival."""
 
     @property
     def mode(self) -> Mode:
@@ -114,9 +114,9 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Position in the stream of IMU samples at which the last read ended, for ``clock``.
+        """Where the last read of the port ended in the stream of IMU samples; for ``clock``.
 
-        None while the framing is uncertain, or if the read shows nothing new about the position.
+        None while the framing is uncertain, or if the read shows nothing new about this position.
         """
         return None
 
@@ -134,14 +134,14 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        A command to stand still is never refused for this reason.
+        While the board runs, a command to stand still is not refused for this reason.
         """
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
-        """Return advice on the settings; empty if ``gravity_mps2`` is near the true gravity.
+        """Return advice on the IMU's settings if the measured gravity is wrong; otherwise empty.
 
-        ``gravity_mps2``: specific force measured at rest, in m/s².
+        ``gravity_mps2``: magnitude of the specific force that was measured at rest, in m/s².
         """
         return ""
 
@@ -151,8 +151,8 @@ class Board(Protocol):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
 
-        ``now`` is when the bytes arrived. A reading may be returned by a later call than the one
-        that brings its last byte, because more evidence may be needed that the reading is valid.
+        ``now`` is the time at which the bytes arrived. The board may return a reading later than
+        with its last byte, because later bytes may be needed to prove that the reading is valid.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -176,18 +176,18 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the subscriptions, polls and relayed values that are due; commands are excluded.
+        """Return the packets other than commands that are due.
 
-        The driver calls this method at ``wake_at`` and writes the packets, so the board may regard
-        them as written.
+        They are subscriptions, polls and relayed values. The driver calls this method at
+        ``wake_at`` and writes the packets. So the board may regard them as written.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time; called at ``wake_at``.
 
-        OdometryReadings and NoticeReadings do not show that the board is alive. Any other returned
-        reading does.
+        An OdometryReading or a NoticeReading from this method does not show that the board is
+        alive. Any other reading does.
         """
         return []
 
@@ -204,7 +204,7 @@ class Board(Protocol):
         return True
 
     def actuator(self, proof: StopProof) -> Actuator:
-        """Return the part that encodes motion orders; called once.
+        """Return the actuator, which encodes motion orders. The driver calls this method once.
 
         The actuator reports to ``proof`` each stop and each motion that it sends.
         """
@@ -229,7 +229,7 @@ class Board(Protocol):
     def pause(self) -> Packets:
         """Return the packets that pause a running board.
 
-        Raise RequestRefused if the pause command toggles and the board is not known to run.
+        If the pause command toggles, raise RequestRefused unless the board is known to run.
         """
         return NO_PACKETS
 
@@ -253,10 +253,11 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the two alternatives that the guard sends: Stop, or emergency stop and then Stop.
+        """Return the packets that the guard sends when this process hangs: one item for each case.
 
-        The guard sends the second item if the e-stop is latched. This method is called after each
-        input and before each output, because the right packets may depend on the board's state.
+        The first item is Stop. The second item is the emergency stop and then Stop, for the case
+        that the e-stop is latched. This method is called after each input and before each output,
+        because the right packets may depend on the board's state.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

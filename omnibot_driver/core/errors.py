@@ -2,9 +2,9 @@
 
 """All exceptions of the driver, in one class hierarchy.
 
-Bytes from a board never raise an exception; invalid ones are counted. An exception means that the
-driver or its user asked for something impossible. Each message says what is wrong and what to do
-next.
+The driver counts invalid bytes from a board, and does not fail because of them. An exception means
+that the driver or its user asked for something impossible. Each message says what is wrong and what
+to do next.
 """
 
 

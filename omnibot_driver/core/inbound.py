@@ -3,8 +3,8 @@
 """The inbound path: from bytes of the board, or elapsed time, to measurements and events.
 
 ``hear`` returns the measurements that must be published at once. ``process`` handles the rest:
-checked displacements, mode changes, answers and figures. This module connects the board, the
-measurements and the safety stops. It must not know bytes, nor what is commanded.
+displacements, changes of the mode, answers to requests, and notices. This module knows the board,
+the measurements and the safety stops; it does not know what the bytes mean, or what is commanded.
 """
 
 from omnibot_driver.core.board import Board
@@ -19,7 +19,7 @@ from omnibot_driver.core.safety import SafetyStops
 
 
 class Inbound:
-    """The inbound path of a session: passes data to ``measurement``, ``safety``, ``reporter``."""
+    """Passes what the board sends to ``measurement``, ``safety`` and ``reporter``."""
 
     def __init__(
         self,
@@ -38,17 +38,18 @@ class Inbound:
         """Last of the readings that ``hear`` has decoded and ``process`` has not handled yet."""
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Process bytes that arrived at ``now``."""
+        """Process bytes that arrived at ``now``: call ``hear``, then ``process``."""
         self._reporter.events += self.hear(data, now, channel)
         self.process(now)
 
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
-        """Decode bytes, and return the estimates to publish at once; call ``process`` afterwards.
+        """Decode bytes, and return the estimates to publish at once. Call ``process`` afterwards.
 
-        A command that arrives between the two calls is handled as if it had arrived before the
-        bytes. This would be wrong if the bytes change the mode. In this case ``hear`` itself calls
-        ``process`` and returns an empty list, and the caller's call of ``process`` returns True.
-        Requests other than commands call ``process`` before they begin.
+        A motion command that arrives between the two calls is handled as if it had arrived before
+        the bytes. This would be wrong if the bytes change the board's mode. In this case ``hear``
+        calls ``process`` itself, puts the estimates among the events, and returns an empty list.
+        The caller's own call of ``process`` then returns True. Requests call ``process`` before
+        they begin, so that they come after the bytes.
         """
         self._liveness.came_at = now
         before = self._board.mode
@@ -67,7 +68,10 @@ class Inbound:
         return []
 
     def process(self, now: float) -> bool:
-        """Handle the bytes received last; return False if nothing is left to write or report."""
+        """Handle the readings of the last ``hear``.
+
+        Return False if nothing is left to write or report.
+        """
         last, self._last = self._last, None
         if (
             now < self._reporter.news_at

@@ -12,18 +12,19 @@ from omnibot_driver.core.traits import Traits
 
 
 class Liveness:
-    """The arrival times of a board's last data, and the limits above which silence is a fault.
+    """Knows when a board last sent data, and from when on its silence is a fault.
 
-    ``heard_at``: arrival of the last reading, in s; ``came_at``: arrival of the last bytes, valid
-    or not. ``unheard_s`` and ``silence_s`` have the same meaning as in ``Traits``.
+    * ``heard_at``: arrival of the last reading, in s.
+    * ``came_at``: arrival of the last bytes, valid or not, in s.
+    * ``unheard_s``, ``silence_s``: limits of a silence; see ``Traits``.
     """
 
     def __init__(self, traits: Traits) -> None:
         self.unheard_s, self.silence_s = traits.unheard_s, traits.silence_s
         self.heard_at = self.came_at = -math.inf
         self._silent_since: float | None = None
-        """Value of ``heard_at`` when a silence was last reported. As long as ``heard_at`` has this
-        value, no silence is reported again."""
+        """Value of ``heard_at`` when a silence was last reported. While ``heard_at`` has this
+        value, the silence is not reported again."""
 
     def begin(self, now: float) -> None:
         """Begin a new connection."""
@@ -31,7 +32,7 @@ class Liveness:
         self._silent_since = None
 
     def stalled(self, now: float) -> None:
-        """Restart the measurement of silence, because this process stalled and did not receive."""
+        """Measure the silence from now on, because this process stalled and could not receive."""
         if self._silent_since == self.heard_at:
             self._silent_since = now
         self.heard_at = now

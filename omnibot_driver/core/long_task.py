@@ -2,9 +2,9 @@
 
 """Long tasks of a board, such as a recording: one at a time.
 
-A task ends when the code that began it reports the end, and fails when its time limit has passed.
-It fails at once if the robot is stopped, the e-stop is latched, or the board is lost. This module
-knows times and sentences, not what a task does.
+A task ends when the code that began it reports the end. It fails when its time limit has passed. It
+fails at once if the robot is stopped, the e-stop is latched, or the board is lost. This module
+knows times and sentences; it does not know what a task does.
 """
 
 import math
@@ -16,8 +16,8 @@ from omnibot_driver.core.requests import RequestDone
 class LongTask:
     """The task in progress, if any.
 
-    ``answers``: answers that the session has not taken yet. ``wake_at``: when ``tick`` must be
-    called, in s; infinity without a task.
+    * ``answers``: answers that the session has not taken yet.
+    * ``wake_at``: time at which ``tick`` must be called, in s; infinity without a task.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class LongTask:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Fail the task if a command drove the robot at the last call, and none does so now.
+        """Fail the task if the robot was driven at the last call, but is not driven now.
 
         ``driven``: whether a command drives the robot now.
         """

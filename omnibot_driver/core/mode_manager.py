@@ -2,11 +2,11 @@
 
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
-The single-letter commands (S, P, R) may be lost, P toggles, and a board that boots drops what it
-receives first. So each request is a short exchange. The driver sends the command, waits for data
-that shows the result, and repeats the command after a while. At a deadline the request fails, with
-the reason as a sentence. One request is in progress at a time. This module does not know bytes and
-reads no clock.
+A single-letter command (S, P, R) may be lost. P toggles between pause and run. A board that boots
+drops what it receives first. So each request is a short exchange: the driver sends the command,
+waits for data that shows the result, and repeats the command after a while. At a deadline the
+request fails, with the reason as a sentence. Only one request is in progress at a time. This module
+does not know bytes, and reads no clock.
 """
 
 import math
@@ -24,8 +24,8 @@ PAUSE_RETRY_S: Final = 1.5
 sends a notice every second, so data without a notice for this time shows that the command was
 lost."""
 FLOWING_S: Final = 0.1
-"""Largest time, in s, that one gap between receptions adds to the measured time of uninterrupted
-data. A running board sends every 10 ms."""
+"""Largest contribution, in s, of one pause between receptions to the measured time of uninterrupted
+data. A running board sends every 10 ms, so a longer pause is an interruption."""
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command, or the notice of a paused board, takes to arrive. A notice
 that arrives sooner than this after a command may have been sent before the board obeyed. If data
@@ -57,15 +57,17 @@ class Wanted(Enum):
 CLOSED: Final = Phase.CLOSED
 SETTLED: Final = Phase.SETTLED
 PAUSED: Final = Wanted.PAUSED
-"""Copies of Enum members for the checks at every read, because Python 3.11 looks each member up by
-a slow function call."""
+"""``CLOSED``, ``SETTLED``, ``PAUSED``: copies of Enum members for the checks at every read. Python
+3.11 looks up a member of an Enum by a slow function call."""
 
 
 class ModeManager:
-    """The requested and the confirmed mode of a board.
+    """The mode that was requested from a board, and the exchange that is to bring it about.
 
-    ``run``: whether to start the board whenever it is connected. If not, the board keeps its mode.
-    ``answers``: answers to requests that the session has not taken yet.
+    * ``run``: whether to start the board whenever it is connected. If not, the board keeps its
+      mode.
+    * ``phase``: state of the exchange.
+    * ``answers``: answers to requests that the session has not taken yet.
     """
 
     def __init__(self, board: Board, *, run: bool) -> None:

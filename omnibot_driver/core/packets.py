@@ -2,14 +2,14 @@
 
 """Packets: bytes, each with the channel that carries them.
 
-A board has one channel or several: serial lines or UDP ports. Channels are numbered from 0 in the
-order of ``Traits.channels``. On a UDP channel a packet is one datagram.
+A board has one channel or several: serial lines or UDP ports. Channels are numbered from 0, in the
+order of ``Traits.channels``. On a UDP channel, each packet is one datagram.
 """
 
 from typing import Final
 
 Packet = tuple[int, bytes]
-"""Channel and bytes."""
+"""Number of the channel, and the bytes."""
 Packets = tuple[Packet, ...]
 """Packets in the order in which they are sent."""
 

@@ -28,15 +28,16 @@ class ImuReading:
 
 @value(frozen=True, slots=True)
 class DisplacementReading:
-    """Motion during the last ``duration_s``, in m and rad, in the board's earth or body frame.
+    """Motion of the robot in a short time, in m and rad.
 
-    * ``duration_s``: None if unknown, as for the first displacement after a pause, which includes
-      all motion during the pause.
+    * ``frame``: frame of ``dx_m`` and ``dy_m``: the board's earth frame, or the body's own axes.
+    * ``duration_s``: duration of the motion, in s. None if unknown. The first displacement after a
+      pause has no known duration, because it includes all motion during the pause.
     * ``lost``: number of displacements that are missing before this one.
-    * ``restarted``: whether the board's counters, and with them its earth frame, seem to start
-      again with this displacement.
-    * ``measured``: False if the board cannot measure motion; the values are then the commanded
-      ones.
+    * ``restarted``: whether the board's counters seem to start again with this displacement. Its
+      earth frame then starts again too.
+    * ``measured``: False if the values are not a measurement of the motion. A board that cannot
+      measure motion reports the commanded values instead.
     """
 
     dx_m: float
@@ -57,9 +58,10 @@ NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, me
 class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    ``lost``: number of lost displacements whose motion this pose includes; the next displacement
-    does not count these losses again. ``restarted``: whether the counter of the poses starts again
-    with this pose; the counter of the displacements has then restarted earlier.
+    * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
+      does not count these losses again.
+    * ``restarted``: whether the counter of the poses starts again with this pose. The counter of
+      the displacements has then restarted earlier.
     """
 
     x_m: float
@@ -119,9 +121,10 @@ class ResetReading:
 
 @dataclass(frozen=True, slots=True)
 class NoticeReading:
-    """A notice for the user; ``halt``: whether the robot must be stopped.
+    """A notice for the user.
 
-    An empty text means that the user already has this notice.
+    * ``text``: the notice as a sentence; empty if the user already has it.
+    * ``halt``: whether the robot must be stopped.
     """
 
     text: str
@@ -152,14 +155,14 @@ Reading = (
 class SampleBoundary:
     """Where a read of the port ended in the stream of IMU samples, for the clock that stamps them.
 
-    The last byte of a sample may come late. The first bytes of a sample show its time better.
+    The last byte of a sample may come late, so the first bytes of a sample show its time better.
 
-    * ``ahead``: number of samples (0 or 1) received, at least in part, after the last ImuReading.
+    * ``ahead``: number of samples (0 or 1) of which at least a part came after the last ImuReading.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
-    * ``latest_s``: longest time in s, after the read, until the line completes the last sample; 0
-      if it is complete.
-    * ``earliest_s``: the next sample, or the incomplete one, cannot be complete sooner than this
-      time after the read.
+    * ``latest_s``: longest time, in s after the read, until the last sample is complete; 0 if it is
+      complete already.
+    * ``earliest_s``: shortest time, in s after the read, until the incomplete sample is complete.
+      Without an incomplete sample, it is the time until the next one is complete.
     """
 
     ahead: int

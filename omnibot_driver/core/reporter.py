@@ -38,8 +38,8 @@ class Reporter:
     * ``news_at``: time of the next ``look_for_news``, in s.
     * ``missing``: which lines are missing, as a sentence; empty if none.
     * ``overruns``: how often a port has lost bytes, counted over all connections.
-    * ``shown``: public state, and whether the e-stop was latched, at the last ``take``; a state
-      that lasts only during one input is never shown.
+    * ``shown``: public state, and whether the e-stop was latched, both at the last ``take``. A
+      state that begins and ends between two calls of ``take`` is never shown.
     """
 
     def __init__(
@@ -125,8 +125,8 @@ class Reporter:
     def set_to_zero(self, *, sideways: bool, planar: bool) -> None:
         """Report which parts of a body velocity were set to zero, each part only once.
 
-        ``sideways``: whether it had a sideways part that the wheels cannot produce; ``planar``:
-        False if it also had motion out of the plane.
+        * ``sideways``: whether the velocity had a sideways part that the wheels cannot produce.
+        * ``planar``: False if the velocity also had motion out of the plane.
         """
         if sideways:
             self.notify(self._notices.once(SIDEWAYS))

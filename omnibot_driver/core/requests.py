@@ -10,7 +10,7 @@ OnExit = Literal["stop", "pause", "reset"]
 
 
 class Request(Enum):
-    """A request to a board; the value is used in messages after the word "a"."""
+    """A request to a board. Its value is the noun in messages such as "a start is under way"."""
 
     START = "start"
     PAUSE = "pause"

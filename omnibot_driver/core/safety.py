@@ -2,11 +2,16 @@
 
 """Safety stops: what stops the robot at once, whatever the source of its commands.
 
-A stop follows from the e-stop, from a board that restarts, is paused or falls silent, and from a
-stall of this process. This module passes what the board reports to the parts that handle commands
-and requests. It must not know bytes, or who commands. Two other stops are elsewhere: the command
-policy stops the robot when a command expires, and the motion monitor stops a robot that does not
-move as commanded.
+The robot is stopped in these cases:
+
+* The e-stop is latched.
+* The board restarts, is paused, falls silent, or reports that the robot must be stopped.
+* This process was stalled.
+
+This module also passes what the board reports to the parts that handle commands and requests. It
+does not know bytes, or who commands the robot. Two other stops are elsewhere: the command policy
+stops the robot when a command expires, and the motion monitor stops a robot that does not move as
+commanded.
 """
 
 from typing import Final
@@ -130,7 +135,7 @@ class SafetyStops:
         self._policy.halt(now)
 
     def tick(self, now: float) -> None:
-        """End the command after a short silence of the board; forget the mode after a long one."""
+        """End the command after a short silence of the board. Forget the mode after a long one."""
         if self._policy.current and self._liveness.unheard(now):
             self._policy.halt(now)
         if not self._liveness.fell_silent(now):
@@ -149,7 +154,7 @@ class SafetyStops:
             self._mode_manager.heard_nothing(now)
 
     def stalled(self, seconds: float, now: float) -> None:
-        """Stop the robot and fail the task in progress: this process stalled for ``seconds``."""
+        """Stop the robot and fail the task, because this process was stalled for ``seconds``."""
         self._liveness.stalled(now)
         self._task.give_up("the driver stalled meanwhile; call again")
         self._board.stalled()

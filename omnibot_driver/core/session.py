@@ -1,14 +1,19 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session with one board: bytes and commands in; measurements, answers and packets out.
+"""A session with one board: it takes bytes and commands, and gives measurements and packets.
 
-The caller calls an input method, then passes ``take_output`` to the port and ``take_events`` to its
-own caller. It calls ``tick`` at ``wake_at``. A session is not thread-safe, reads no clock and does
-not log: everything that a user should know is an event.
+The caller calls an input method. Then it passes ``take_output`` to the port, and ``take_events`` to
+its own caller. It calls ``tick`` at ``wake_at``. A session is not thread-safe, reads no clock and
+does not log: everything that a user should know is an event.
 
-This module puts the parts together and holds no state of its own. ``inbound`` handles what the
-board sends, ``safety`` stops the robot, ``interlocks`` refuses commands, ``reporter`` collects the
-events, ``shutdown`` ends the connection. This module must not know bytes or threads.
+This module connects the parts of a session, and holds no state of its own. It does not know bytes
+or threads. The parts are:
+
+* ``inbound`` handles what the board sends.
+* ``safety`` stops the robot.
+* ``interlocks`` refuses commands.
+* ``reporter`` collects the events.
+* ``shutdown`` ends the connection.
 """
 
 import math
@@ -42,10 +47,10 @@ class Session:
     """The driver's core for one board, across all its connections.
 
     * ``run``: whether to start the board whenever it is connected.
-    * ``axis_signs``: factors for x, y and yaw: -1 where the board's body axis is opposite to
-      REP-103's, else 1; applied to commands and odometry.
-    * ``control``: position of the board's control switch, which no board reports; None for a board
-      without one.
+    * ``axis_signs``: factors for x, y and yaw of commands and odometry: -1 if the board's body axis
+      is opposite to REP-103's, else 1.
+    * ``control``: position of the board's control switch, which the board does not report. None for
+      a board without this switch.
     * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
     """
 
@@ -130,9 +135,10 @@ class Session:
     # Inputs from the link and from the clock
 
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
-        """Apply new settings to later commands and frames; stricter limits stop the robot.
+        """Apply new settings to later commands and frames.
 
-        ``board``: new settings of the board itself; the current command is encoded again with them.
+        If a limit becomes stricter, the robot is stopped. ``board``: new settings of the board
+        itself. The current command is encoded again with them.
         """
         self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:
@@ -141,8 +147,9 @@ class Session:
         self._measurement.configure(settings)
 
     def opened(self, now: float, *, missing: str = "") -> None:
-        """Begin with an open port; ``missing`` names the lines that are not open, as a sentence.
+        """Begin a connection, because the port is open now.
 
+        ``missing``: which lines of the board are not open, as a sentence; empty if all are open.
         While a line is missing, the robot is stopped and not driven, because the board would
         receive only a part of its commands.
         """
@@ -189,10 +196,13 @@ class Session:
     def command_twist(
         self, twist: BodyTwist, now: float, *, age_s: float = 0.0, planar: bool = True
     ) -> None:
-        """Command a body velocity. If it raises CommandRefused, nothing changes.
+        """Command a body velocity.
 
-        ``age_s``: age of the command in s, from its sender's stamp; negative for a stamp in the
-        future. ``planar``: False if the sender also asked for motion out of the plane.
+        If it raises CommandRefused, the earlier command stays in effect.
+
+        * ``age_s``: age of the command in s, from its sender's stamp; negative for a stamp in the
+          future.
+        * ``planar``: False if the sender also asked for motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
         sideways = self._commanding.shaper.sideways
@@ -200,11 +210,14 @@ class Session:
             self._reporter.set_to_zero(sideways=sideways, planar=planar)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
-        """Command wheel rates. If it raises CommandRefused, nothing changes."""
+        """Command wheel rates. If it raises CommandRefused, the earlier command stays in effect."""
         self._command(self._commanding.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
-        """Command a pose in the odometry frame. If it raises CommandRefused, nothing changes."""
+        """Command a pose in the odometry frame.
+
+        If it raises CommandRefused, the earlier command stays in effect.
+        """
         self._command(self._commanding.pose(goal), now)
 
     def request(self, request: Request, token: object, now: float) -> None:
@@ -257,7 +270,10 @@ class Session:
         return self._safety.estop(active, now, by=by)
 
     def reset_odometry(self, now: float) -> None:
-        """Begin the odometry frame at the robot's present pose; drop a goal in the old frame."""
+        """Move the origin of the odometry frame to the robot's present pose.
+
+        A goal of ``cmd_pose`` in the old frame is dropped.
+        """
         self.inbound.process(now)
         self._board.reset_odometry()
         self._reporter.events += self._odometry.reset()

@@ -35,7 +35,7 @@ class Shutdown:
 
     @property
     def stands(self) -> bool:
-        """Whether the robot was shown to stand still, without a motion command since then."""
+        """Whether the robot was shown to stand still, and no motion was commanded since then."""
         return self._policy.proof.proved
 
     @property
@@ -49,10 +49,11 @@ class Shutdown:
         return self._policy.proof.takes_s
 
     def fall_silent(self, now: float) -> bool:
-        """Stop repeating Stop, and demand a new proof that the robot stands still.
+        """End the repetition of Stop, and demand a new proof that the robot stands still.
 
-        The line may have damaged the last Stop, and the board may obey it as another command.
-        Return whether such a proof is possible now.
+        The line may have damaged the last Stop, and the board may obey it as another command. The
+        new proof shows that this did not happen. If such a proof is not possible now, return False
+        and change nothing.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False

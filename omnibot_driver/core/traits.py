@@ -15,26 +15,29 @@ class Traits:
     """The capabilities of a board, constant while the driver runs.
 
     * ``channels``: names of the lines to the board; a single line needs no name.
-    * ``imu_period_s``: time between two ImuReadings, of which the board sends one in each tick of
-      its clock. None for a board without an IMU; its readings are stamped on arrival.
+    * ``imu_period_s``: time between two ImuReadings, in s. The board sends one in each tick of its
+      clock. None for a board without an IMU, whose readings are stamped on arrival.
     * ``authorities``: the topics that may command motion.
     * ``requests``: the requests that the board supports.
     * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in the order of its values.
-    * ``unheard_s``: after this time without data the robot is stopped.
-    * ``silence_s``: after this time without data the mode of the board is unknown.
+    * ``unheard_s``: time without data, in s, after which the robot is stopped.
+    * ``silence_s``: time without data, in s, after which the mode of the board is unknown.
     * ``own_odometry``: whether OdometryReadings give the robot's pose. If they do, displacements
-      only show whether the robot obeys; if not, the driver integrates the displacements.
-    * ``stands_after_s``: if displacements show no motion for this time, the robot stands still.
-    * ``unproved_s``: longest time for which Stop is repeated while the standstill is not shown.
+      only show whether the robot obeys. If not, the driver integrates the displacements.
+    * ``stands_after_s``: if displacements show no motion for this time, in s, the robot stands
+      still.
+    * ``unproved_s``: longest time, in s, for which Stop is repeated while the standstill is not
+      shown.
     * ``baudrate``: whether the line has a baud rate to set.
-    * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself; its profile then
+    * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself. Its profile then
       offers ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest time until the board obeys a stop, if it acknowledges stops.
-    * ``slack_mps``, ``slack_radps``: how far the measured velocity may differ from the commanded
-      one, in addition to the motion monitor's tolerance for any robot; for coarse displacements, or
-      wheels that lag while they speed up.
-    * ``advice``: what to check when the robot does not move as commanded; names the parameters of
-      this board and replaces the general advice.
+    * ``stops_within_s``: longest time, in s, until the board obeys a stop, if it acknowledges
+      stops.
+    * ``slack_mps``, ``slack_radps``: additional tolerance of the motion monitor for the difference
+      between measured and commanded velocity, in m/s and rad/s. A board needs it if its
+      displacements are coarse, or if its wheels lag while they speed up.
+    * ``advice``: for each fault of the robot's motion, what to check. This text names the
+      parameters of this board, and replaces the general advice.
     """
 
     channels: tuple[str, ...] = ("",)

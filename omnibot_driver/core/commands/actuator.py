@@ -2,10 +2,10 @@
 
 """The interface between the command policy and a board's encoding of motion.
 
-The policy decides what the robot should do and for how long. An actuator makes the packets that
-carry out the decision: set-points that are repeated (`set_point_stream.py`), or an exchange
-specific to the board. The actuator reports to the stop proof each stop and motion that it sends. An
-actuator reads no clock and never refuses an order of the policy.
+The policy decides what the robot should do, and for how long. An actuator makes the packets that
+carry out this decision. Some actuators repeat set-points (`set_point_stream.py`), others run an
+exchange that only their board has. An actuator reports to the stop proof each stop and each motion
+that it sends. It reads no clock, and never refuses an order of the policy.
 """
 
 from typing import Protocol

@@ -18,8 +18,8 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    ``leaving``: whether the driver is shutting down, and therefore refuses everything. ``missing``:
-    which of the board's lines are not open, as a sentence; empty if all are open.
+    * ``leaving``: whether the driver is shutting down. It then refuses everything.
+    * ``missing``: which of the board's lines are not open, as a sentence; empty if all are open.
     """
 
     def __init__(
@@ -41,9 +41,9 @@ class Interlocks:
         return "the driver is shutting down" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, so its sender is still active.
+        """Record that a motion command was refused, which shows that its sender is still active.
 
-        This module or an earlier check has refused it.
+        Call this for every refusal, by this module or by an earlier check.
         """
         self._interlock.be_active(now)
 

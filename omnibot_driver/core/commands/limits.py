@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits for commands; no speed limit changes the direction of the linear velocity.
+"""Speed limits for commands. They never change the direction of the linear velocity.
 
-This module does pure arithmetic on finite numbers; ``require_finite`` rejects NaN and infinity.
+All functions expect finite numbers, and ``require_finite`` rejects NaN and infinity.
 """
 
 import math
@@ -55,8 +55,8 @@ class SpeedLimits:
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
         """Return the twist that is reached in ``duration_s`` with limited acceleration.
 
-        ``now`` is the present twist. Its linear velocity changes along a straight line to that of
-        ``wanted``; its yaw rate changes independently.
+        ``now`` is the twist at the beginning. The linear velocity changes along a straight line
+        towards that of ``wanted``. The yaw rate changes independently.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),

@@ -27,10 +27,11 @@ class Until(Enum):
 
 
 class MotionInterlock:
-    """The state of the interlock: whether motion is refused, and until when.
+    """Whether motion is refused after a stop by the motion monitor, and until when.
 
-    ``until``: what ends the refusal of motion. ``trips``: number of calls of ``trip``. ``starts``:
-    whether the board supports ~/start.
+    * ``until``: what ends the refusal.
+    * ``trips``: how often ``trip`` was called.
+    * ``starts``: whether the board supports ~/start.
     """
 
     def __init__(self, *, starts: bool = True) -> None:
@@ -56,10 +57,11 @@ class MotionInterlock:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Restart the measurement of the pause that ends a refusal.
+        """Record that a sender of commands is active.
 
-        Call it when a command is refused for any reason, because its sender is active. Call it
-        also after a stall of this process, because a sender may have been active meanwhile.
+        The pause that ends a refusal is measured from now on. Call this when a command is refused
+        for any reason. Call it also after a stall of this process, because a sender may have been
+        active meanwhile.
         """
         self._commanded_at = now
 

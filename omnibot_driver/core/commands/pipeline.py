@@ -187,7 +187,8 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion is ``rolling`` of the newest odometry estimate; if it is unknown, ``reading``.
+        The motion is ``rolling`` of the newest odometry estimate, or ``reading`` if that is
+        unknown.
         """
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
@@ -235,10 +236,10 @@ class CommandPipeline:
         return f" (commanded {commanded}; measured {measured})"
 
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
-        """Drop an invalid goal, or a goal that the robot drives away from; return notices.
+        """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 
-        A goal is invalid if the origin of the odometry frame has moved since the command, because
-        of a reset of the odometry or a restart of the board. The notices are for the user.
+        A goal becomes invalid when the origin of the odometry frame moves, because of a reset of
+        the odometry or a restart of the board. The notices are for the user.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):

@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The command policy: one commanding topic at a time, expiry, the e-stop latch, proved stops.
+"""The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-No board stops without a command. So when a motion command expires, Stop is repeated until
-displacements show that the robot stands still. The actuator encodes Stop; time is an argument.
+One topic commands the robot at a time. A board does not stop without a command. So when a motion
+command expires, the policy repeats Stop until displacements show that the robot stands still. The
+policy also holds the latch of the e-stop. This module knows commands and times; it does not know
+how Stop is encoded, and reads no clock.
 """
 
 import math
@@ -28,8 +30,8 @@ ROUNDING_S: Final = 1e-6
 class CommandSettings:
     """The settings of the policy.
 
-    ``timeout_s``: age at which a command expires, in s; ``rate_hz``: rate at which a command
-    is repeated.
+    * ``timeout_s``: age at which a command expires, in s.
+    * ``rate_hz``: rate at which a command is repeated.
     """
 
     timeout_s: float = 0.5
@@ -39,8 +41,8 @@ class CommandSettings:
 class CommandPolicy:
     """The command in effect: what the robot should do now.
 
-    ``proof``: proof that the robot stands still, from displacements and from what the actuator
-    sends.
+    ``proof``: the proof that the robot stands still. It follows from displacements, and from what
+    the actuator has sent.
     """
 
     def __init__(

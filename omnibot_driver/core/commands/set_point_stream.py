@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An actuator for boards that follow set-points: decides when to send or repeat which frame.
+"""An actuator for boards that follow set-points: it decides which frame is sent when.
 
-These boards do not acknowledge frames, so each frame is repeated. This module does not know
-what is in a frame; time is an argument.
+These boards do not acknowledge frames, so each frame is repeated. This module knows orders and
+times; it does not know what is in a frame, and reads no clock.
 """
 
 import math
@@ -48,9 +48,9 @@ class Encoder(Protocol):
 class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
-    ``proof`` receives a report of each stop and motion that the stream sends. If ``heard`` is
-    given, the stream calls it with all packets that are written, including those of requests, and
-    the time.
+    * ``proof``: receives a report of each stop and each motion that the stream sends.
+    * ``heard``: is called, if given, with all packets that are written and with the time. These
+      include the packets of requests.
     """
 
     def __init__(
@@ -96,10 +96,10 @@ class SetpointStream:
             self._fresh_at = self._stop_at
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that a request was written, and adapt what to send next.
+        """Record that the packets of a request were written, and adapt what to send next.
 
-        Packets that begin with Stop on every channel count as a Stop. After all other packets the
-        stream repeats the set-point at once: if the last motion frame lost bytes, the board may
+        Packets that begin with Stop on every channel count as a Stop. After any other packets, the
+        stream repeats the set-point at once. If the last motion frame lost bytes, the board may
         have completed it with the first bytes of these packets.
         """
         if self._heard is not None:

@@ -65,9 +65,10 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    ``is_zero``: the method ``Actuator.is_zero``, which may raise CommandRefused. ``before``: the
-    previous set-point. If ``before`` is a BaseSetpoint, a ramp starts at its velocity, otherwise at
-    rest. ``since``: earliest time, in s, at which a ramp can begin.
+    * ``is_zero``: as an argument, the method ``Actuator.is_zero``, which may raise CommandRefused.
+    * ``before``: the previous set-point. If it is a BaseSetpoint, a ramp starts at its velocity,
+      otherwise at rest.
+    * ``since``: earliest time, in s, at which a ramp can begin.
     """
 
     authority: Final = Authority.BASE
@@ -115,7 +116,7 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    ``is_zero``: the method ``Actuator.is_zero``, which may raise CommandRefused.
+    ``is_zero``: as an argument, the method ``Actuator.is_zero``, which may raise CommandRefused.
     """
 
     settled: Final = True

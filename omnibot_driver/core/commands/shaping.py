@@ -32,8 +32,8 @@ ControlMethod = Literal["velocity", "position"]
 class CommandShaper:
     """The checks and limits of motion commands. Every method may raise CommandRefused.
 
-    ``limits`` and ``kinematics`` may be replaced at any time. ``control``: position of the board's
-    control switch, or None for a board without one.
+    * ``limits``, ``kinematics``: may be replaced at any time.
+    * ``control``: position of the board's control switch. None for a board without this switch.
     """
 
     def __init__(

@@ -2,9 +2,9 @@
 
 """The stop proof: whether displacements show that the robot stands still after the last Stop.
 
-Boards do not acknowledge a stop, but displacements show it. This module knows displacements, and
-when Stop and motion were sent. It does not know what happens while the proof is missing. Time is an
-argument.
+Displacements are the evidence, because boards do not acknowledge a stop. This module knows
+displacements, and when Stop and motion were sent. It does not know what happens while the proof is
+missing. Time is an argument.
 """
 
 import math
@@ -25,7 +25,7 @@ AT_LEAST: Final = 2
 """Smallest number of displacements in a proof, even if one lasts long enough: a single displacement
 may be damaged, or may date from before the wheels turned."""
 PROOFS: Final = 2.0
-"""Least time to wait for a proof, as a multiple of the duration of standstill that it needs."""
+"""Shortest wait for a proof, as a multiple of the standstill that the proof needs."""
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 

@@ -19,7 +19,7 @@ class Pose:
     yaw_rad: float = 0.0
 
     def __add__(self, other: "Pose") -> "Pose":
-        """Add component by component; valid for differences in one frame."""
+        """Add component by component. This is valid for displacements in one frame."""
         return Pose(self.x_m + other.x_m, self.y_m + other.y_m, self.yaw_rad + other.yaw_rad)
 
     def __sub__(self, other: "Pose") -> "Pose":

@@ -13,7 +13,12 @@ from omnibot_driver.core.values import value
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuCorrection:
-    """Biases in rad/s and m/s²; ``auto_gyro_bias``: whether to refine the gyro's bias at rest."""
+    """Biases of the IMU's readings, which the driver subtracts.
+
+    * ``gyro_bias``: bias of the gyro, in rad/s.
+    * ``accel_bias``: bias of the accelerometer, in m/s².
+    * ``auto_gyro_bias``: whether to refine the gyro's bias while the robot is at rest.
+    """
 
     gyro_bias: Vector3 = (0.0, 0.0, 0.0)
     accel_bias: Vector3 = (0.0, 0.0, 0.0)
@@ -30,7 +35,10 @@ class ImuEstimate:
 
 
 class BiasCorrector:
-    """Removes the IMU's biases; ``calibration`` finds the gyro's bias, at rest or on request."""
+    """Removes the biases from the IMU's readings.
+
+    ``calibration``: finds the gyro's bias, while the robot is at rest or on request.
+    """
 
     def __init__(self, board: Board, correction: ImuCorrection) -> None:
         self._board = board

@@ -2,13 +2,18 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-A gyro at rest measures only its bias and noise. Three sources show whether the robot is at rest:
-the wheels (displacements whose sum is zero), and the gyro and the accelerometer (readings that
-hardly vary). Without the wheels, a steady turn is not detected, so the result must
-also be a bias that the sensor's specification allows. The measurement yields the magnitude of
-gravity as well.
+A gyro at rest measures only its bias and noise. The robot is taken to be at rest if three
+conditions hold:
 
-This module knows readings and times. It does not read a clock, and does not know when to measure.
+* The displacements of the wheels add up to almost zero.
+* The readings of the gyro hardly vary.
+* The readings of the accelerometer hardly vary.
+
+If the wheels do not report displacements, a steady turn meets these conditions. So the gyro's mean
+reading must also be a bias that the sensor's specification allows. The measurement yields the
+magnitude of gravity as well.
+
+This module knows readings and times; it does not read a clock, and does not know when to measure.
 """
 
 import math
@@ -47,7 +52,10 @@ corrected in 14 s."""
 
 
 class Look:
-    """One observation of the robot; ``began_s``: time at which the observation began."""
+    """One observation of the robot: readings of the IMU, and displacements of the same time.
+
+    ``began_s``, ``last_s``: stamps of the first and the last reading, in s; NaN before the first.
+    """
 
     def __init__(self) -> None:
         self.rates: list[Vector3] = []
@@ -65,7 +73,10 @@ class Look:
         self.forces.append(force)
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """Add a displacement, in any axes."""
+        """Add a displacement.
+
+        Its axes do not matter, because the sums only show whether the robot has moved.
+        """
         self.displacements += 1
         self._x_m += dx_m
         self._y_m += dy_m
@@ -83,7 +94,7 @@ class Look:
 
     @property
     def motion(self) -> str:
-        """Sentence part that says how the readings show motion; empty if they show rest."""
+        """How the readings show motion, as a part of a sentence; empty if they show rest."""
         shaken_radps, shaken_mps2 = max(deviation(self.rates)), max(deviation(self.forces))
         bias_radps = max(map(abs, mean(self.rates)))
         if self.rolled:
@@ -98,11 +109,12 @@ class Look:
 
 
 class GyroCalibration:
-    """Calibration of the gyro; ``bias``: the gyro's mean reading at rest, in rad/s.
+    """Measures and refines the gyro's bias.
 
-    ``refine``: whether each ``BLOCK_S`` at rest corrects the bias a little; the wheels must have
-    confirmed the rest. ``answers``: one RequestDone for each measurement that has succeeded or
-    failed.
+    * ``bias``: mean reading of the gyro at rest, in rad/s.
+    * ``refine``: whether each ``BLOCK_S`` at rest corrects the bias a little. Only blocks in which
+      the wheels have reported displacements are used.
+    * ``answers``: one RequestDone for each measurement that has succeeded or failed.
     """
 
     def __init__(self, bias: Vector3, *, refine: bool) -> None:
@@ -142,7 +154,11 @@ class GyroCalibration:
             )
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:
-        """Add a reading in SI units: ``rate`` with the gyro's bias, ``force`` without its bias."""
+        """Add a reading of the IMU in SI units.
+
+        ``rate`` includes the gyro's bias. The accelerometer's bias is already subtracted from
+        ``force``.
+        """
         look = self._look
         if stamp_s - look.last_s > GAP_S:
             look = self._look = Look()
@@ -152,7 +168,7 @@ class GyroCalibration:
             self._conclude()
 
     def displaced(self, dx_m: float, dy_m: float, dyaw_rad: float) -> None:
-        """Add a displacement that the wheels report, in any axes, as evidence of motion or rest."""
+        """Add a displacement of the wheels, which shows motion or rest. Its axes do not matter."""
         self._look.displaced(dx_m, dy_m, dyaw_rad)
 
     def _conclude(self) -> None:

@@ -30,7 +30,7 @@ Counts = tuple[int, int, int]
 
 
 def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
-    """Return advice on the settings; empty if ``gravity_mps2`` is near the true gravity."""
+    """Return advice on the settings if the measured gravity is wrong; otherwise empty."""
     if abs(gravity_mps2 / STANDARD_GRAVITY - 1.0) <= ACCEL_TOLERANCE:
         return ""
     wrong = f"at rest the accelerometer measures {gravity_mps2:.2f} m/s² instead of gravity: "
@@ -43,7 +43,10 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImuScale:
-    """Conversion for two given ranges: keys of ACCEL_COUNTS_PER_G and GYRO_COUNTS_PER_DPS."""
+    """The conversion for one range of the accelerometer and one range of the gyro.
+
+    The ranges are keys of ACCEL_COUNTS_PER_G and GYRO_COUNTS_PER_DPS.
+    """
 
     accel_range_g: int = 2
     gyro_range_dps: int = 250

@@ -1,16 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outlier filter: rejects physically impossible readings, though their frames are valid.
+"""The outlier filter: it rejects physically impossible readings, though their frames are valid.
 
-Two things are impossible: a displacement faster than the robot can move, and a spike. A spike is a
-single reading that leaps away from all earlier readings, while the next reading leaps back. A leap
-that lasts, or that is followed by more leaps, is a real shock. So a reading that leaps waits for
-the next one of its kind, which shows whether to release or to reject it. Poses after a waiting
-displacement wait as well; nothing else ever waits.
+Two kinds of readings are impossible: a displacement faster than the robot can move, and a spike. A
+spike is a single reading that leaps away from all earlier readings, while the next reading leaps
+back. A leap that lasts, or that is followed by more leaps, is a real shock. So a reading that leaps
+waits for the next reading of its kind, which shows whether to release or to reject it. Poses that
+arrive after a waiting displacement wait as well. No other reading ever waits.
 
-A knock may move one axis of an accelerometer for a single reading, and such a reading is real. So a
-spike in one axis of an accelerometer is rejected only if it has the size of a bit: a flipped bit
-changes a word by its full scale, a half of it, a quarter, and so on.
+A knock on the robot may change one axis of an accelerometer for a single reading, and this reading
+is real. So a spike in one axis of an accelerometer is rejected only if it has the size of a bit. A
+flipped bit changes a word by its full scale, a half of it, a quarter, and so on.
 
 A reading of a board's own odometry is rejected only if it contains NaN or infinity. A rejected
 displacement is treated like a displacement that was lost on the line. This module knows readings
@@ -37,32 +37,35 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""Ratio of a change to the largest recent step. A change can be a spike only above this ratio."""
+"""A change can be a spike only if it is more than this many times the largest recent step."""
 CALMING: Final = 0.95
 """Factor by which the stored largest recent step shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Fraction of a leap of an IMU value, which is used for two conditions. A leap of an acceleration
-can be a spike only if every other value of the IMU changes by less. The leap was a spike only if
-the next reading returns: each value then differs from its value before the leap by at most this
-fraction of the leap."""
+"""Two conditions of a spike in the IMU's values, as a fraction of the leap.
+
+* At the leap of an acceleration, every other value of the IMU changes by at most this fraction.
+* The next reading returns: each value then differs by at most this fraction from its value before
+  the leap.
+"""
 END_OF_SCALE: Final = 0.99996
-"""Fraction of full scale from which a value is regarded as the end of the scale. It is just below
-that of the largest positive word."""
+"""A value from this fraction of full scale on is regarded as the end of the scale. The largest
+positive word is just above it."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a leaping displacement, and the poses after it."""
 BACK: Final = 0.25
-"""Fraction of a leap of a displacement: the leap was a spike only if the next displacement differs
-from the one before the leap by at most this fraction."""
+"""A leap of a displacement was a spike only if the next displacement returns. It then differs from
+the displacement before the leap by at most this fraction of the leap."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    ``force_step_mps2``: a change of specific force between two readings up to this value is never
-    regarded as a spike. ``full_scale_mps2``: full scale of the accelerometer; infinite if its
-    readings are not integers.
+    * ``force_step_mps2``: largest change of the specific force between two readings that is never
+      regarded as a spike.
+    * ``full_scale_mps2``: full scale of the accelerometer; infinite if its readings are not
+      integers.
     """
 
     fastest_mps: float = 2.0
@@ -85,10 +88,11 @@ class Refused:
 class OutlierFilter:
     """Rejects implausible readings, and holds a reading that leaps until the next one arrives.
 
-    ``limits`` may be replaced at any time; ``tick_s``: time between two ImuReadings in s.
-    ``corrected``: whether displacements are steps of the board's own estimate, which leaps when the
-    board corrects it. If they are, an impossible step is not rejected, but passed on with
-    ``measured`` False.
+    * ``limits``: may be replaced at any time.
+    * ``tick_s``: time between two ImuReadings, in s.
+    * ``corrected``: whether displacements are steps of the board's own estimate, which leaps when
+      the board corrects it. If so, an impossible step is not rejected, but passed on with
+      ``measured`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -198,7 +202,7 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading; for a pose, ``reading.lost`` includes the rejected displacements.
+        """Return the reading. If it is a pose, its ``lost`` includes the rejected displacements.
 
         Only their number is added, because the pose already includes their motion.
         """
@@ -223,9 +227,11 @@ class OutlierFilter:
 class _Spikes:
     """Finds spikes in a series of readings, each of which is a list of values.
 
-    The caller has divided each value by the change that is always allowed. ``left``: a leap was a
-    spike only if at most this fraction of it remains in the next reading. ``knocked``: number of
-    values at the start of the list that a knock of the robot may change for a single reading.
+    The caller has divided each value by the change that is always allowed.
+
+    * ``left``: a leap was a spike only if at most this fraction of it remains in the next reading.
+    * ``knocked``: number of values, at the start of the list, that a knock on the robot may change
+      for a single reading.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -244,8 +250,8 @@ class _Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the previous values were a spike, and whether these values leap.
 
-        ``periods``: number of periods since the previous values; ``topmost_bit``: size of the
-        highest bit, for the values that a knock may move.
+        * ``periods``: number of periods since the previous values.
+        * ``topmost_bit``: size of the highest bit, for the values that a knock may change.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False
@@ -275,10 +281,10 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether a flipped bit can cause the step; recent variation is the tolerance.
+        """Return whether a flipped bit can explain the step, within the recent variation.
 
         ``value``: magnitude after the step. At the end of the scale the result is False, because a
-        knock of the robot can cause such a value.
+        knock on the robot can also cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

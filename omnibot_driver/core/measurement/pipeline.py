@@ -2,9 +2,9 @@
 
 """The measurement pipeline: readings are stamped, checked, integrated, corrected and counted.
 
-It combines the board's clock, the outlier filter, odometry and the IMU. It does not know commands
-or modes. IMU readings are processed at once by ``hear``; other readings wait for ``flush``. So IMU
-readings need not wait until the other readings are processed.
+``hear`` processes IMU readings at once. Other readings wait for ``flush``, so that they do not
+delay the IMU readings. This module knows the board's clock, the outlier filter, the odometry and
+the IMU; it does not know commands or modes.
 """
 
 from collections.abc import Sequence
@@ -87,11 +87,11 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that these readings complete; ``now``: their arrival time.
+        """Return the IMU estimates that these readings complete. ``now`` is their time of arrival.
 
-        Other readings wait for ``flush``, and IMU readings after them wait too, to keep the order.
-        Most reads of a board with an IMU bring one IMU reading and nothing else. Such a reading is
-        processed without lists, which is faster.
+        Other readings wait for ``flush``. IMU readings that come after them wait too, to keep the
+        order. Most reads of a board with an IMU bring one IMU reading and nothing else. Such a
+        reading is processed without lists, which is faster.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

@@ -21,11 +21,11 @@ from omnibot_driver.core.readings import (
 class StreamStatistics:
     """Counts and sums since the driver began.
 
-    All values only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
+    All values except ``last_gap``, ``same_force`` and ``same_rate`` only grow.
 
-    ``imu_period_s``: period of the IMU readings in s if one clock of the board paces IMU readings
-    and displacements, otherwise None. If it is given, lost IMU readings can be counted by means of
-    the displacements.
+    ``imu_period_s``: period of the IMU readings, in s, if one clock of the board paces IMU readings
+    and displacements. Otherwise None. With this period, the displacements show how many IMU
+    readings were lost.
     """
 
     imu_period_s: float | None = None

@@ -14,10 +14,13 @@ SPREAD_S: Final = 0.2
 
 
 class CorrectionSmoother:
-    """The published ``pose``, which follows the best known pose, ``target``.
+    """Keeps two poses, and moves the published one towards the best known one.
 
-    Corrections of ``pose`` are limited to the room of each step: the largest motion that was
-    possible in the time of the step, minus the robot's own motion.
+    * ``pose``: the published pose.
+    * ``target``: the best known pose.
+
+    Each step leaves room for a correction of ``pose``: the largest motion that was possible in the
+    time of the step, minus the robot's own motion. No correction is larger than this room.
     """
 
     def __init__(self) -> None:
@@ -50,7 +53,7 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` by as much of that as the room allows."""
+        """Move ``target`` by a displacement, and move ``pose`` along as far as the room allows."""
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
         self.move(chord.times(linear, linear, angular), room_m, room_rad)
@@ -71,5 +74,5 @@ class CorrectionSmoother:
 
 
 def _part(wanted: float, room: float) -> float:
-    """Return the fraction, 0 to 1, of the wanted correction that is not larger than the room."""
+    """Return how much of the wanted correction fits into the room, as a fraction from 0 to 1."""
     return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

@@ -1,13 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The uncertainty of the odometry: its sources of error, kept separately.
+"""The uncertainty of the odometry, from three sources of error that are kept separately.
 
 * Errors of the wheels. Slip that varies is a random walk. A wrong wheel size, or constant slip, is
-  the same error in every turn of a wheel: it grows with the distance and cancels on the way back.
-* ``gap``: unreported motion, which a later pose of the board reveals.
-* Known errors that are still being corrected; they are added at their full size.
+  the same error in every turn of a wheel. It grows with the distance, and cancels on the way back.
+* Unreported motion in gaps (``gap``). A later pose of the board reveals this motion.
+* Known errors of the published pose that are still being corrected. They are added at their full
+  size.
 
-This module knows covariances and the wheels' geometry. It does not know frames or boards.
+This module knows covariances and the wheels' geometry; it does not know frames or boards.
 """
 
 import math

@@ -2,11 +2,15 @@
 
 """The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
-The main idea: ``_board`` is the robot's pose in the board's frame. Displacements update it at once,
-and the board's poses correct it. The target of the ``CorrectionSmoother`` is the robot's pose in
-the odometry frame. ``_board`` and this target always move by the same tangent in the body's
-axes, so motion that was lost on the line is recovered with the next pose. This module knows
-SE(2). It does not know bytes, clocks or ROS.
+The estimator keeps the robot's pose in two frames:
+
+* ``_board`` is the pose in the board's frame. Displacements update it at once, and the board's
+  poses correct it.
+* The target of the ``CorrectionSmoother`` is the pose in the odometry frame.
+
+Both always move by the same tangent in the body's axes. So motion that was lost on the line is
+recovered with the next pose of the board. This module knows SE(2); it does not know bytes, clocks
+or ROS.
 """
 
 import math
@@ -24,8 +28,8 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
-"""Longest time, in s of the board's clock, to wait for a pose that gives the heading. Then heading
-0, or that of an unconfirmed pose, is assumed."""
+"""Longest time, in s of the board's clock, to wait for a pose that gives the heading. After this
+time, the driver assumes the heading of an unconfirmed pose, or 0 without such a pose."""
 LONG_GAP_S: Final = 1.0
 """Duration of lost displacements, in s, above which the next displacements wait for a pose that
 shows the lost motion."""
@@ -33,7 +37,8 @@ POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Standard deviation in rad, due to open gaps, from which a heading counts as unknown."""
+"""Standard deviation in rad, due to open gaps. A heading that has at least this deviation counts as
+unknown."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -116,7 +121,10 @@ class Odometry:
         )
 
     def reset(self) -> list[OdometryEstimate]:
-        """Begin the odometry frame at the robot's pose; return estimates that were still due."""
+        """Move the origin of the odometry frame to the robot's present pose.
+
+        Return the estimates of displacements that were still waiting for a pose.
+        """
         self.alignments += 1
         due = []
         if self._board is not None:
@@ -172,10 +180,10 @@ class Odometry:
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
-        """Return ``place``, a pose in the odometry frame, as a pose in the board's frame.
+        """Convert ``place``, a pose in the odometry frame, into a pose in the board's frame.
 
-        Of the two ways to turn to the heading of ``place``, the shorter one is used. None if no
-        pose of the board shows yet where the odometry frame lies in the board's frame.
+        There are two ways to turn to the heading of ``place``; the shorter one is used. Return None
+        if no pose of the board has shown yet where the odometry frame lies in the board's frame.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -198,8 +206,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether a pose is the first one, or shows that the board's frame has changed.
 
-        After a suspected restart, a single pose is enough to decide, if it fits the motion since
-        the restart, or the motion since the last pose before the restart.
+        After a suspected restart of the board, a single pose may be enough. It must fit the motion
+        since the restart, or the motion since the last pose before the restart.
         """
         if self._board is None:
             return confirmed
@@ -252,9 +260,9 @@ class Odometry:
     def _judge(self, told: Pose, confirmed: bool) -> None:
         """Accept a pose that is reachable and expected, or that confirms the last unexpected pose.
 
-        A confirmed pose that is out of reach changes the place of the odometry frame in the board's
-        frame; the odometry itself does not change. Any other pose must be confirmed by the next
-        pose.
+        If a confirmed pose is out of reach, only the place of the odometry frame in the board's
+        frame changes. The odometry itself does not change. Any other pose must be confirmed by the
+        next pose.
         """
         assert self._board is not None
         way = self._board.way_to(told)

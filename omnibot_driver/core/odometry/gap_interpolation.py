@@ -34,8 +34,8 @@ class GapInterpolation:
     ) -> tuple[Pose, Pose]:
         """Return the tangents of the lost displacements and of ``reading``, in the body's axes.
 
-        A tangent is twist x time. ``heading_rad``: heading of the board before the lost
-        displacements. If it is None, the board has never reported a pose, and displacements are
+        A tangent is twist x time. ``heading_rad`` is the heading of the board before the lost
+        displacements. None means that the board has never reported a pose. Displacements are then
         taken to be in body axes.
         """
         last, self.last = self.last, None

@@ -2,8 +2,8 @@
 
 """The gate for the board's poses: accepts a pose that is finite, reachable and as expected.
 
-An unexpected pose must be confirmed by the next one. This module knows poses, speeds and what open
-gaps explain; it does not know what an accepted pose changes.
+An unexpected pose must be confirmed by the next one. This module knows poses, speeds and the
+uncertainty of open gaps; it does not know what an accepted pose changes.
 """
 
 import math
@@ -31,9 +31,9 @@ or 16,000 turns comes from misread bytes."""
 class PoseGate:
     """Decides which poses of the board are accepted.
 
-    * ``proved``: the last accepted pose; None before the first pose is accepted, and
-      after the last one has become invalid.
-    * ``doubted``: the last unexpected pose, which the next pose must confirm; it is moved along
+    * ``proved``: the last accepted pose. None before the first pose is accepted, and after the last
+      one has become invalid.
+    * ``doubted``: the last unexpected pose, which the next pose must confirm. It is moved along
       with the robot. None if no pose is to be confirmed.
     """
 
@@ -81,8 +81,8 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached a pose since the last accepted one.
 
-        ``mps``, ``radps``: largest speeds in m/s and rad/s; ``seconds``: time in addition to
-        the time recorded by ``passed``.
+        * ``seconds``: time in s, in addition to the time recorded by ``passed``.
+        * ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.
         """
         if self.proved is None:
             return False
@@ -95,7 +95,7 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether ``way``, a pose's deviation, can come from rounding or from open gaps.
+    """Return whether rounding or open gaps can explain that a pose deviates by ``way``.
 
     ``gap``: covariance of the motion in open gaps.
     """

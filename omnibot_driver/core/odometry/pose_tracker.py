@@ -2,9 +2,10 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-``PoseTracker`` combines a CorrectionSmoother and an Uncertainty. Inputs are tangents (twist x time)
-in the board's body axes, for the wheel sizes that the board assumes; outputs are in REP-103's axes
-and of true size. This module knows times; it does not know which of the board's reports to believe.
+``PoseTracker`` combines a CorrectionSmoother and an Uncertainty. Its inputs are tangents (twist x
+time) in the board's body axes, computed with the wheel sizes that the board assumes. Its outputs
+are in REP-103's axes, and of true size. This module knows times; it does not know which of the
+board's reports to believe.
 """
 
 from typing import Final
@@ -60,8 +61,8 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent from the robot's pose to ``place``, by the shorter turn.
 
-        ``place`` is in the odometry frame. The tangent is in the board's body axes, for the wheel
-        sizes that the board assumes.
+        ``place`` is in the odometry frame. The tangent is in the board's body axes, computed with
+        the wheel sizes that the board assumes.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
@@ -69,8 +70,9 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time in s between the stamps that the motion can fill. If it is shorter than
-        ``seconds``, the published pose moves only as far as the robot can move in ``stamped_s``.
+        ``stamped_s``: time in s that the stamps of the estimates leave for this motion. If it is
+        shorter than ``seconds``, the published pose moves only as far as the robot can move in
+        ``stamped_s``.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
@@ -81,18 +83,18 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the lost motion of a gap, which a pose has shown, at once instead of gradually."""
+        """Add at once the lost motion of a gap, which a pose of the board has shown."""
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:
-        """Correct the pose by ``tangent`` gradually; remove the uncertainty of all gaps."""
+        """Correct the pose gradually by ``tangent``, and remove the uncertainty of all gaps."""
         if self.uncertainty.gap != NOTHING:  # otherwise it corrects only rounding
             self.rolled += _times(tangent, self._size)
         self.follower.correct(roll(_times(tangent, self._signed_size)))
         self.uncertainty.settle()
 
     def _part(self, tangent: Pose) -> Pose:
-        """Add a tangent to ``rolled`` and the uncertainty; return the tangent in REP-103's axes."""
+        """Add a tangent to ``rolled`` and to the uncertainty; return it in REP-103's axes."""
         self.rolled += _times(tangent, self._size)
         signed = _times(tangent, self._signed_size)
         self.uncertainty.move(self.follower.target.yaw_rad, signed)
