@@ -61,7 +61,6 @@ def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[s
 
 
 def _ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, Any]:
-    """Return the values of the changed parameters that are the driver's own."""
     return {item.name: item.value for item in changed if item.name in table.by_name}
 
 

@@ -29,7 +29,8 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longest wait for a thread to end, in s. A guard takes less time to repeat Stop."""
+"""Longest wait for a thread to end, in s. The reader may have to wait until the guard has repeated
+Stop, which takes less."""
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board's proof takes
 longer, the driver waits that long. Without a proof, the guard then repeats Stop."""

@@ -51,7 +51,7 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 """State of the wheels, in three parts.
 
 * Sum of the robot's displacements along its own axes, in m and rad.
-* Angle of each wheel, in rad. It counts all turns.
+* Angle by which each wheel has turned in total, in rad.
 * Rate of each wheel, in rad/s. Empty if unknown.
 """
 
@@ -173,7 +173,10 @@ def joint_state_message(wheels: Wheels, stamp: Time, settings: MessageSettings) 
 def diagnostic_message(
     statuses: Sequence[Status], stamp: Time, node_name: str, hardware_id: str
 ) -> DiagnosticArray:
-    """Return a ``/diagnostics`` message, with names of statuses as in diagnostic_updater."""
+    """Return a ``/diagnostics`` message.
+
+    The names of its statuses have the form that diagnostic_updater gives them.
+    """
     return DiagnosticArray(
         header=Header(stamp=stamp),
         status=[

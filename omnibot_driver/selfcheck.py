@@ -2,9 +2,10 @@
 
 """Advice on settings of the computer and of other nodes that disturb the driver.
 
-This module checks the adapter of an open port, the clock, nodes of the same name, and publishers of
-another type. It reads sysfs; it does not use pyserial, ROS or a board. If a port cannot be opened,
-for example because of its permissions, ``transports`` reports the reason.
+This module checks the USB adapter of an open port, the clock, nodes of the same name, and
+publishers of ``cmd_vel`` with another message type. It reads sysfs; it does not use pyserial, ROS
+or a board. If a port cannot be opened, for example because of its permissions, ``transports``
+reports the reason.
 """
 
 from collections.abc import Iterable
@@ -45,7 +46,7 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
 
 
 def clock_advice(port: str, use_sim_time: bool) -> str:
-    """Return a warning about simulated time for a board that runs in real time; otherwise empty."""
+    """Return a warning if the board runs in real time but the node does not; otherwise empty."""
     if not use_sim_time or port.lower().startswith(WITHOUT_CLOCK):
         return ""
     return (

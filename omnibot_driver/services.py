@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The services under the node's name. None of them blocks other callbacks while it waits."""
+"""The services in the node's own namespace, ``~/``.
+
+While a service waits for its answer, it does not block other callbacks.
+"""
 
 import threading
 from collections.abc import Callable

@@ -59,7 +59,7 @@ class SharedSession:
         self.leaving = False
         """Whether the link is about to end."""
         self.on_exit: OnExit = "stop"
-        """State in which the link leaves the board when it ends."""
+        """What the board is sent when the link ends, in addition to Stop."""
         self.told = False
         """Whether the last Stop was written to every line. It is written when the link ends, or
         later if the port was lost while the robot drove."""

@@ -148,7 +148,7 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Return whether this sender may have sent ``number``: a number above its last one."""
+        """Return whether this sender may have sent ``number``. A sender's numbers only grow."""
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
@@ -160,7 +160,6 @@ class _Sender:
         return late_s if late_s >= 0.0 else -CLOCK_RETREATS * late_s
 
     def hear(self, differences_s: Differences, at_s: float, longest_s: float) -> float:
-        """Record a message and return its delay in s."""
         self.heard += 1
         return min(
             offset.hear(difference_s, at_s, longest_s)
@@ -182,7 +181,6 @@ class _Offset:
         return difference_s - self._least_s - drift_s
 
     def hear(self, difference_s: float, at_s: float, longest_s: float) -> float:
-        """Update the offset with a message, and return the message's delay in s."""
         late_s = self.late_s(difference_s, at_s)
         if late_s > longest_s:
             return self._hear_late(difference_s, at_s, late_s)

@@ -253,11 +253,11 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the packets that the guard sends when this process hangs: one item for each case.
+        """Return what the guard sends if this process hangs: without, and with a latched e-stop.
 
-        The first item is Stop. The second item is the emergency stop and then Stop, for the case
-        that the e-stop is latched. This method is called after each input and before each output,
-        because the right packets may depend on the board's state.
+        The first item is Stop. The second item is the emergency stop and then Stop. This method is
+        called after each input and before each output, because the right packets may depend on the
+        board's state.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -19,7 +19,7 @@ from omnibot_driver.core.safety import SafetyStops
 
 
 class Inbound:
-    """Passes what the board sends to ``measurement``, ``safety`` and ``reporter``."""
+    """Passes the board's readings on to ``measurement``, ``safety`` and ``reporter``."""
 
     def __init__(
         self,
@@ -98,7 +98,7 @@ class Inbound:
     def elapse(self, now: float) -> None:
         """Process readings that follow from time alone, such as predicted odometry.
 
-        OdometryReadings and NoticeReadings do not show that the board is alive.
+        OdometryReadings and NoticeReadings from elapsed time do not show that the board is alive.
         """
         before = self._board.mode
         readings = self._board.elapse(now)

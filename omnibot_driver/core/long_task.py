@@ -35,8 +35,8 @@ class LongTask:
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
         """Begin a task that may take ``limit_s``; ``token`` identifies it in the answer.
 
-        ``name`` is used in messages after the word "a". Raises RequestRefused if another task is in
-        progress.
+        ``name`` is the noun in messages such as "a recording is under way". Raises RequestRefused
+        if another task is in progress.
         """
         if self.active:
             raise RequestRefused(

@@ -24,8 +24,8 @@ PAUSE_RETRY_S: Final = 1.5
 sends a notice every second, so data without a notice for this time shows that the command was
 lost."""
 FLOWING_S: Final = 0.1
-"""Largest contribution, in s, of one pause between receptions to the measured time of uninterrupted
-data. A running board sends every 10 ms, so a longer pause is an interruption."""
+"""Longest time between two receptions, in s, that counts in full as uninterrupted data. Of a longer
+time only this part counts. A running board sends every 10 ms."""
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command, or the notice of a paused board, takes to arrive. A notice
 that arrives sooner than this after a command may have been sent before the board obeyed. If data

@@ -159,10 +159,10 @@ class SampleBoundary:
 
     * ``ahead``: number of samples (0 or 1) of which at least a part came after the last ImuReading.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
-    * ``latest_s``: longest time, in s after the read, until the last sample is complete; 0 if it is
+    * ``latest_s``: longest time, in s, from the read until the last sample is complete; 0 if it is
       complete already.
-    * ``earliest_s``: shortest time, in s after the read, until the incomplete sample is complete.
-      Without an incomplete sample, it is the time until the next one is complete.
+    * ``earliest_s``: shortest time, in s, from the read until another sample can be complete. If a
+      sample is incomplete, it is this one.
     """
 
     ahead: int

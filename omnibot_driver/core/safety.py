@@ -41,7 +41,7 @@ BUTTON_HELD: Final = (
 
 
 class SafetyStops:
-    """The safety stops of a session, reported to ``reporter``."""
+    """Stops the robot for safety, and reports this to ``reporter``."""
 
     def __init__(
         self,

@@ -2,9 +2,9 @@
 
 """A session with one board: it takes bytes and commands, and gives measurements and packets.
 
-The caller calls an input method. Then it passes ``take_output`` to the port, and ``take_events`` to
-its own caller. It calls ``tick`` at ``wake_at``. A session is not thread-safe, reads no clock and
-does not log: everything that a user should know is an event.
+The caller calls an input method. Then it passes the result of ``take_output`` to the port, and the
+result of ``take_events`` to its own caller. It calls ``tick`` at ``wake_at``. A session is not
+thread-safe, reads no clock and does not log: everything that a user should know is an event.
 
 This module connects the parts of a session, and holds no state of its own. It does not know bytes
 or threads. The parts are:
@@ -198,7 +198,7 @@ class Session:
     ) -> None:
         """Command a body velocity.
 
-        If it raises CommandRefused, the earlier command stays in effect.
+        If this method raises CommandRefused, the earlier command stays in effect.
 
         * ``age_s``: age of the command in s, from its sender's stamp; negative for a stamp in the
           future.
@@ -210,13 +210,16 @@ class Session:
             self._reporter.set_to_zero(sideways=sideways, planar=planar)
 
     def command_wheels(self, rates_radps: Sequence[float], now: float) -> None:
-        """Command wheel rates. If it raises CommandRefused, the earlier command stays in effect."""
+        """Command wheel rates, in rad/s.
+
+        If this method raises CommandRefused, the earlier command stays in effect.
+        """
         self._command(self._commanding.wheels(rates_radps, now), now)
 
     def command_pose(self, goal: Pose, now: float) -> None:
         """Command a pose in the odometry frame.
 
-        If it raises CommandRefused, the earlier command stays in effect.
+        If this method raises CommandRefused, the earlier command stays in effect.
         """
         self._command(self._commanding.pose(goal), now)
 
@@ -246,8 +249,8 @@ class Session:
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
         """Begin a task that takes the board a long time; a RequestDone answers within ``limit_s``.
 
-        ``name`` is used in messages after the word "a". Raises RequestRefused at once if the task
-        cannot begin.
+        ``name`` is the noun in messages such as "a recording is under way". Raises RequestRefused
+        at once if the task cannot begin.
         """
         if reason := self.interlocks.why_not_task():
             raise RequestRefused(reason)

@@ -16,8 +16,8 @@ from omnibot_driver.core.requests import OnExit
 class Shutdown:
     """The steps of a shutdown, in the order of their calls.
 
-    * ``begin``, then wait until ``stands``.
-    * ``fall_silent``; if it returns True, wait until ``stands`` once more.
+    * Call ``begin``, then wait until ``stands`` is True.
+    * Call ``fall_silent``. If it returns True, wait until ``stands`` is True once more.
     * Write the packets of ``sequence``.
     """
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The capabilities of a kind of board: fixed at construction, never computed for each frame."""
+"""The capabilities of a kind of board, which are fixed when the board object is made."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -150,5 +150,4 @@ class CommandPolicy:
 
     @property
     def _stopping_s(self) -> float:
-        """Time for which Stop is repeated, in s."""
         return STOPPING_S if self.proof.proved else self._unproved_s

@@ -23,9 +23,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: largest allowed growth of the distance in m, and of the angle in
-rad, to a goal. No controller overshoots that far, so beyond these limits the robot is driving away
-from the goal."""
+"""``LEAVING_M``, ``LEAVING_RAD``: limits for how much farther from a goal the robot may get than it
+was before, in m and rad. No controller overshoots that far, so beyond these limits the robot is
+driving away from the goal."""
 
 
 class Authority(Enum):
@@ -37,7 +37,7 @@ class Authority(Enum):
 
 
 class Setpoint(Protocol):
-    """A command that is current until it expires or is replaced."""
+    """A command that is in effect until it expires or is replaced."""
 
     @property
     def authority(self) -> Authority:
@@ -143,7 +143,7 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: ``Odometry.alignments`` at the time of the command; identifies the
+    * ``alignment``: value of ``Odometry.alignments`` at the time of the command. It identifies the
       relation between the two frames.
     * ``check``: an actuator's method that raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.

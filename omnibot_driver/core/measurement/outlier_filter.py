@@ -42,11 +42,10 @@ CALMING: Final = 0.95
 """Factor by which the stored largest recent step shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Two conditions of a spike in the IMU's values, as a fraction of the leap.
+"""Fraction of a leap of the IMU's values. The leap is a spike only under two conditions.
 
-* At the leap of an acceleration, every other value of the IMU changes by at most this fraction.
-* The next reading returns: each value then differs by at most this fraction from its value before
-  the leap.
+* If an acceleration leaps, every other value of the IMU changes by at most this fraction.
+* With the next reading, every value returns to its value before the leap, up to this fraction.
 """
 END_OF_SCALE: Final = 0.99996
 """A value from this fraction of full scale on is regarded as the end of the scale. The largest
@@ -303,5 +302,4 @@ def _is_finite(reading: OdometryReading) -> bool:
 
 
 def _steps(before: Sequence[float], after: Sequence[float]) -> Iterator[float]:
-    """Return the absolute change of each value."""
     return map(abs, map(sub, after, before))

@@ -36,7 +36,7 @@ class StreamStatistics:
     lost_imu: int = 0
     lost_displacements: int = 0
     gaps: int = 0
-    """Number of times that one or more displacements in a row were lost."""
+    """Number of gaps. In each gap, one displacement or several in a row were lost."""
     last_gap: int = 0
     """Number of displacements that were lost in the last gap."""
     reads: int = 0

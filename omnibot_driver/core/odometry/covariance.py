@@ -122,8 +122,8 @@ class Uncertainty:
         self.gap = NOTHING
         self._walk = Covariance()
         self._levers: list[tuple[float, float, float]] = []
-        """For each wheel: error of the pose (m, m, rad), divided by the wheel's relative size
-        error."""
+        """For each wheel: the error of the pose (m, m, rad) that a relative size error of 1 would
+        cause."""
 
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
