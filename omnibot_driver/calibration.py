@@ -18,7 +18,7 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.parameters import Table, Value
 
 RECORDED: Final = ("imu_rpy", "step")
-"""Names that ``calibrate`` writes for people who read the file; the driver ignores them."""
+"""Names that ``calibrate`` writes for people who read the file. The driver ignores them."""
 
 
 def locate(file: str) -> Path:

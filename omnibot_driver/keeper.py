@@ -128,7 +128,7 @@ class Keeper:
         return "the guard process hung"
 
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill the guard without waiting for its end; later heartbeats check whether it has ended.
+        """Kill the guard without waiting for its end. Later heartbeats check whether it has ended.
 
         Waiting for a guard in an uninterruptible sleep would delay the e-stop, because the e-stop
         needs the lock that the caller holds.

@@ -243,7 +243,7 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 
 
 def age(stamp: Time, now_ns: int) -> float:
-    """Return the age of a stamp, in s; 0 for a stamp of zero.
+    """Return the age of a stamp, in s. A stamp of zero has the age 0.
 
     ``now_ns``: present time of the clock that made the stamp, in ns.
     """
@@ -252,7 +252,7 @@ def age(stamp: Time, now_ns: int) -> float:
 
 
 def is_stamped(stamped: TwistStamped) -> bool:
-    """Return whether the sender has set the stamp; a stamp of zero means that it has not."""
+    """Return whether the sender has set the stamp. A stamp of zero is not set."""
     stamp = stamped.header.stamp
     return bool(stamp.sec or stamp.nanosec)
 

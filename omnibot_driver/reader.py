@@ -177,7 +177,7 @@ class Reader:
             self._shared.tell_guard()
 
     def _count(self, port: Transport, now: float) -> None:
-        """Read the kernel's count of losses every COUNT_EVERY_S; the caller holds the lock."""
+        """Read the kernel's count of losses every COUNT_EVERY_S. The caller holds the lock."""
         if now < self._count_at:
             return
         self._count_at = now + COUNT_EVERY_S

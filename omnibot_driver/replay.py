@@ -138,7 +138,7 @@ class Replay:
         self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
-        """Call ``Session.tick`` as needed until ``end_s``; return False if ``close`` interrupts."""
+        """Call ``Session.tick`` as needed until ``end_s``. Return False if ``close`` interrupts."""
         while (due_s := self._due()) < end_s:
             if not self._pass(due_s):
                 return False

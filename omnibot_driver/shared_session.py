@@ -147,7 +147,7 @@ class SharedSession:
             self.outbox.put(partial(self._deliver, events))
 
     def write(self, packets: Packets) -> None:
-        """Write packets to the open port; if that fails, the reader opens the port again."""
+        """Write packets to the open port. If that fails, the reader opens the port again."""
         if not packets or self.port is None or self.write_error is not None:
             return
         try:

@@ -22,7 +22,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Mode(Enum):
-    """The mode of a board, as shown by its data; each value is the mode's public name."""
+    """The mode of a board, as shown by its data. Each value is the mode's public name."""
 
     UNKNOWN = "connecting"
     PAUSED = "paused"
@@ -69,7 +69,7 @@ class ReadingClock(Protocol):
 
     @property
     def skew_ppm(self) -> float:
-        """Rate error of the board's clock in ppm; positive if it is faster than the host's."""
+        """Rate error of the board's clock, in ppm. It is positive if the clock is too fast."""
 
     def restart(self) -> None:
         """Forget all earlier readings, because a new stream of readings begins."""
@@ -156,7 +156,7 @@ class Board(Protocol):
         """
 
     def flush(self, now: float) -> list[Reading]:
-        """Decode the bytes that are still held when the line is closed; return their readings."""
+        """Decode the bytes that are still held when the line is closed. Return their readings."""
         return []
 
     def silence(self) -> None:
@@ -184,7 +184,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that follow from elapsed time; called at ``wake_at``.
+        """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
         An OdometryReading or a NoticeReading from this method does not show that the board is
         alive. Any other reading does.
@@ -216,14 +216,14 @@ class Board(Protocol):
         """
 
     def start_requested(self) -> None:
-        """Record that the user has requested a start; called before ``start``.
+        """Record that the user has requested a start. Called before ``start``.
 
         The driver also calls ``start`` by itself, for example after a reconnect.
         """
         return
 
     def start(self) -> Packets:
-        """Return the packets that make the board run, whatever its mode; may be sent repeatedly."""
+        """Return the packets that make the board run in any mode. They may be sent repeatedly."""
         return NO_PACKETS
 
     def pause(self) -> Packets:
@@ -238,18 +238,18 @@ class Board(Protocol):
         return NO_PACKETS
 
     def reset(self) -> Packets:
-        """Return the packets that reboot the board; its mode is then unknown until data arrives."""
+        """Return the packets that reboot the board. Its mode is then unknown until data arrives."""
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Return the packets that stop the robot; they may depend on the robot's motion."""
+        """Return the packets that stop the robot. They may depend on the robot's motion."""
 
     def emergency_stop(self) -> Packets:
         """Return the board's own emergency stop, without Stop; empty if the board has none."""
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """Return the packets that switch off devices other than the wheels; sent after Stop."""
+        """Return the packets that switch off devices other than wheels. They are sent after Stop."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:

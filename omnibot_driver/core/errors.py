@@ -21,7 +21,7 @@ class RequestRefused(OmniBotError):
 
 
 class CommandRefused(OmniBotError):
-    """A motion command that is rejected; it has no effect."""
+    """A motion command that is rejected and has no effect."""
 
 
 class LinkError(OmniBotError):

@@ -26,7 +26,7 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """A measurement that only one kind of board makes; the profile of that board publishes it.
+    """A measurement that only one kind of board makes. The profile of that board publishes it.
 
     ``stamp_s``: time of measurement, in s of the host's steady clock.
     """

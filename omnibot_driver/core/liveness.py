@@ -42,7 +42,7 @@ class Liveness:
         return now - self.heard_at >= self.unheard_s
 
     def fell_silent(self, now: float) -> bool:
-        """Return whether a silence has just exceeded ``silence_s``; True once for each silence."""
+        """Return whether a silence has just exceeded ``silence_s``. True once for each silence."""
         if self._silent_since == self.heard_at or now - self.heard_at < self.silence_s:
             return False
         self._silent_since = self.heard_at

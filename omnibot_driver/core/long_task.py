@@ -33,7 +33,7 @@ class LongTask:
         return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task that may take ``limit_s``; ``token`` identifies it in the answer.
+        """Begin a task that may take ``limit_s``. ``token`` identifies it in the answer.
 
         ``name`` is the noun in messages such as "a recording is under way". Raises RequestRefused
         if another task is in progress.
@@ -50,13 +50,13 @@ class LongTask:
         return self.active and self._token is token
 
     def end(self, token: object, success: bool, message: str) -> None:
-        """End the task as done or failed; no effect if the task has already ended."""
+        """End the task as done or failed. This has no effect if the task has already ended."""
         if self.is_current(token):
             self.answers.append(RequestDone(token, success, message))
             self._token, self._begun_at, self.wake_at = None, math.inf, math.inf
 
     def give_up(self, reason: str) -> None:
-        """Fail the task with a reason; no effect without a task."""
+        """Fail the task with a reason. This has no effect without a task."""
         if self.active:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 

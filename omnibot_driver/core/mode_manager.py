@@ -37,7 +37,7 @@ RESET_WITHIN_S: Final = 9.5
 
 
 class Phase(Enum):
-    """The state of the exchange with the board; motion is accepted only in SETTLED."""
+    """The state of the exchange with the board. Motion is accepted only in SETTLED."""
 
     CLOSED = "not connected"
     SETTLED = "settled"
@@ -47,7 +47,7 @@ class Phase(Enum):
 
 
 class Wanted(Enum):
-    """The mode that the board should be in; a reconnect or a failed request does not change it."""
+    """The mode that the board should be in. A reconnect or a failed request does not change it."""
 
     ANY = "as it is"
     RUNNING = "running"
@@ -119,7 +119,7 @@ class ModeManager:
         self._answer(False, why)
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Begin a request; its answer appears in ``answers``.
+        """Begin a request. Its answer appears in ``answers``.
 
         Raises RequestRefused at once if the request cannot begin. ``token`` identifies the request
         in the answer.

@@ -22,5 +22,5 @@ def packed(data: bytes, channel: int = 0) -> Packets:
 
 
 def joined(packets: Packets) -> bytes:
-    """Return the bytes of all packets, concatenated; for boards with one channel."""
+    """Return the bytes of all packets of a board with one channel, concatenated."""
     return b"".join([data for _, data in packets])

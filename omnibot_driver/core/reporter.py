@@ -27,7 +27,7 @@ from omnibot_driver.core.reporting.notices import (
 )
 
 NEWS_EVERY_S: Final = 0.1
-"""Shortest time between two searches for news, in s; a search at every read would be too slow."""
+"""Shortest time between two searches for news, in s. A search at every read would be too slow."""
 DISCONNECTED: Final = "disconnected"
 
 
@@ -61,7 +61,7 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """Values from which ``shown`` was computed; ``shown`` is computed again if they change."""
+        """Values from which ``shown`` was computed. It is computed again if they change."""
 
     @property
     def state(self) -> str:

@@ -19,7 +19,7 @@ class Request(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RequestDone:
-    """The answer to a request; ``token`` is what the caller passed with the request."""
+    """The answer to a request. ``token`` is what the caller passed with the request."""
 
     token: object
     success: bool

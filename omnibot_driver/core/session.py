@@ -224,7 +224,7 @@ class Session:
         self._command(self._commanding.pose(goal), now)
 
     def request(self, request: Request, token: object, now: float) -> None:
-        """Start, pause or reset the board; a RequestDone answers later.
+        """Start, pause or reset the board. A RequestDone answers later.
 
         Raises RequestRefused at once if the request is not possible now.
         """
@@ -238,7 +238,7 @@ class Session:
             self._commands.halt(now)
 
     def calibrate_gyro(self, token: object, now: float) -> None:
-        """Measure the gyro's bias; a RequestDone answers later.
+        """Measure the gyro's bias. A RequestDone answers later.
 
         Raises RequestRefused at once if a measurement is not possible now.
         """
@@ -247,7 +247,7 @@ class Session:
         self._calibration.measure(token, now)
 
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task that takes the board a long time; a RequestDone answers within ``limit_s``.
+        """Begin a task that takes the board a long time. A RequestDone answers within ``limit_s``.
 
         ``name`` is the noun in messages such as "a recording is under way". Raises RequestRefused
         at once if the task cannot begin.
@@ -261,7 +261,7 @@ class Session:
         return self._task.is_current(token)
 
     def end_task(self, token: object, success: bool, message: str) -> None:
-        """End the task as done or failed; no effect if the task has already ended."""
+        """End the task as done or failed. This has no effect if the task has already ended."""
         self._task.end(token, success, message)
 
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:

@@ -24,15 +24,15 @@ class Traits:
     * ``silence_s``: time without data, in s, after which the mode of the board is unknown.
     * ``own_odometry``: whether OdometryReadings give the robot's pose. If they do, displacements
       only show whether the robot obeys. If not, the driver integrates the displacements.
-    * ``stands_after_s``: if displacements show no motion for this time, in s, the robot stands
-      still.
+    * ``stands_after_s``: time without motion in the displacements, in s, that proves a
+      standstill.
     * ``unproved_s``: longest time, in s, for which Stop is repeated while the standstill is not
       shown.
     * ``baudrate``: whether the line has a baud rate to set.
     * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself. Its profile then
       offers ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest time, in s, until the board obeys a stop, if it acknowledges
-      stops.
+    * ``stops_within_s``: longest time, in s, until the board obeys a stop. It is set if the board
+      acknowledges stops.
     * ``slack_mps``, ``slack_radps``: additional tolerance of the motion monitor for the difference
       between measured and commanded velocity, in m/s and rad/s. A board needs it if its
       displacements are coarse, or if its wheels lag while they speed up.

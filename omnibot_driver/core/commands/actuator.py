@@ -16,7 +16,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import Packets
 
 Wanted = Setpoint | Stop | EmergencyStop | None
-"""What the robot should do; None: send nothing."""
+"""What the robot should do. None means: send nothing."""
 
 
 class Actuator(Protocol):
@@ -51,7 +51,7 @@ class Actuator(Protocol):
         """Send ``wanted`` from now on, in place of the previous order."""
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that packets of a request, such as a start, were sent; they command no motion."""
+        """Record that packets of a request, such as a start, were sent. They command no motion."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now, possibly none, and regard them as written."""

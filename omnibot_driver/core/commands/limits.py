@@ -39,7 +39,7 @@ class SpeedLimits:
         )
 
     def allow(self, twist: BodyTwist) -> bool:
-        """Return whether the twist is below the speed limits; False if it has NaN or infinity."""
+        """Return whether the twist is below the speed limits. False if it has NaN or infinity."""
         return (
             twist.vx_mps * twist.vx_mps + twist.vy_mps * twist.vy_mps
             < self.linear_mps * self.linear_mps
@@ -88,7 +88,7 @@ def require_finite(what: str, values: Sequence[float]) -> None:
 def require_timely(what: str, age_s: float, longest_s: float) -> None:
     """Raise CommandRefused if ``age_s``, the age of the sender's stamp, exceeds ``longest_s``.
 
-    For a stamp in the future ``age_s`` is negative; its absolute value has the same limit.
+    For a stamp in the future ``age_s`` is negative. Its absolute value has the same limit.
     """
     if abs(age_s) <= longest_s:
         return
@@ -105,7 +105,7 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Return the vector, shortened to a length of at most ``limit``; never overflows."""
+    """Return the vector, shortened to a length of at most ``limit``. This never overflows."""
     largest = max(map(abs, vector))
     if largest == 0.0:
         return tuple(vector)

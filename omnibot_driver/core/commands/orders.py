@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion orders to a board, in SI units and the board's own axes; values without behaviour.
+"""Motion orders to a board, in SI units and the board's own axes: values without behaviour.
 
 An order has passed every check and limit. The actuator of a board encodes it.
 """

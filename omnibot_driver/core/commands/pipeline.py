@@ -140,7 +140,7 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity. Raises CommandRefused if it is not allowed.
 
-        ``age_s``: age of the command in s, from its sender's stamp; it shortens the time to expiry.
+        ``age_s``: age of the command in s, from its sender's stamp. It shortens the time to expiry.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -155,11 +155,11 @@ class CommandPipeline:
         return self.shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
-        """Return the command to drive to a pose in the odometry frame; it never expires."""
+        """Return the command to drive to a pose in the odometry frame. It never expires."""
         return self.shaper.pose(goal), NEVER
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Record that packets of a request, such as a start, were sent; they command no motion."""
+        """Record that packets of a request, such as a start, were sent. They command no motion."""
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:

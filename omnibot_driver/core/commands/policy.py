@@ -73,7 +73,7 @@ class CommandPolicy:
         self._actuator.rate_hz = settings.rate_hz
 
     def command(self, setpoint: Setpoint, now: float, *, expires_at: float) -> None:
-        """Replace the current command; no effect while the e-stop is latched."""
+        """Replace the current command. This has no effect while the e-stop is latched."""
         if self.latched:
             return
         self.current = setpoint
@@ -91,7 +91,7 @@ class CommandPolicy:
             self._actuator.apply(None, now)
 
     def connect(self, now: float) -> None:
-        """Begin a new connection; a latched e-stop is sent again."""
+        """Begin a new connection. A latched e-stop is sent again."""
         self.current = self._stopping_since = None
         self.proof.begin()
         self._actuator.connect()
@@ -123,7 +123,7 @@ class CommandPolicy:
             self._actuator.apply(EMERGENCY_STOP, now)
 
     def release(self, now: float) -> None:
-        """Release the e-stop; the robot stays stopped until the next command."""
+        """Release the e-stop. The robot stays stopped until the next command."""
         if self.latched:
             self.latched = False
             self.halt(now)

@@ -18,7 +18,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 PACE_S: Final = 0.01
-"""Shortest time between frames, in s; more frequent frames would only fill a buffer."""
+"""Shortest time between frames, in s. More frequent frames would only fill a buffer."""
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
 
@@ -68,7 +68,7 @@ class SetpointStream:
         self.connect()
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the encoding of this order is Stop; a very slow motion rounds to Stop."""
+        """Return whether the encoding of this order is Stop. A very slow motion rounds to Stop."""
         return self._encoder.encode(order) == self._encoder.stop()
 
     def connect(self) -> None:
@@ -79,7 +79,7 @@ class SetpointStream:
         self._said_at = self._fresh_at = self._moved_at = self._stop_at = -math.inf
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the order in effect; if the commanding topic changes, Stop is sent first."""
+        """Replace the order in effect. If the commanding topic changes, Stop is sent first."""
         rested = now - self._stop_at >= PACE_S
         if wanted is None or isinstance(wanted, Stop | EmergencyStop):
             begins = wanted is not self._standing

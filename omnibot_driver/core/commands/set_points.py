@@ -29,7 +29,7 @@ driving away from the goal."""
 
 
 class Authority(Enum):
-    """The topics that can command the robot, by name; the newest command is in effect."""
+    """The topics that can command the robot, by name. The newest command is in effect."""
 
     BASE = "cmd_vel"
     WHEELS = "wheel_cmd"
@@ -106,7 +106,7 @@ class BaseSetpoint:
         return self._order
 
     def check_anew(self) -> None:
-        """Update ``is_zero`` for new settings; end the ramp if its final velocity is now zero."""
+        """Update ``is_zero`` for new settings. End the ramp if its final velocity is now zero."""
         self.is_zero = self._is_zero(Drive(self._wanted))
         if self.is_zero:
             self._setpoint, self.settled = self._wanted, True

@@ -55,7 +55,7 @@ class CommandShaper:
         """Whether the last body velocity had a sideways part that the wheels cannot produce."""
 
     def base(self, twist: BodyTwist, *, before: Setpoint | None, since: float) -> Setpoint:
-        """Return the set-point for a body velocity; ``before``: the set-point to replace."""
+        """Return the set-point for a body velocity. ``before`` is the set-point to replace."""
         if self._control == "position":
             raise self._at_odds(Authority.BASE)
         limited = feasible = self.kinematics.feasible(twist)

@@ -52,7 +52,7 @@ class StopProof:
         self.begin()
 
     def begin(self) -> None:
-        """Discard the proof so far, because the robot's motion is unknown; begin a new proof."""
+        """Discard the proof so far, because the robot's motion is unknown. Begin a new proof."""
         self.proved = self.measured = False
         self._stopped_at = math.inf
         self._still_s, self._still = 0.0, 0
@@ -72,7 +72,7 @@ class StopProof:
 
     @property
     def takes_s(self) -> float:
-        """Time in s to wait for a proof; it depends on the period of the displacements."""
+        """Time in s to wait for a proof. It depends on the period of the displacements."""
         return max(PROOFS * self._needed_s, UNDER_WAY_S + (AT_LEAST + 1) * self._period_s)
 
     def look(self, reading: DisplacementReading, now: float) -> None:

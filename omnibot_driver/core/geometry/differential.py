@@ -15,7 +15,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 @dataclass(frozen=True, slots=True)
 class DifferentialKinematics:
-    """Two wheels of radius ``wheel_radius_m``, ``track_m`` apart; positive rates drive forward."""
+    """Two wheels of radius ``wheel_radius_m``, ``track_m`` apart. Positive rates drive forward."""
 
     wheel_radius_m: float
     track_m: float

@@ -31,7 +31,7 @@ GAP_S: Final = 0.2
 ANSWER_WITHIN_S: Final = 4.0
 """Time in s within which a request is answered.
 
-A service call may take five seconds; the remaining second is for writing a file."""
+A service call may take five seconds. The remaining second is for writing a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
@@ -47,7 +47,7 @@ LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """Largest accepted bias: the initial zero-rate output in the MPU-6050 product specification,
 section 6.1."""
 REFINEMENT: Final = 0.05
-"""Fraction of the bias error that is corrected after each ``BLOCK_S`` at rest; half of the error is
+"""Fraction of the bias error that is corrected after each ``BLOCK_S`` at rest. Half of the error is
 corrected in 14 s."""
 
 
@@ -136,12 +136,12 @@ class GyroCalibration:
         return self.wake_at < math.inf
 
     def measure(self, token: object, now: float) -> None:
-        """Measure the bias in the next two seconds; the answer appears in ``answers``."""
+        """Measure the bias in the next two seconds. The answer appears in ``answers``."""
         self._look = Look()
         self._token, self.wake_at = token, now + ANSWER_WITHIN_S
 
     def give_up(self, reason: str) -> None:
-        """End a running measurement as failed; ``reason``: the cause and a remedy."""
+        """End a running measurement as failed. ``reason`` is the cause with a remedy."""
         if self.wake_at < math.inf:
             self._answer(False, f"gyro bias unchanged: {reason}")
 

@@ -34,7 +34,7 @@ class CorrectionSmoother:
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Move ``target`` by the correction ``chord``; ``pose`` follows within ``spread_s``.
+        """Move ``target`` by the correction ``chord``. ``pose`` follows within ``spread_s``.
 
         ``chord`` is given in the axes of ``target``.
         """

@@ -160,7 +160,7 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """Add a gap in the reports; ``fastest_mps`` and ``fastest_radps`` limit the motion in it.
+        """Add a gap in the reports. ``fastest_mps`` and ``fastest_radps`` limit the motion in it.
 
         The speeds before and after the gap are known. A robot that accelerates and brakes in the
         gap deviates by at most a·t²/4 from motion at constant speed, and never by more than its

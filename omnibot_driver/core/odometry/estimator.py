@@ -182,7 +182,7 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Convert ``place``, a pose in the odometry frame, into a pose in the board's frame.
 
-        There are two ways to turn to the heading of ``place``; the shorter one is used. Return None
+        There are two ways to turn to the heading of ``place``. The shorter one is used. Return None
         if no pose of the board has shown yet where the odometry frame lies in the board's frame.
         """
         if self._board is None or self._restarted is not None or not self._settles:
@@ -223,7 +223,7 @@ class Odometry:
         return confirmed and self._restarted is not None
 
     def _attach(self, told: Pose) -> list[OdometryEstimate]:
-        """Adopt a new frame of the board; the odometry continues from its present pose."""
+        """Adopt a new frame of the board. The odometry continues from its present pose."""
         self._begin_at(self._backlog.before(told))
         estimates = self._release()
         self._belief.believe(told)
@@ -245,7 +245,7 @@ class Odometry:
         return estimates
 
     def _assume(self) -> None:
-        """Assume that the last, unconfirmed pose is right; without any pose, assume heading 0."""
+        """Assume that the last, unconfirmed pose is right. Without any pose, assume heading 0."""
         if self._belief.doubted is not None:
             self._begin_at(self._backlog.before(self._belief.doubted))
         else:

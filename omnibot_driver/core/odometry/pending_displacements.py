@@ -49,7 +49,7 @@ class PendingDisplacements:
 
     @property
     def duration_s(self) -> float:
-        """Sum of the waiting displacements' durations, in s; an unknown duration counts as 0."""
+        """Sum of the waiting displacements' durations, in s. An unknown duration counts as 0."""
         return math.fsum(reading.duration_s or 0.0 for reading, _ in self._waiting)
 
     def unheard_s(self, last_stamp_s: float | None) -> float:

@@ -59,7 +59,7 @@ class PoseGate:
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
-        """Return whether a pose is finite and below the limits; if not, count it as refused."""
+        """Return whether a pose is finite and below the limits. If not, count it as refused."""
         possible = told.finite and told.way_m < FARTHEST_M and abs(told.yaw_rad) < FARTHEST_RAD
         self.refused += not possible
         return possible
