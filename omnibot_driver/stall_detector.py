@@ -77,7 +77,7 @@ class StallDetector:
         self._day_ns = wall_ns - round(now * 1e9)
 
     def outlived_by(self, sent_ns: int, now: float) -> bool:
-        """Return False for a command that may have been sent before or during a recent stall.
+        """Return False if a command may have been sent before or during a recent stall, else True.
 
         ``sent_ns``: time of day at which the command was sent, in ns.
         """

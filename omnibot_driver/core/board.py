@@ -249,7 +249,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """Return the packets that switch off devices other than wheels. They are sent after Stop."""
+        """Return the packets, sent after Stop, that switch off devices other than the wheels."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:

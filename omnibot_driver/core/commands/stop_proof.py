@@ -14,16 +14,16 @@ from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
-"""``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill. They
-are more than two encoder counts of a wheel in 40 ms, and less than the slowest linear command
-(0.014 m/s)."""
+"""``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill. Two
+encoder counts of a wheel in 40 ms are below these speeds. The slowest linear command (0.014 m/s) is
+above them."""
 STILL_S: Final = 0.1
 """Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
 SLACK_S: Final = 1e-6
 """Tolerance for rounding, in s: in floating point, a sum of ten times 0.1 s is less than 1 s."""
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof, even if one lasts long enough: a single displacement
-may be damaged, or may date from before the wheels turned."""
+may be damaged, or may describe the time before the wheels began to turn."""
 PROOFS: Final = 2.0
 """Shortest wait for a proof, as a multiple of the standstill that the proof needs."""
 RAREST_S: Final = 1.0

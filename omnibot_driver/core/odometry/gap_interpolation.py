@@ -22,8 +22,8 @@ NO_WAY: Final = Pose()
 class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after them.
 
-    ``last``: newest tangent (twist x time) in the board's body axes, with its duration in s; None
-    if unknown.
+    ``last``: newest tangent (twist x time) in the board's body axes, and its duration in s. None if
+    unknown.
     """
 
     def __init__(self) -> None:

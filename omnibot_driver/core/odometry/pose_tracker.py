@@ -70,9 +70,8 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time in s that the stamps of the estimates leave for this motion. If it is
-        shorter than ``seconds``, the published pose moves only as far as the robot can move in
-        ``stamped_s``.
+        ``stamped_s``: time between the stamps before and after this motion, in s. If it is shorter
+        than ``seconds``, the published pose moves only as far as the robot can move in this time.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail
