@@ -152,15 +152,21 @@ class Doubt:
         """Add the errors of a turn on the spot that has ended; arguments as in ``turn``."""
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
+    def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
+        """Replace the heading error of the turn that has ended, because its angle is known now.
+
+        The position must not have changed since ``end_turn``. ``spun_rad``: the turn that the wheel
+        has measured; ``told_rad``: the turn that the gyro has measured.
+        """
+        self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
+
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
         """Return the errors of a turn on the spot, from its beginning until now.
 
         ``spun_rad``: the turn that the wheel has measured; ``told_rad``: the turn that the server
         has reported, or None. The robot also moves a little aside if its motors are unequal.
         """
-        variance = (WHEEL_HEADING * spun_rad) ** 2
-        if told_rad is not None:
-            variance = TOLD_TURN_RAD**2 + (TOLD_TURN * told_rad) ** 2
+        variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))
         return anywhere(pivot_m, math.sqrt(variance))
 
@@ -170,6 +176,14 @@ class Doubt:
         size, bias, *others = self._levers
         errors = [(scale, *size), (drift, *bias), *((1.0, *lever) for lever in others)]
         return self._walk.with_errors([*errors, *more])
+
+
+def _by_wheel(spun_rad: float) -> float:
+    return (WHEEL_HEADING * spun_rad) ** 2
+
+
+def _by_gyro(told_rad: float) -> float:
+    return TOLD_TURN_RAD**2 + (TOLD_TURN * told_rad) ** 2
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:

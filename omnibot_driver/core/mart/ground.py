@@ -118,6 +118,8 @@ class Ground:
         self._copies_stopped_s = -math.inf
         self._moved_by: Request | None = None
         self._last_move: Request | None = None
+        self._recorded: Request | None = None
+        self._unrecorded = 0
         self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._blocked: Motion = Motion.NONE

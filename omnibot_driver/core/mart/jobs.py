@@ -41,6 +41,7 @@ class Job(Enum):
     LAST_TURN = "download of the last turn"
     LOG_FILE = "download of the log"
     TIME = "setting of the clock"
+    TURN_RECORD = "reading of the turn's angle"
 
 
 WORD_OF: Final[dict[Job, Word]] = {
@@ -51,9 +52,12 @@ WORD_OF: Final[dict[Job, Word]] = {
     Job.LAST_TURN: words.LAST_TURN,
     Job.LOG_FILE: words.EXIT,
     Job.TIME: words.TIME,
+    Job.TURN_RECORD: words.LAST_TURN,
 }
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
+OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
+"""Jobs that the driver begins by itself, and that give way to a job of the user."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs that may be sent again if the reply is missing."""
 
@@ -64,11 +68,13 @@ class Jobs:
     ``done``: results that the caller has not taken yet; ``logging``: whether LOG was answered with
     ok in this connection; ``log_may_be_lost``: whether the server may have been restarted since
     that reply; ``ended``: whether EXIT was sent, which ends the server; ``moving``: whether the
-    controlled move of the job was sent.
+    controlled move of the job was sent; ``turn_record``: pieces of the last TURN_RECORD, until the
+    caller takes them; empty if the download failed.
     """
 
     def __init__(self) -> None:
         self.done: list[JobDone] = []
+        self.turn_record: list[bytes] | None = None
         self.forget_log()
         self.moving = False
         self._clear()
@@ -115,10 +121,11 @@ class Jobs:
         """Begin a job.
 
         Raises RequestRefused while another job is under way, and for a download of a log that was
-        not started. A new job replaces the driver's own job of setting the clock, unless TIME was
-        already sent.
+        not started. A new job replaces one of the driver's own jobs, unless its command was already
+        sent.
         """
-        if self.job is Job.TIME and not self._waiting:
+        if self.job in OWN and not self._waiting:
+            self.turn_record = []
             self._clear()
         if self.job is not None:
             raise RequestRefused(
@@ -142,9 +149,11 @@ class Jobs:
     def next(self, now: float, *, stands: bool) -> Request | None:
         """Return the job's request if it must be sent now, else None.
 
-        ``stands``: whether measurements have shown that the robot is at rest.
+        ``stands``: whether measurements have shown that the robot is at rest. A TURN_RECORD does
+        not wait for that, because the server has already reported the end of the turn.
         """
-        return self._request if stands and not self._waiting else None
+        ready = stands or self.job is Job.TURN_RECORD
+        return self._request if ready and not self._waiting else None
 
     def sent(self, request: Request, now: float) -> None:
         """Record that the job's request was sent."""
@@ -198,7 +207,8 @@ class Jobs:
             self._pieces.append(data)
             self._piece_s = now + QUIET_S
             if len(self._pieces) * PIECE >= self._size:
-                self._piece_s = now + QUIET_S / 3
+                waits_for_copies = self.job is not Job.TURN_RECORD
+                self._piece_s = now + (QUIET_S / 3 if waits_for_copies else 0.0)
 
     def tick(self, now: float) -> None:
         """End a download that gets no more pieces, or a job that has taken too long."""
@@ -233,5 +243,8 @@ class Jobs:
             self._finish(True, f"{self._name}, {came} bytes{ended}", content=content)
 
     def _finish(self, success: bool, message: str, content: bytes = b"") -> None:
-        self.done.append(JobDone(self._token, success, message, self._name, content))
+        if self.job is Job.TURN_RECORD:
+            self.turn_record = self._pieces
+        else:
+            self.done.append(JobDone(self._token, success, message, self._name, content))
         self._clear()

@@ -92,16 +92,14 @@ class Measuring(Starts):
         _speed, rate = self.odometry.speeds.means
         if self.state is State.STILL:
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
-            if self._moved_by is not None and rested and self.odometry.motion is not Motion.NONE:
-                if self._copies_stopped_s > self._rested_s:
-                    self._discard_goal()
-                else:
-                    moved_m, spun_rad = self.odometry.moved_m, self.odometry.spun_rad
-                    self._surplus.learn(self._moved_by, moved_m, spun_rad)
-                self._moved_by = None
             if rested and self.odometry.motion is not Motion.NONE:
                 self._doubt_a_copy(now)
                 self.odometry.rest()
+                move, self._moved_by = self._moved_by, None
+                if move is not None and self._copies_stopped_s > self._rested_s:
+                    self._discard_goal()
+                elif move is not None:
+                    self._learn_from(move, now)
             self._watch_stray(before, count, now)
         elif self.state is State.TURNING:
             self._turns.seen_radps = rate

@@ -6,14 +6,21 @@ This module knows goals and moves; it does not know when a move may be sent. Tim
 """
 
 import math
+from typing import Final
 
 from omnibot_driver.core.commands.orders import GoTo
+from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.asking import Asking
 from omnibot_driver.core.mart.goal import Done, Move, next_move
+from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
+from omnibot_driver.core.mart.turn_record import recorded_deg
 from omnibot_driver.core.mart.words import Request
+
+UNRECORDED: Final = 2
+"""Number of turns in a row without a usable record after which no more records are downloaded."""
 
 
 class Moves(Asking):
@@ -31,6 +38,8 @@ class Moves(Asking):
         return f"over, {left}" if move.given_up else f"move {move.said}, {left}"
 
     def _next_goal_move(self, order: GoTo, now: float) -> Request | None:
+        if self.jobs.job is Job.TURN_RECORD:
+            return None
         if self._move is None:
             self._move = Move(order.place)
         request = next_move(self._move, self.odometry.pose, self._settings, self._surplus)
@@ -68,6 +77,35 @@ class Moves(Asking):
             self._notice(f"controlled move failed: {reason}{discarded}", halt=True)
             if reply.reason == words.IMU_LOST:
                 self.imu.lost()
+
+    def _learn_from(self, move: Request, now: float) -> None:
+        """Learn by how much a move that has ended goes beyond its target.
+
+        The wheel does not measure a turn exactly, so the driver first downloads the record of the
+        turn. It does not do so on a network that has just lost or delayed datagrams.
+        """
+        turns = move.word in (words.MCR, words.MCL)
+        if turns and self._unrecorded < UNRECORDED and not self.conversation.disturbed(now):
+            try:
+                self.jobs.ask(Job.TURN_RECORD, None, now)
+            except RequestRefused:
+                pass  # the user has called a job
+            else:
+                self._recorded = move
+                return
+        self._surplus.learn(move, self.odometry.moved_m, self.odometry.spun_rad)
+
+    def _use_turn_record(self) -> None:
+        """Correct the heading by the record of the last turn, if its download has ended."""
+        pieces, self.jobs.turn_record = self.jobs.turn_record, None
+        turn, self._recorded = self._recorded, None
+        if turn is None or pieces is None:
+            self._recorded = turn
+            return
+        degrees = recorded_deg(pieces, turn)
+        used = degrees is not None and self.odometry.turn_recorded(degrees)
+        self._unrecorded = 0 if used else self._unrecorded + 1
+        self._surplus.learn(turn, 0.0, self.odometry.spun_rad)
 
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.

@@ -19,6 +19,7 @@ from omnibot_driver.core.mart.ground import (
     STARTS_UP_S,
 )
 from omnibot_driver.core.mart.hearing import Hearing
+from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.required_motion import is_standstill, moving_order
 from omnibot_driver.core.mart.states import (
     HALTS,
@@ -55,15 +56,15 @@ class Pilot(Hearing):
 
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``; a new command cancels the present job."""
-        docks = self.jobs.moving
-        if wanted is not None:
+        docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
+        if not (move and isinstance(order, GoTo) and order.place == move.place):
+            move = None
+        if wanted is not None and not (move and self.jobs.job is Job.TURN_RECORD):
             self.jobs.cancel(
                 "a motion command or a stop arrived; end the commands, then call again"
             )
         if wanted is not self._wanted:
-            order = moving_order(wanted, now)
-            same = self._move and isinstance(order, GoTo) and order.place == self._move.place
-            self._move = self._move.repeated() if self._move and same and not docks else None
+            self._move = move.repeated() if move and not docks else None
             if is_standstill(self._wanted) or is_standstill(wanted):
                 self._blocked = Motion.NONE
         self._wanted = wanted

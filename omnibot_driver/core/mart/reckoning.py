@@ -66,7 +66,7 @@ class Reckoning:
         self.speeds = MeanSpeeds()
         self._motion_rad = self.spun_rad = self.moved_m = 0.0
         self.told_rad: float | None = None
-        self._guessed = False
+        self._guessed = self._may_be_recorded = False
         self.reset()
 
     @property
@@ -83,6 +83,7 @@ class Reckoning:
         self.pose = Pose()
         self.doubt.reset()
         self._begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)
+        self._may_be_recorded = False
 
     def connect(self) -> None:
         """Begin a new connection; the robot may have moved, or the server may have restarted."""
@@ -103,7 +104,7 @@ class Reckoning:
         self.doubt.begin()
         self.heading.begin(now, anew=motion is Motion.REFERENCE)
         self._motion_rad = self.spun_rad = self.moved_m = 0.0
-        self.told_rad, self._guessed = None, False
+        self.told_rad, self._guessed, self._may_be_recorded = None, False, False
 
     def started(self, now: float, *, sure: bool) -> None:
         """Record that the server has acknowledged the start.
@@ -134,7 +135,8 @@ class Reckoning:
         self.doubt.add(way_m**2, turn_rad**2)
         if self._begins_in_move:  # the part of the move before the reset is not known
             self.doubt.add(self.moved_m**2, self.spun_rad**2)
-            self._begins_in_move = False
+        self._may_be_recorded = self.motion is Motion.TURN and not self._begins_in_move
+        self._begins_in_move = False
         self.motion = Motion.NONE
         self.wheel.rest()
         self.slowing_since_s = None
@@ -223,7 +225,7 @@ class Reckoning:
             self._guessed = True
             return wheel_m * (1.0 - ratio) / self._settings.track_m
         turn_rad = wheel_m * (1.0 - (-1.0 if ratio is None else ratio)) / self._settings.track_m
-        told = abs(told_rad - turn_rad) < TOLD_RAD + TOLD_PART * abs(turn_rad)
+        told = not _is_of_another(told_rad - turn_rad, turn_rad)
         if self.motion is Motion.TURN and told:
             turn_rad = told_rad
         self.spun_rad += turn_rad
@@ -251,6 +253,23 @@ class Reckoning:
         self.told_rad = math.radians(degrees) * self._settings.heading_sign
         self._correct_yaw(self.told_rad - self.spun_rad)
 
+    def turn_recorded(self, degrees: float) -> bool:
+        """Correct the heading after a controlled turn by the angle that the server has recorded.
+
+        ``degrees``: this angle, with the server's sign. Returns False, and corrects nothing, if the
+        angle differs too much from the turn measured at the wheel, or if the turn was not the last
+        motion in this odometry frame.
+        """
+        told_rad = math.radians(degrees) * self._settings.heading_sign
+        wrong_rad = told_rad - self.spun_rad
+        if not self._may_be_recorded or _is_of_another(wrong_rad, self.spun_rad):
+            return False
+        self._may_be_recorded = False
+        self._correct_yaw(wrong_rad)
+        self.doubt.turn_recorded(self.spun_rad, told_rad)
+        self.spun_rad = told_rad
+        return True
+
     def _correct_yaw(self, wrong_rad: float) -> None:
         self.pose = Pose(self.pose.x_m, self.pose.y_m, self.pose.yaw_rad + wrong_rad)
         self.rolled += Pose(0.0, 0.0, wrong_rad)
@@ -263,7 +282,7 @@ class Reckoning:
         """
         told_rad = self.told_rad
         wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad
-        if abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(self.spun_rad):
+        if _is_of_another(wrong_rad, self.spun_rad):
             self._correct_yaw(wrong_rad)
             told_rad = None
         self.doubt.end_turn(self.spun_rad, told_rad)
@@ -304,3 +323,11 @@ class Reckoning:
         if self.motion is not Motion.REFERENCE:
             stale_s = 0.0
         return stale_s, ACCELERATION_RADPS2 * stale_s * stale_s / 2
+
+
+def _is_of_another(wrong_rad: float, spun_rad: float) -> bool:
+    """Return whether a reported turn that is wrong by ``wrong_rad`` belongs to another motion.
+
+    ``spun_rad``: the turn that the wheel has measured.
+    """
+    return abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(spun_rad)

@@ -60,6 +60,7 @@ class Starts(Adjusting):
         return NO_PACKETS
 
     def _act_still(self, now: float) -> Packets:
+        self._use_turn_record()
         if setting := self._spin_setting(now):
             return self._ask(setting, now)
         if not self._rolled_out and not self._rescue:
@@ -160,6 +161,7 @@ class Starts(Adjusting):
         self._require(start.word)
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
+        self._recorded = None
         self._start, self._refused = start.word, False
         self._started_s = now
         self.imu.used()

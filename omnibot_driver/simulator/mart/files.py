@@ -50,13 +50,16 @@ class FileNote:
             part = (row + 1) / self.rows
             rate = 100.0 * self.angle_deg / self.rows
             lines.append(f"{10 * (row + 1)},,{rate:.4f},{int(self.encoder * part)}")
-        return ("\r\n".join(lines) + "\r\n").encode("latin-1")
+        return ("\n".join(lines) + "\n").encode("latin-1")
 
 
 def note_of(server: "ServerState", motion: Motion) -> FileNote:
     """Return the data from which the file of a motion is made. The motion must have ended."""
+    record = _turn_record(motion) if motion.kind is Kind.CONTROLLED_SPIN else ()
     head = (
+        *record[:1],
         server.date,
+        *record[1:],
         "Gyro Z bias (\u00b0/sec): 0.000",
         f"Max speed: {motion.speed}",
         f"Direction: {'backward' if motion.backward else 'forward'}",
@@ -73,4 +76,15 @@ def note_of(server: "ServerState", motion: Motion) -> FileNote:
         min(motion.sample_count, ROWS),
         motion.angle_deg,
         server.chassis.encoder,
+    )
+
+
+def _turn_record(motion: Motion) -> tuple[str, ...]:
+    """Return the first lines of the file of a controlled spin, without the date."""
+    return (
+        "MC Spin sensor data log",
+        f"Target motion (\u00b0): {motion.target:.2f}",
+        "Calculated motion (\u00b0):",
+        f"  @ stop detected - {motion.angle_deg:.2f}",
+        f"  @ encoder stop - {motion.angle_deg:.2f}",
     )
