@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART motion controller: one request at a time, in UDP datagrams.
+"""The MART motion controller, a server that the driver commands by UDP datagrams.
 
-The package handles bytes and times only; sockets and ROS are handled elsewhere.
+The driver sends one request at a time. The server replies when the request is complete. This
+package knows bytes and times; it does not know sockets or ROS.
 """
 
 from omnibot_driver.core.mart.replies import Fail, MartDecoder, Ok, Other, parse

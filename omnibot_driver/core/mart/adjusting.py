@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the motors' units while the robot drives, and learning from its speed.
+"""The adjustment of the two motors while the robot drives.
 
-The driver learns how fast each motor turns with its units. This module knows the present motion and
-its measured speed; it does not know how a motion begins or ends. Time is an argument.
+The driver compares the measured speed with the command, and changes the motors' units. It also
+learns from the measurements how fast each motor turns with its units. This module knows the present
+motion and its measured speed; it does not know how a motion begins or ends. The caller passes the
+time.
 """
 
 import math
@@ -17,15 +19,18 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""If the heading has been constant for WAG_S (s), the driver turns the robot a little.
+"""A small turn of the robot, by which the driver tests the IMU while the heading is constant.
 
-It adds WAG_UNITS to the units of the left motor and subtracts them from those of the right one.
-If the turn changes the heading, the IMU works, and the heading was constant because the robot drove
-straight.
+``WAG_S``: time in s for which the reported heading is constant before the driver makes the turn.
+
+``WAG_UNITS``: units that the driver adds to the left motor and subtracts from the right motor.
+
+A constant heading means that the IMU is dead, or that the robot drives exactly straight. If the
+heading changes after the small turn, the IMU works.
 """
 
 STARTED_M: Final = 0.01
-"""Distance in m that a wheel must roll to prove that its motor has turned it."""
+"""Distance in m that the wheels must roll in a motion to prove that their motors can turn them."""
 
 
 class Adjusting(Moves):
@@ -33,12 +38,11 @@ class Adjusting(Moves):
 
     @property
     def motor_balance(self) -> str:
-        """The measured ratio of the left to the right motor's speed, as a text."""
+        """The measured speed of the left motor divided by that of the right motor, as text."""
         ratio = self.loop.measured_balance
         return "unknown" if ratio is None else f"{ratio:.3f}"
 
     def _adjust(self, now: float) -> Packets:
-        """Return the command that adjusts the motors' units to the commanded speed, if needed."""
         odometry = self.odometry
         if self.state is State.DRIVING and not odometry.heading.is_known:
             if abs(odometry.speeds.means[0]) > CREEP_MPS:
@@ -71,9 +75,9 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Set the ratio of the wheel speeds in the odometry.
+        """Pass the expected ratio of left to right wheel speed to the odometry.
 
-        The odometry computes the turn from this ratio if RMRA does not report the turn.
+        The odometry computes the turn from this ratio if the server does not report the heading.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
@@ -85,7 +89,11 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty: for ``seconds``, the left wheel may have turned unmeasured."""
+        """Add the uncertainty of a time in which only the left wheel may have turned.
+
+        The encoder is on the right wheel, so it does not show a turning left wheel. ``seconds``:
+        this time, in s.
+        """
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
         turn_rad = min(math.pi, most_m / self._settings.track_m)
@@ -94,7 +102,8 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Record that the present motor units are too small to turn the motors.
 
-        If the robot has already moved in this motion, it is blocked now, and nothing is learned.
+        If the robot has already moved in this motion, something blocks it now, so nothing is
+        learned.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.spun_rad) * self._settings.track_m / 2

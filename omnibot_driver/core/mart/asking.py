@@ -1,11 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The queries that show, after the stop port was used, which motion is in progress.
+"""Queries that show which motion is in progress after the driver has used the stop port.
 
-SL ends RM and B in such a way that a later SM or SRM hangs the server permanently. So SM and SRM
-are sent only once RST IMU has shown that the server knows of no motion (it refuses RST IMU during a
-motion), or the encoder has shown that the robot moves. This module knows commands and replies. Time
-is an argument.
+SL on the stop port ends RM and B in such a way that a later SM or SRM hangs the server permanently.
+So the driver sends SM and SRM only in one of two cases:
+
+- The server does not refuse RST IMU. It refuses this command during a motion.
+- The encoder shows that the robot moves.
+
+This module knows commands and replies; it does not know why the stop port was used. The caller
+passes the time.
 """
 
 import math
@@ -22,12 +26,12 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packets
 
 STOP_AGAIN_S: Final = 3.0
-"""Time in s after which SL and SS are sent again.
+"""Interval in s at which SL and SS are repeated while the server is silent.
 
-During a controlled move the server is silent until SL or SS arrives and ends the move.
+During a controlled move the server is silent until SL or SS ends the move.
 """
 APART_S: Final = 0.4
-"""Time in s between the two encoder counts that show whether the robot moves."""
+"""Least time in s between two encoder counts that are compared to see whether the robot moves."""
 
 
 class Asking(Stops):
@@ -59,7 +63,6 @@ class Asking(Stops):
         return self._send(LAST_HALTS[Motion.UNKNOWN], now) + self._greet(now)
 
     def _asked(self, answer: Answer, now: float) -> None:
-        """Evaluate the answer to RST IMU or ENC."""
         reply = answer.reply
         if answer.word is words.RESET:
             self._conflict = isinstance(reply, Fail) and reply.reason == words.CONFLICT
@@ -78,7 +81,7 @@ class Asking(Stops):
             self._lose(now, "the robot is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
-        """Stop any motion with SRM and SM, which cannot hang the server now."""
+        """Stop any motion with SRM and SM. In this state they cannot hang the server."""
         if self._lost_told:
             self._lost_told = False
             self._notice("the server answers again; the driver first stops any motion", halt=True)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller as a ``Board`` of the driver, backed by its pilot.
+"""The MART controller as a ``Board`` of the driver. The pilot does the work.
 
-The controller sends nothing by itself: each measurement is the reply to a query of the pilot.
-During a controlled move the controller answers nothing, so silence is expected.
+The controller sends nothing by itself, so every measurement is the reply to a query of the pilot.
+During a controlled move the controller does not answer, so silence is normal then.
 """
 
 import math
@@ -50,15 +50,19 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""Time in s without a reading after which the next reply is reported as NOTHING_MEASURED.
+"""Longest time in s in which replies without a reading are ignored.
 
-Measurements of a moving robot come at shorter intervals.
+If a reply without a reading comes later, the board returns NOTHING_MEASURED. Measurements of a
+moving robot come at shorter intervals.
 """
 EXPECTED_EVERY_S: Final = 0.2
 
 
 class MartBoard(Board):
-    """One MART controller. ``settings`` may be replaced at any time."""
+    """A MART controller, as a board of the driver.
+
+    ``settings`` may be replaced at any time.
+    """
 
     traits = TRAITS
 
@@ -79,7 +83,11 @@ class MartBoard(Board):
 
     @property
     def mode(self) -> Mode:
-        """The mode: nominal once the server has given its name and answered the first stop."""
+        """The mode of the board.
+
+        The mode is nominal as soon as the server has given its name and has answered the first
+        stop.
+        """
         return self._mode
 
     @property
@@ -105,7 +113,7 @@ class MartBoard(Board):
 
     @property
     def refusal(self) -> str:
-        """The reason why motion is refused, with a remedy; empty while motion is allowed."""
+        """Why the driver refuses motion, with a remedy; empty while motion is allowed."""
         return self._pilot.refusal
 
     # Inbound
@@ -118,7 +126,8 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that a datagram from this channel brings.
 
-        NOTHING_MEASURED is added if a reply brings no reading and no reading came for UNREAD_S.
+        If a reply brings no reading, and the last reading is older than UNREAD_S, the result is
+        NOTHING_MEASURED.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -138,12 +147,19 @@ class MartBoard(Board):
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:
-        """End the present job after the port has closed; return the readings and the result."""
+        """End the present job, because the port has closed; return the readings that are left.
+
+        The job's result is one of these readings.
+        """
         self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return due odometry, and NOTHING_MEASURED while the server is expected to be silent."""
+        """Return the readings that are due without a datagram.
+
+        These are the results of jobs and the odometry. NOTHING_MEASURED is added while the server
+        is busy and its silence is expected.
+        """
         readings = self._pilot.take()
         pilot = self._pilot
         if self._mode is not Mode.NOMINAL:
@@ -158,7 +174,7 @@ class MartBoard(Board):
         return readings
 
     def reset_odometry(self) -> None:
-        """Begin the odometry frame at the robot's present pose."""
+        """Begin a new odometry frame at the robot's present pose."""
         self._pilot.odometry.reset()
 
     # Outbound
@@ -176,14 +192,18 @@ class MartBoard(Board):
         return min(times)
 
     def actuator(self, proof: StopProof) -> "Conductor":
-        """Return the actuator; its pilot records each stop and each start in ``proof``."""
+        """Return the actuator.
+
+        The pilot records each stop and each start of the robot in ``proof``.
+        """
         self._pilot.proof = proof
         return Conductor(self._pilot)
 
     def wake(self) -> Packets:
         """Return the commands that stop the robot at the beginning of a connection.
 
-        The pilot repeats them until the server answers; it sends other requests only after that.
+        The pilot repeats these commands until the server answers. Only then does it send other
+        requests.
         """
         return self.stop()
 
@@ -193,7 +213,7 @@ class MartBoard(Board):
         return tuple((word.channel, word.request().data) for word in said)
 
     def emergency_stop(self) -> Packets:
-        """Return the packets of ``stop``: the controller does not have an emergency stop."""
+        """Return the packets of ``stop``, because the controller has no emergency stop."""
         return self.stop()
 
     # What only this board has
@@ -201,8 +221,8 @@ class MartBoard(Board):
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job; a JobDone with this ``token`` reports its result later.
 
-        Raises RequestRefused while another job is under way, or if the job downloads a log and no
-        log was started.
+        Raises RequestRefused while another job is in progress. A download of the log is also
+        refused if no log was started, or if the server may have lost it.
         """
         self._pilot.jobs.ask(job, token, now, *arguments)
 
@@ -213,17 +233,16 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether no RM has run since the server's start.
+        """Whether the server has not run RM since it was started.
 
-        Only then may the server's clock be set back without harm.
-        RM integrates the heading over the time since the previous RM. If the clock was set back in
-        that time, the heading is useless.
+        Only then may the driver set the server's clock back. RM integrates the heading over the
+        time since the previous RM. If the clock was set back in that time, the heading is useless.
         """
         return self._pilot.odometry.heading.is_zero
 
 
 class Conductor:
-    """The actuator: passes commands to the pilot, which sends one request at a time."""
+    """The actuator: it passes commands to the pilot, which sends one request at a time."""
 
     rate_hz = 20.0
 
@@ -241,7 +260,10 @@ class Conductor:
         return self._pilot.wake_at
 
     def is_zero(self, order: Order) -> bool:
-        """Return whether the order's speeds count as a standstill; False for a GoTo."""
+        """Return whether the order is so slow that the driver regards it as a standstill.
+
+        A goal (GoTo) is never regarded as a standstill.
+        """
         if isinstance(order, GoTo):
             return False
         return not isinstance(order, Drive) or not (
@@ -250,14 +272,14 @@ class Conductor:
         )
 
     def connect(self) -> None:
-        """Do nothing: ``MartBoard.connect`` has reset the pilot."""
+        """Do nothing, because ``MartBoard.connect`` has already reset the pilot."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
         """Carry out ``wanted`` from now on, instead of the previous command."""
         self._pilot.apply(wanted, now)
 
     def wrote(self, packets: Packets, now: float) -> None:
-        """Do nothing: no other part of the driver sends requests to this board."""
+        """Do nothing, because only the pilot sends requests to this board."""
 
     def due(self, now: float) -> Packets:
         """Return the packets to write now."""

@@ -1,13 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The exchange with the server: one request at a time, and the assignment of replies to requests.
+"""The exchange with the server: send one request, and find the reply to it.
 
-Replies carry no sequence number, and datagrams can be lost, duplicated or late. So a reply is
-assigned by its form, its failure text and the least time that its command takes. A reply that does
-not match is regarded as late and discarded. After an unanswered query, no query with the same form
-of reply is sent until the missing reply can no longer come. The queries that are needed for driving
-cannot wait: the replies to them are marked as doubtful, and their recipient compares them with the
-expected values. Time is an argument.
+Replies carry no sequence number. The network can lose, duplicate or delay datagrams. So the driver
+checks whether the form of a reply and its failure text fit the pending request. It also checks that
+the reply does not come sooner than the command allows. A reply that does not fit is regarded as
+late and discarded.
+
+After an unanswered query, the driver sends no query with the same form of reply until the missing
+reply can no longer come. The queries for driving cannot wait that long. The driver marks the
+replies to them as doubtful, and their recipient compares them with the expected values.
+
+This module knows requests and replies; it does not know what the requests are for. The caller
+passes the time.
 """
 
 import math
@@ -32,29 +37,40 @@ from omnibot_driver.core.mart.words import (
 from omnibot_driver.core.packets import Packets
 
 QUICKEST_S: Final = 0.1
-"""Shortest time in s to wait for a query's reply, in addition to the time the server needs."""
+"""Shortest time in s to wait for the reply to a query, in addition to the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
-"""An unanswered query multiplies ``trip_s`` by LOSS, and then adds LOSS_S (s) to it.
+"""Increase of ``trip_s``, the average duration of a query, after an unanswered query.
 
-The driver may have stopped waiting too soon, so it waits longer for the reply to the next query.
+The driver multiplies ``trip_s`` by LOSS, then adds LOSS_S (s). Maybe the driver has stopped waiting
+too soon, so it waits longer for the reply to the next query.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""After an exchange longer than SLOW_S (s), the network counts as disturbed for DISTURBED_S (s).
+"""Times in s that decide whether the network is regarded as disturbed.
 
-A network that delays, loses or duplicates a datagram may do so again. While the network is
+``SLOW_S``: an exchange that takes longer shows a disturbed network.
+
+``DISTURBED_S``: the network is regarded as disturbed for this time afterwards.
+
+A network that has delayed, lost or duplicated one datagram may do so again. While the network is
 disturbed, each reply may belong to an earlier query.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
-"""Failure texts that the server may send at once, when it refuses a check or finds no IMU."""
+"""Failure texts that may come sooner than ``least_s`` after a check of the IMU.
+
+The server then refuses the check, or finds no IMU.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """A request without a reply yet; at ``until_s`` the driver stops waiting for the reply."""
+    """A request whose reply has not come yet.
+
+    ``until_s``: time at which the driver stops waiting for the reply.
+    """
 
     request: Request
     sent_s: float
@@ -68,10 +84,11 @@ class Pending:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A reply together with the request that it answers.
+    """A reply, together with the request that it answers.
 
-    ``took_s``: time from the request to the reply in s; ``when``: the time at which the value
-    in the reply was measured.
+    ``took_s``: time from the request to the reply, in s.
+
+    ``when``: time at which the value in the reply was measured.
     """
 
     request: Request
@@ -88,10 +105,15 @@ class Answer:
 class Conversation:
     """The exchange of requests and replies with one server.
 
-    ``delay_s``: longest time that a datagram may be on its way, in s; ``discarded``: number of late
-    replies so far; ``trip_s``: average duration of a query in s, raised by unanswered ones;
-    ``answered_trip_s``: average duration of the answered queries in s; ``missed_s``: time at which
-    the driver last stopped waiting for a reply.
+    ``delay_s``: longest time that a datagram may be on its way, in s.
+
+    ``discarded``: number of replies so far that were late, duplicate or foreign.
+
+    ``trip_s``: average duration of a query, in s. Each unanswered query increases it.
+
+    ``answered_trip_s``: average duration of the answered queries, in s.
+
+    ``missed_s``: time at which the driver last stopped waiting for an overdue reply.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -111,8 +133,8 @@ class Conversation:
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now.
 
-        A command must wait while a request is pending. A query that is not in PRESSING must also
-        wait while a late reply can be mistaken for its reply.
+        No command may be sent while a request is pending. A query that is not in PRESSING must also
+        wait while a late reply could be mistaken for its reply.
         """
         if self.pending is not None:
             return False
@@ -123,9 +145,9 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Stop expecting a missing reply of this form, because ``reply`` is that reply.
+        """Stop expecting a missing reply of this form, because ``reply`` is the missing reply.
 
-        If ``reply`` is a copy of an earlier reply, do nothing.
+        Do nothing if ``reply`` is a copy of an earlier reply.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
@@ -164,9 +186,10 @@ class Conversation:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
     def ask(self, request: Request, now: float, takes_s: float | None = None) -> Packets:
-        """Return the packets that send the request, and wait for its reply.
+        """Return the packets with the request, and begin to wait for its reply.
 
-        ``takes_s``: longest time that the server needs, in s (default: the limit of the command).
+        ``takes_s``: longest time in s that the server needs. The default is the limit of the
+        command.
         """
         patience_s = self._patience_s(request.word)
         if takes_s is not None:
@@ -177,8 +200,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The reply is then recorded as missing, because it may still come late. The reply to a
-        controlled move is not recorded, because the stop of the move waits for it.
+        The missing reply is recorded, because it may still come late. The reply to a controlled
+        move is not recorded, because the stop of the move waits for that reply.
         """
         if self.pending is None:
             return None
@@ -201,7 +224,7 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        Replies to HELLO are evaluated elsewhere, because HELLO may be sent while a request is
+        Replies to HELLO are not passed to this method, because HELLO may be sent while a request is
         pending.
         """
         pending = self.pending
@@ -234,10 +257,10 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether the reply to ``word`` is a duplicate of the reply to another query.
+        """Return whether the reply is a duplicate of the reply to another query.
 
-        A duplicate is assumed if an identical reply to another query has just come, and the
-        previous reply to ``word`` was different. The true reply to ``word`` is then still to come.
+        That is assumed if an identical reply to another query has just come, and the previous reply
+        to ``word`` was different. The true reply to ``word`` is then still to come.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA
@@ -247,10 +270,11 @@ class Conversation:
     def _has_come(
         self, reply: Ok | Fail, now: float, *, but: Word | None = None, kind: Kind | None = None
     ) -> bool:
-        """Return whether a reply identical to ``reply`` came within the last ``delay_s``.
+        """Return whether an identical reply came within the last ``delay_s``.
 
-        ``but``: a command whose replies are left out; ``kind``: the only kind of command whose
-        replies are compared.
+        ``but``: replies to this command are ignored.
+
+        ``kind``: if given, only replies to commands of this kind are compared.
         """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and kind in (None, word.kind)
@@ -258,13 +282,13 @@ class Conversation:
         )
 
     def _owes_until(self, word: Word, sent_s: float) -> None:
-        """Record that the reply to a ``word`` that was sent at ``sent_s`` may still come."""
+        """Record that the reply to ``word``, which was sent at ``sent_s``, may still come."""
         until_s = sent_s + word.takes_s + 2 * self.delay_s
         for form in word.forms:
             self._owed_until_s[form] = max(self._owed_until_s.get(form, until_s), until_s)
 
     def _patience_s(self, word: Word) -> float:
-        """Return how long to wait for the reply to ``word``, in s.
+        """Return how long the driver waits for the reply to ``word``, in s.
 
         The time is short for queries and changes, so that a moving robot is soon measured again.
         """

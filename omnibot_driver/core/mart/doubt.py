@@ -1,11 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The uncertainty of a MART robot's odometry, and its sources.
+"""The uncertainty of the odometry of a MART robot.
 
-The sources are: a wheel that slips or whose size is not exactly known, a gyro that drifts, unequal
-motors while the heading is unknown, the beginning and end of each motion, and replies whose time is
-known only within the network's delay. This module knows metres, rad and seconds; it does not know
-how they are measured.
+The uncertainty has these sources:
+
+- a wheel that slips, or whose size is not exactly known
+- a gyro that drifts
+- motors with unequal speeds, while the heading is unknown
+- the beginning and the end of each motion
+- replies whose time is known only within the network's delay
+
+This module knows metres, rad and seconds; it does not know how they are measured.
 """
 
 import math
@@ -15,50 +20,58 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.odometry.covariance import Covariance
 
 WAY_STDDEV: Final = 0.004
-"""Standard deviation in m of a distance of 1 m; it grows with the square root of the distance."""
-GYRO_WALK: Final = 0.002
-"""Standard deviation in rad of the heading after 1 s of motion: random walk of the gyro.
+"""Standard deviation in m of a distance of 1 m.
 
-The motion shakes the gyro. The deviation grows with the square root of the time.
+The standard deviation grows with the square root of the distance.
+"""
+GYRO_WALK: Final = 0.002
+"""Standard deviation in rad of the heading after 1 s of motion, because motion shakes the gyro.
+
+The standard deviation grows with the square root of the time (random walk).
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Standard deviations of the errors from the start and the roll-out of each motion.
+"""Standard deviations of the errors that one motion adds at its start and while it rolls out.
 
-END_M (m) applies to the position, END_RAD (rad) to the heading.
+``END_M``: error of the position, in m.
+
+``END_RAD``: error of the heading, in rad.
 """
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of the angle that the server reports for a turn on the spot.
 
-TOLD_TURN_RAD (rad) comes from the whole degrees of the report; TOLD_TURN is relative to the angle.
-Both errors add up.
+``TOLD_TURN_RAD``: error in rad, because the server reports whole degrees.
+
+``TOLD_TURN``: further error, as a fraction of the angle.
 """
 PIVOT: Final = 0.01
-"""Standard deviation of the offset between the robot's centre and the point about which it turns.
+"""Error of the position in a turn on the spot, as a fraction of the track width.
 
-The value is a part of the track, and applies to turns on the spot.
+The robot does not turn exactly about its centre. The error is the standard deviation of the
+distance from the centre to the point about which the robot turns.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
-"""Standard deviation of the heading after a straight controlled move, in rad."""
+"""Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Ratio of two errors of a turn that is known only from commands.
+"""Ratio of two errors of a turn whose angle is known only from the commands.
 
-One error has the same direction in all steps. The other is independent in each step; its standard
-deviation is BEND_WALK times that of the first.
+The first error has the same direction in all steps of the turn. The second error is independent in
+each step. Its standard deviation is BEND_WALK times that of the first error.
 """
 ASTRAY: Final = 0.7
-"""Factor from the variance of the heading, in rad², to the relative error of a distance.
+"""Relative error of a driven distance, divided by the variance of the heading in rad².
 
-The error applies along and across the direction of motion; it is at most the distance itself.
+The error is equally large along and across the direction of motion. It is at most the distance
+itself.
 """
 SPREAD: Final = 0.3
-"""Standard deviation of a time that is uniformly distributed in an interval of length 1.
+"""Standard deviation of a time that is equally likely anywhere in an interval of length 1.
 
 The exact value is 1/√12.
 """
 CLOCK_S: Final = 0.01
-"""Uncertainty of a reply's time on a good network, in s; on other networks it is larger."""
+"""Least assumed uncertainty of a reply's time, in s. It is reached on a good network."""
 Errors = list[tuple[float, float, float, float]]
 
 
@@ -88,10 +101,11 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the ratio of left to right wheel speed if the turn is known
-        from that ratio alone, else 0; ``aside_m``: standard deviation of the position across the
-        direction of motion, in m; the error arises because the heading was not measured at the time
-        of the count.
+        ``bend``: standard deviation of the ratio of left to right wheel speed. It is 0 unless this
+        ratio alone shows the turn.
+
+        ``aside_m``: standard deviation in m of the position across the direction of motion. This
+        error arises because the heading was not measured at the time of the count.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -124,11 +138,11 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Record that a motion has begun; ``heading_told`` can later remove its heading error."""
+        """Record that a motion has begun, so that ``heading_told`` can remove its heading error."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the heading error of a turn known from commands alone.
+        """Remove the heading error of a turn that is known only from the commands.
 
         Call this when the server reports the heading. The position error that the wrong heading has
         caused remains.
@@ -137,11 +151,16 @@ class Doubt:
         self._levers[2] = x_m, y_m, self._bend_before_rad
 
     def add(self, m2: float, rad2: float) -> None:
-        """Add independent errors by their variances: of x and y (m²), and of the heading (rad²)."""
+        """Add independent errors of x, y and heading.
+
+        ``m2``: variance of x and of y, in m².
+
+        ``rad2``: variance of the heading, in rad².
+        """
         self._walk = self._walk.with_errors(_around(m2, rad2))
 
     def end(self) -> None:
-        """Add the errors of the beginning and end of a motion."""
+        """Add the errors that each motion has at its beginning and its end."""
         self.add(END_M**2, END_RAD**2)
 
     def end_straight(self) -> None:
@@ -163,15 +182,21 @@ class Doubt:
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
         """Return the errors of a turn on the spot, from its beginning until now.
 
-        ``spun_rad``: the turn that the wheel has measured; ``told_rad``: the turn that the server
-        has reported, or None. The robot also moves a little aside if its motors are unequal.
+        ``spun_rad``: the turn that the wheel has measured.
+
+        ``told_rad``: the turn that the server has reported, or None.
+
+        The errors include a small sideways motion, which unequal motors cause.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))
         return anywhere(pivot_m, math.sqrt(variance))
 
     def total(self, more: Errors) -> Covariance:
-        """Return the covariance of the pose, including the errors ``more`` since the last count."""
+        """Return the covariance of the pose.
+
+        ``more``: further errors, from the time since the last count.
+        """
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
         size, bias, *others = self._levers
         errors = [(scale, *size), (drift, *bias), *((1.0, *lever) for lever in others)]
@@ -187,7 +212,7 @@ def _by_gyro(told_rad: float) -> float:
 
 
 def anywhere(way_m: float, turn_rad: float) -> Errors:
-    """Return independent errors of x, y and heading with these standard deviations."""
+    """Return independent errors of x, y (m) and heading (rad) with these standard deviations."""
     return _around(way_m * way_m, turn_rad * turn_rad)
 
 

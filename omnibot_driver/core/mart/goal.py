@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The plan of moves to a goal pose: turn towards it, drive straight, turn to the goal's heading.
+"""The plan of moves to a goal pose: turn towards it, drive straight, turn to its heading.
 
-Each move is a number of whole degrees or inches and ends a little beside its target, so the
-remaining moves are planned anew after each move. This module knows poses and the commands for
-moves; it does not know when they are sent.
+Each move is a whole number of degrees or inches, and ends a little beside its target. So the driver
+plans the remaining moves anew after each move. This module knows poses and the commands for moves;
+it does not know when they are sent.
 """
 
 import math
@@ -20,19 +20,19 @@ NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
-"""Motor units of controlled moves that are not SLOW."""
+"""Motor units of controlled moves that are sent without SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After ENOUGH_MOVES moves, a distance of ENOUGH_M (m) from the goal is near enough.
+"""After ENOUGH_MOVES moves, the robot need not come nearer to the goal than ENOUGH_M (m).
 
 To come nearer, the robot would have to turn towards the goal first.
 """
 STRETCH: Final = 1.3
-"""Ratio of driven to requested length of straight moves that is assumed before it is measured.
+"""Assumed ratio of driven to requested length of a straight move, before it is measured.
 
 A request for 12 inches becomes a move of 15.8 inches.
 """
 DOCK_STRETCH: Final = 1.6
-"""Largest assumed ratio of driven to requested length of docking moves.
+"""Largest assumed ratio of driven to requested length of a docking move.
 
 A request for 19 inches (0.48 m) becomes a move of 0.73 m.
 """
@@ -45,14 +45,17 @@ WIDER: Final = 0.5
 Turns overshoot, so a larger error is allowed after each of them.
 """
 MOST_MOVES: Final = 9
-"""Largest allowed number of moves to one goal; after them the goal is given up."""
+"""Largest number of moves to one goal. After them, the driver gives the goal up."""
 
 
 LEAST_LIKE: Final = 0.35
 """Relative difference between a move and its request, above which the move may have run twice."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
-"""Usual duration of a move, in s: SETTLES_S, plus S_PER_DEG for each degree or S_PER_IN for each
-inch. SLOW doubles S_PER_DEG and S_PER_IN."""
+"""Usual duration of a move in s: SETTLES_S, plus a time for each degree or inch.
+
+The time for a degree of a turn is S_PER_DEG. The time for an inch of a straight move is S_PER_IN.
+SLOW doubles both.
+"""
 LONGER: Final = 1.4
 
 
@@ -60,9 +63,11 @@ LONGER: Final = 1.4
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder since the move began; ``lasted_s``:
-    duration of the move; ``quiet_s``: longest time that a duplicate of the move may have run before
-    the encoder was read.
+    ``way_m``, ``turned_rad``: distance and turn by the encoder since the move began.
+
+    ``lasted_s``: duration of the move.
+
+    ``quiet_s``: longest time that a duplicate of the move may have run before the encoder was read.
     """
 
     request: Request
@@ -83,9 +88,10 @@ class Done:
         return number * INCH_M if self.is_straight else math.radians(number)
 
     def may_have_run_twice(self, delay_s: float) -> bool:
-        """Return whether the server may have run the move twice, after its datagram was duplicated.
+        """Return whether the server may have run the move twice.
 
-        If the move has run twice, the encoder count covers only the second run.
+        This happens if the network duplicates the move's datagram. The encoder count then covers
+        only the second run.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         number = float(self.request.data.split()[-1])
@@ -97,10 +103,10 @@ class Done:
 
 
 class Surplus:
-    """The measured excess of controlled moves over the requested distances and turns.
+    """How far controlled moves go beyond the requested distances and turns, as measured so far.
 
-    The excess of turns is a number of degrees. The excess of straight moves is a ratio, because the
-    server ends a straight move after a computed time.
+    The excess of a turn is a number of degrees. The excess of a straight move is a ratio, because
+    the server ends such a move after a computed time.
     """
 
     def __init__(self) -> None:
@@ -108,7 +114,7 @@ class Surplus:
         self._stretch = {True: STRETCH, False: STRETCH}
 
     def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
-        """Learn from the measurement of a finished move; the signs of the values are ignored."""
+        """Learn from the measurement of a finished move. The signs of the values do not matter."""
         parts = request.data.split()
         slow, asked = b"SLOW" in parts, float(parts[-1])
         if request.word in (TF, TB):
@@ -122,19 +128,19 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the number of degrees to request for a turn by ``wanted`` degrees.
 
-        The result is 0 if no possible turn would reduce the heading error by at least WORTH_DEG.
+        The result is 0 if the turn would not reduce the heading error by at least WORTH_DEG.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
 
     def inches(self, way_m: float, *, slow: bool) -> int:
-        """Return the inches to request for a distance in m."""
+        """Return the number of inches to request, so that the robot drives ``way_m``."""
         return max(1, round(way_m / INCH_M / self._stretch[slow]))
 
 
 def docking_inches(longest_m: float) -> int:
-    """Return the inches to request for a docking move that drives ``longest_m`` at most."""
+    """Return the number of inches to request for a docking move of at most ``longest_m``."""
     return max(1, math.floor(longest_m / INCH_M / DOCK_STRETCH))
 
 
@@ -142,9 +148,14 @@ def docking_inches(longest_m: float) -> int:
 class Move:
     """The progress towards the goal ``place``.
 
-    ``said``: number of moves sent so far; ``turns``: number of turns since the last straight move;
-    ``given_up``: whether the goal is finished, or a move has failed; ``failed``: whether a move has
-    failed.
+    ``said``: number of moves sent so far.
+
+    ``turns``: number of turns since the last straight move.
+
+    ``given_up``: whether the driver sends no further move to this goal. The robot has arrived, or a
+    move has failed, or MOST_MOVES moves were sent.
+
+    ``failed``: whether a move has failed.
     """
 
     place: Pose
@@ -158,9 +169,10 @@ class Move:
         self.given_up = self.failed = True
 
     def repeated(self) -> "Move":
-        """Return the progress with which to continue after ``place`` was commanded again.
+        """Return the progress to continue with when ``place`` is commanded again.
 
-        If the robot has come near enough to the goal, it needs no further moves to come nearer.
+        A goal in progress continues, and a failed goal begins anew. If the goal is finished, the
+        robot needs further moves only if it is farther from the goal than ENOUGH_M.
         """
         if not self.given_up:
             return self
@@ -175,7 +187,10 @@ class Move:
 
 
 def next_move(move: Move, pose: Pose, settings: MartSettings, surplus: Surplus) -> Request | None:
-    """Return the next move from ``pose``, or None at the goal or if the goal is given up."""
+    """Return the next move from ``pose``.
+
+    Return None if the robot is at the goal, or if the goal is given up.
+    """
     if move.given_up or move.said >= MOST_MOVES:
         return None
     way = pose.way_to(move.place)

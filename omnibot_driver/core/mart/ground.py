@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The base of the pilot: the state of server and robot, and the sending of commands.
+"""The base of the pilot: what it knows about server and robot, and how it sends commands.
 
-This module knows states and commands; it does not know why a command is sent. Time is an argument.
+This module knows states and commands; it does not know why a command is sent. The caller passes the
+time.
 """
 
 import math
@@ -37,25 +38,29 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Time in s from the server's first reply after an absence until a motion may be started.
+"""Time in s that the driver waits after the server has appeared, before it starts a motion.
 
-The server opens its ports before it has started up completely. VOLTS and most motions crash a
-server that has just started; a crash by RM leaves the motors on.
+The time begins with the server's first reply after an absence. The server opens its ports before it
+has started up completely. VOLTS and most motions crash a server that has just started. If RM
+crashes the server, the motors stay on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
-"""Silence after which the server counts as absent: ABSENT_S (s), plus ABSENT_TRIPS exchanges."""
+"""Silence after which the server is regarded as absent.
+
+The silence is ABSENT_S (s), plus the duration of ABSENT_TRIPS exchanges.
+"""
 ABSENT_BUSY_S: Final = 2.5
-"""Silence in s after which a server that may be busy counts as absent.
+"""Silence in s after which a server that may be busy is regarded as absent.
 
 A stop, for example, keeps the server busy.
 """
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
-The server answers HELLO after the move; a restarted server answers at once.
+The server answers HELLO only after the move. A restarted server answers at once.
 """
 ESTOP_REPEAT_S: Final = 0.1
-"""Interval in s at which stops are sent while the e-stop is latched.
+"""Interval in s at which the driver sends stops while the e-stop is latched.
 
 A server whose robot is at rest answers each stop with ``fail`` and does nothing.
 """
@@ -64,7 +69,15 @@ A server whose robot is at rest answers each stop with ``fail`` and does nothing
 class Ground:
     """The state that all parts of the pilot share.
 
-    ``readings``: readings that the caller has not taken yet. ``settings`` may be replaced.
+    ``readings``: readings that the caller has not taken yet.
+
+    ``heard_s``: time of the server's last reply.
+
+    ``appeared_s``: time of the server's first reply after an absence.
+
+    ``greeted``: whether the server has answered the first stop of this connection.
+
+    ``settings`` may be replaced.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -148,7 +161,7 @@ class Ground:
 
     @property
     def refusal(self) -> str:
-        """The reason why motion is refused, with a remedy; empty while motion is allowed."""
+        """Why the driver refuses motion, with a remedy; empty while motion is allowed."""
         if self.state is State.LOST:
             return (
                 "the server is lost: cut the motor power if the robot moves, then restart the"
@@ -210,8 +223,8 @@ class Ground:
     def _heading_first(self) -> bool:
         """Whether the heading must be read before the encoder.
 
-        After RM the last heading must come before the last count, because with that count the
-        odometry ends the motion.
+        The first count after a motion ends this motion in the odometry. So after RM, the last
+        heading must come before that count.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE
@@ -223,7 +236,10 @@ class Ground:
             raise AssertionError(f"{word.text} must not be sent while {self.state.value}")
 
     def _send(self, said: tuple[Word, ...], now: float) -> Packets:
-        """Return the packets of commands whose replies are not awaited, and record the sending."""
+        """Return the packets with these commands, and record when they are sent.
+
+        The driver does not wait for the replies to these commands.
+        """
         for word in said:
             self._require(word)
             if word in HARMFUL_LATE:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The reasons not to drive: the motor board's state, the IMU, obstacles, a wrong server.
+"""Reasons not to drive: faults of the motor board, a dead IMU, an obstacle, or a wrong server.
 
-This module knows the slower measurements and their limits; it does not stop the robot.
-Time is an argument.
+This module knows the slower measurements and their limits; it does not know how to stop the robot.
+The caller passes the time.
 """
 
 import math
@@ -34,28 +34,45 @@ BITS: Final = {
 NO_READ: Final = 255
 HALTING: Final = 4 | 8 | 16 | 32
 FRONT_IN, REAR_IN = 19, 15
-"""The controller stops for obstacles nearer than FRONT_IN in front or REAR_IN behind (inches)."""
+"""Distances in inches: the controller stops the robot if an obstacle is nearer.
+
+FRONT_IN is the limit in front of the robot, REAR_IN the limit behind it.
+"""
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
-"""Two readings count as the same value if they differ by no more than this, in V or inches."""
+"""Largest difference between two readings that are regarded as equal, in V or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of like values in a row after which the value is accepted, even if replies may be late."""
+"""Number of equal readings in a row after which an uncertain reading is accepted.
+
+A reading is uncertain if the reply may belong to another query.
+"""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s after a failed RM within which it is regarded as the cause of uncommanded motion."""
+"""Time in s for which a failed RM is regarded as the cause if the robot moves without a command."""
 
 
 class Health:
     """The health of robot and server.
 
-    ``imu``: the results of the IMU's checks; ``stranger``: the name of a server that is not a
-    motion controller, else empty; ``heading_told``: motions besides RM in which RMRA was seen to
-    change; ``heading_changes``: number of such changes in the present motion; ``reference_fails``:
-    number of bare ``fail`` replies to RM in a row; ``outlived``: whether the server has ended a
-    motion only after the stop port was used, so that its stop port or its next motion may hang.
+    ``imu``: the results of the checks of the IMU.
+
+    ``stranger``: name of a server that is not a motion controller, else empty.
+
+    ``heading_told``: motions besides RM in which the server reports changes of the heading (RMRA).
+
+    ``heading_changes``: number of these changes in the present motion.
+
+    ``reference_fails``: number of bare ``fail`` replies to RM in a row.
+
+    ``outlived``: whether the server has ended a motion only after the driver had used the stop
+    port. The stop port or the next motion of such a server may hang.
+
+    ``status``: the bits of the last accepted MCSTAT, or None.
+
+    ``volts``: last battery voltage, in V, or None.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -85,8 +102,8 @@ class Health:
     ) -> list[Reading]:
         """Return the readings from a reply to one of the slower queries.
 
-        ``uncertain``: whether the reply may be to another query, so that the value is reported only
-        after similar values came several times in a row.
+        ``uncertain``: whether the reply may belong to another query. The reading is then returned
+        only after several equal readings in a row.
         """
         if word is VOLTS:
             self._voltages.append(reply.number)
@@ -117,19 +134,20 @@ class Health:
     def _is_of_another(self, word: Word, inches: float) -> bool:
         """Return whether the distance is probably the reply to another query.
 
-        That is assumed for 0 inches, and for the value that the other sonar has reported.
+        That is assumed for 0 inches, and for the last value of the other sonar.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
 
     def is_voltage(self, number: float) -> bool:
-        """Return whether the battery voltage was recently reported as this number, in V."""
+        """Return whether ``number`` is one of the last reported battery voltages, in V."""
         return any(abs(number - volts) < SAME_V for volts in self._voltages)
 
     def _status(self, bits: int) -> None:
-        """Record the motor board's status, but a nonzero status only when it comes twice in a row.
+        """Record the status of the motor board.
 
-        A late reply to ENC can look like a status.
+        A status other than 0 must come twice in a row, because a late reply to ENC can look like a
+        status.
         """
         if not 0 <= bits <= NO_READ:
             return
@@ -146,13 +164,16 @@ class Health:
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """Record a change of RMRA; HEADING_CHANGES of them prove that RMRA works in this motion."""
+        """Record that the heading (RMRA) has changed in this motion.
+
+        HEADING_CHANGES changes prove that the server reports the heading in this kind of motion.
+        """
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
     def reference_failed(self, now: float) -> None:
-        """Record that RM was answered by a bare ``fail``."""
+        """Record that RM was answered by a bare ``fail``, without a reason."""
         self.reference_fails += 1
         self._reference_failed_s = now
 
@@ -163,7 +184,7 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If an RM has failed shortly before, the motion shows that the server is defective.
+        If RM has failed shortly before, this shows that the server is defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 
@@ -173,7 +194,10 @@ class Health:
 
     @property
     def bits(self) -> str:
-        """The faults that MCSTAT reports, as text; "none" without faults, or "unknown"."""
+        """The faults that MCSTAT reports, as text.
+
+        The text is "none" without faults, and "unknown" before the first status.
+        """
         if self.status is None:
             return "unknown"
         if self.status == NO_READ:
@@ -189,7 +213,7 @@ class Health:
 
     @property
     def refusal(self) -> str:
-        """The reason why motion is refused, with a remedy; empty while motion is allowed."""
+        """Why the driver refuses motion, with a remedy; empty while motion is allowed."""
         if self.stranger:
             return (
                 f"the server is not a motion controller; it calls itself '{self.stranger}'; check"

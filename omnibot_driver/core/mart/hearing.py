@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The reaction to each reply of the server, and to each reply that does not come in time.
+"""What the pilot does when a reply comes, and when a reply does not come in time.
 
-This module knows states and replies; it does not know which request is sent next. Time is an
-argument.
+This module knows states and replies; it does not know which request is sent next. The caller passes
+the time.
 """
 
 import math
@@ -19,10 +19,10 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units (sum of both sides) that may remain unanswered.
+"""Largest change of the motors' units that may remain unanswered while the heading is unknown.
 
-If the server does not answer a larger change while the heading is unknown, the driver stops the
-robot: it would not know whether the change makes the robot turn.
+The change is the ``part`` of ``SpeedLoop``. After a larger unanswered change, the driver does not
+know whether the robot turns, so it stops the robot.
 """
 
 
@@ -66,9 +66,9 @@ class Hearing(Measuring):
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
 
-        A bare ``ok`` may answer the start of the motion or the check of the IMU. A number answers
-        the stop of a turn on the spot, but it may also be a count that was requested before the
-        stop.
+        A bare ``ok`` may answer the start of the motion or the check of the IMU. A number may be
+        the reply to the stop of a turn on the spot. It may also be an encoder count that was
+        queried before the stop.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -95,7 +95,7 @@ class Hearing(Measuring):
             self._named_s = self._name_from_s
 
     def _named_in_a_move(self, now: float) -> None:
-        """Stop any motion: a server that gives its name is not busy with a controlled move.
+        """Stop any motion: the server gives its name, although it should be busy with a move.
 
         Either the reply that ended the move was lost, or the server was restarted while the motors
         turned.
@@ -132,7 +132,6 @@ class Hearing(Measuring):
             self.state = State.SERVING if self.jobs.collecting else State.STILL
 
     def _missed(self, word: Word, now: float) -> None:
-        """Handle the missing reply to ``word``, which did not come in time."""
         if self.state is State.ASKING:
             self._unanswered(word)
         elif word.kind is Kind.START:

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The check that the IMU is alive: the command, and its last results.
+"""The check that the IMU works, and the results of the last checks.
 
-RST IMU checks without a motion; MCR SLOW 0 is used if the server does not have RST IMU. The server
-closes the IMU when RST IMU fails, so the driver repeats a failed RST IMU before it regards the IMU
-as dead. This module knows replies and times; it does not know which motion is started. Time is an
-argument.
+The command RST IMU checks the IMU without a motion. If the server does not have this command, the
+driver sends MCR SLOW 0 instead. If RST IMU fails, the server closes the IMU. So the driver repeats
+RST IMU several times before it regards the IMU as dead. This module knows replies and times; it
+does not know which motion is started. The caller passes the time.
 """
 
 import math
@@ -23,11 +23,11 @@ from omnibot_driver.core.mart.words import (
 )
 
 PROVED_S: Final = 0.2
-"""Age of the last successful check of the IMU, in s, up to which a motion may start."""
+"""Largest age in s of the last successful check of the IMU with which a motion may start."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
-"""Usual duration of a check in s.
+"""Usual duration of each check, in s.
 
-If a check takes longer, half of the additional time is regarded as the delay of the reply.
+If a check takes longer, the driver regards its result as older, by half of the additional time.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """Number of failed checks in a row after which the IMU is regarded as dead."""
@@ -37,7 +37,10 @@ REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
 class ImuProof:
     """The results of the last checks of the IMU.
 
-    ``word``: the command that checks the IMU; ``dead``: whether the last checks found no IMU;
+    ``word``: the command that checks the IMU of this server.
+
+    ``dead``: whether the last checks found no working IMU.
+
     ``again_s``: earliest time of the next check.
     """
 
@@ -56,11 +59,11 @@ class ImuProof:
         return now <= self._proved_s + PROVED_S
 
     def used(self) -> None:
-        """Record that a motion starts; the next motion needs a new check."""
+        """Record that a motion starts, so that the next motion needs a new check."""
         self._proved_s = -math.inf
 
     def lost(self) -> None:
-        """Record that a motion has found the IMU dead."""
+        """Record that the server has reported a dead IMU during a motion."""
         self.dead = True
 
     @property
@@ -73,7 +76,7 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return False for a failure that is not about the IMU.
+        """Evaluate the reply to a check; return False if the check failed for another reason.
 
         ``took_s``: time from the check to the reply, in s.
         """
@@ -92,5 +95,8 @@ class ImuProof:
         return True
 
     def retries(self, now: float) -> bool:
-        """Return whether to repeat the check of a dead IMU now; only RST IMU is repeated."""
+        """Return whether the driver must now repeat the check of a dead IMU.
+
+        Only RST IMU is repeated, because it does not move the robot.
+        """
         return self.dead and self.word is RESET and now >= self.again_s

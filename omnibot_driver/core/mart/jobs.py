@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests to the controller besides motion, one job at a time: gyro bias, dock, log, files.
+"""Jobs: requests to the controller besides motion, one at a time.
 
-A file comes as a name with a size, then as unnumbered pieces of 512 bytes. A lost or duplicated
-piece is detected by the total size, or by two identical pieces. This module knows commands and
-replies; it does not know when the command port is free. Time is an argument.
+The jobs are gyro calibration, docking, setting the clock, and starting and downloading logs. The
+server first sends the name and the size of a file. Then it sends the file in pieces of 512 bytes
+without numbers. The driver detects a lost or duplicated piece by the total size, or by two
+identical pieces. This module knows commands and replies; it does not know when the command port is
+free. The caller passes the time.
 """
 
 import math
@@ -20,9 +22,9 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 
 PIECE: Final = 512
 QUIET_S: Final = 1.0
-"""Time in s without a piece after which a file is regarded as complete."""
+"""Time in s without a piece after which the driver does not expect further pieces of a file."""
 TIMES: Final = 3
-"""Largest number of attempts at a job in REPEATED."""
+"""Largest number of times that the driver sends the request of a job in REPEATED."""
 
 CHECK: Final = "check controller and network"
 EXIT_LOST: Final = "if the server has ended, start it again; if it still answers, call again"
@@ -32,7 +34,7 @@ COPY: Final = (
 
 
 class Job(Enum):
-    """A kind of job; its value is the name used in messages."""
+    """A kind of job. Its value is its name in messages."""
 
     BIAS = "gyro calibration"
     DOCK = "docking"
@@ -59,17 +61,24 @@ USUAL_S: Final = 20.0
 OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
 """Jobs that the driver begins by itself, and that give way to a job of the user."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
-"""Jobs that may be sent again if the reply is missing."""
+"""Jobs whose request may be sent again if the reply is missing."""
 
 
 class Jobs:
-    """The job that is under way, and the results of the jobs that have ended.
+    """The job that is in progress, and the results of the jobs that have ended.
 
-    ``done``: results that the caller has not taken yet; ``logging``: whether LOG was answered with
-    ok in this connection; ``log_may_be_lost``: whether the server may have been restarted since
-    that reply; ``ended``: whether EXIT was sent, which ends the server; ``moving``: whether the
-    controlled move of the job was sent; ``turn_record``: pieces of the last TURN_RECORD, until the
-    caller takes them; empty if the download failed.
+    ``done``: results that the caller has not taken yet.
+
+    ``logging``: whether LOG was answered with ``ok`` in this connection.
+
+    ``log_may_be_lost``: whether the server may have been restarted since that reply.
+
+    ``ended``: whether the driver has sent EXIT, which ends the server.
+
+    ``moving``: whether the driver has sent the controlled move of the docking job.
+
+    ``turn_record``: pieces of the last TURN_RECORD, until the caller takes them. It is empty if the
+    download failed.
     """
 
     def __init__(self) -> None:
@@ -120,9 +129,9 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job.
 
-        Raises RequestRefused while another job is under way, and for a download of a log that was
-        not started. A new job replaces one of the driver's own jobs, unless its command was already
-        sent.
+        A new job replaces one of the driver's own jobs, unless its command was already sent.
+        Raises RequestRefused while another job is in progress. A download of the log is also
+        refused if no log was started, or if the server may have lost it.
         """
         if self.job in OWN and not self._waiting:
             self.turn_record = []
@@ -178,7 +187,10 @@ class Jobs:
             self._finish(True, f"{job.value} done")
 
     def missed(self, word: Word, now: float) -> None:
-        """Repeat or end the job if ``word`` was its request; no reply to ``word`` came in time."""
+        """Repeat or end the job if the reply to its request did not come in time.
+
+        ``word``: the command whose reply did not come. Another command than the job's is ignored.
+        """
         if not self._waiting or self._request is None or word is not self._request.word:
             return
         if self.job in REPEATED and self._tries < TIMES:
@@ -189,7 +201,10 @@ class Jobs:
             self._finish(False, f"the controller did not answer {word.text}; {advice}")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
-        """Evaluate the reply to a controlled move; end the docking job if the job sent the move."""
+        """End the docking job if the controlled move that has ended was the move of this job.
+
+        ``reply``: the server's reply to the move.
+        """
         if self.job is not Job.DOCK or not self.moving:
             return
         if isinstance(reply, Fail):
@@ -202,7 +217,7 @@ class Jobs:
             )
 
     def piece(self, data: bytes, now: float) -> None:
-        """Keep a datagram as a piece of the file, if its size is that of a piece."""
+        """Keep a datagram as a piece of the file if it has the size of a piece."""
         if len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
             self._piece_s = now + QUIET_S

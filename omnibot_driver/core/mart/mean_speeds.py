@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The speed and turn rate of the robot, averaged over its last counts.
+"""The mean speed and turn rate of the robot, from its last encoder counts.
 
 This module knows metres, rad and times; it does not know how they are measured.
 """
@@ -11,9 +11,9 @@ from typing import Final
 from omnibot_driver.core.mart.doubt import CLOCK_S
 
 WINDOW_S, SPREADS = 0.35, 4
-"""Averaging time of speeds: the larger of WINDOW_S (s) and SPREADS times ``spread_s``."""
+"""Averaging time of speeds: WINDOW_S (s) or SPREADS times ``spread_s``, whichever is longer."""
 LEAST_S: Final = 0.05
-"""Shortest time in s between two counts from which a speed is computed."""
+"""Shortest time in s between two counts that is used to compute a speed."""
 
 
 class MeanSpeeds:
@@ -28,13 +28,16 @@ class MeanSpeeds:
         self._way_m = self._yaw_rad = 0.0
 
     def add(self, at_s: float, way_m: float, turn_rad: float) -> None:
-        """Add a displacement that was counted at ``at_s``."""
+        """Add the displacement from the previous count to a new count.
+
+        ``at_s``: time of the new count.
+        """
         self._way_m += way_m
         self._yaw_rad += turn_rad
         self._track.append((at_s, self._way_m, self._yaw_rad))
 
     def correct(self, turn_rad: float) -> None:
-        """Add a correction of the heading to the turn of the next displacement."""
+        """Add a correction of the heading. It counts as a part of the next displacement's turn."""
         self._yaw_rad += turn_rad
 
     def forget(self) -> None:
@@ -43,7 +46,7 @@ class MeanSpeeds:
 
     @property
     def are_known(self) -> bool:
-        """Whether there are two counts, from which speeds can be computed."""
+        """Whether speeds are known, which needs at least two counts."""
         return len(self._track) > 1
 
     @property
@@ -53,7 +56,7 @@ class MeanSpeeds:
 
     @property
     def means(self) -> tuple[float, float]:
-        """Mean speeds over the window, in m/s and rad/s; zero while they are unknown."""
+        """Mean speed (m/s) and turn rate (rad/s) over the window; zero while unknown."""
         if not self.are_known:
             return 0.0, 0.0
         newest_s, way_m, yaw_rad = self._track[-1]
@@ -64,7 +67,7 @@ class MeanSpeeds:
 
     @property
     def changes(self) -> tuple[float, float]:
-        """Speeds between the last two counts minus ``means``, in m/s and rad/s."""
+        """Speed (m/s) and turn rate (rad/s) between the last two counts, minus ``means``."""
         if not self.are_known:
             return 0.0, 0.0
         (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]

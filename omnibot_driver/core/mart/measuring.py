@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The evaluation of replies to queries: counts, headings, and motion without a command.
+"""The evaluation of replies to queries: encoder counts, headings, and motion without a command.
 
-This module knows answers and their recipients; it does not know when a query is sent. Time is an
-argument.
+This module knows replies and which part of the driver uses them; it does not know when a query is
+sent. The caller passes the time.
 """
 
 import math
@@ -20,10 +20,12 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS
 
 STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
-"""Times in s for which a robot may coast: ROLLS_S after a stop, ROLLS_AFTER_MOVE_S after a
-controlled move.
+"""Times in s for which a robot may coast after the end of a motion.
 
-If a controlled move fails, the server reports the failure at once, before the robot is at rest.
+``ROLLS_S``: after a stop.
+
+``ROLLS_AFTER_MOVE_S``: after a controlled move. If the move fails, the server reports the failure
+before the robot is at rest.
 """
 
 
@@ -61,9 +63,12 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the present heading shows that the server was restarted.
 
-        The heading is exactly zero before the first RM of a server, but also at the start of each
-        RM, and whenever the heading changes its sign. ``before_rad``: the previous heading, or
-        None.
+        A server reports a heading of exactly zero before its first RM. But the heading is also zero
+        at the start of each RM, and whenever it changes its sign. So a zero shows a restart only if
+        the previous heading was not near zero.
+
+        ``before_rad``: the previous heading, or None. If it is None, a zero shows a restart if the
+        server has been absent since the last start.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False
@@ -120,7 +125,7 @@ class Measuring(Starts):
         )
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
-        """Stop a robot whose counts change although it should be at rest.
+        """Stop a robot whose encoder counts change although it should be at rest.
 
         The cause is a late duplicate of a start, another client, or a push.
         """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The time at which the value in a reply was measured, with the uncertainty that the network adds.
+"""The time at which the value in a reply was measured, and the uncertainty of this time.
 
 This module holds values only.
 """
@@ -9,15 +9,18 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Time uncertainty of a reply, in s, from which the reply is regarded as uncertain."""
+"""Time uncertainty of a reply, in s, at and above which the reply is regarded as uncertain."""
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
     """The time at which the value in a reply was measured.
 
-    ``at_s``: the most probable time; ``from_s``, ``until_s``: the earliest and the latest possible
-    time; ``doubtful``: whether the reply may answer another query than the last one.
+    ``at_s``: the most probable time.
+
+    ``from_s``, ``until_s``: the earliest and the latest possible time.
+
+    ``doubtful``: whether the reply may answer another query than the last one.
     """
 
     at_s: float

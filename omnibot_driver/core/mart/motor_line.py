@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The speed of a motor as a learned straight line over its command units.
+"""The speed of a motor as a straight line over its command units, which the driver learns.
 
 A motor without a regulator needs some units before it turns, so its speed is not proportional to
-its units. If the driver learned only a gain, at a high speed, slow wheels would turn too slowly.
-Speeds are given in nominal units: the units that an ideal motor would need for the speed. This
-module knows neither wheels nor time.
+its units. With a single factor, learned at a high speed, slow wheels would turn too slowly. A speed
+is given in nominal units: the number of units with which an ideal motor has this speed. This module
+knows units; it does not know wheels or time.
 """
 
 import math
@@ -19,16 +19,19 @@ SLOPE_SD, OFFSET_SD = 0.3, 4.0
 SLOPE_DRIFT, OFFSET_DRIFT = 0.01, 0.2
 """Standard deviations of the change of slope and offset (units) between two measurements."""
 SURE: Final = 3.0
-"""A motor certainly turns if its expected speed exceeds this number of standard deviations."""
+"""A motor certainly turns if its expected speed is more than this number of standard deviations."""
 NOISE, NOISE_PART = 0.3, 0.02
-"""Standard deviation of a measured speed: NOISE nominal units, plus NOISE_PART of the commanded
-units."""
+"""Standard deviation of a measured speed, in nominal units.
+
+It is NOISE, plus NOISE_PART times the commanded units.
+"""
 
 
 class MotorLine:
-    """A Kalman filter for the line: ``slope * units + offset`` is the speed in nominal units.
+    """A line that a Kalman filter learns: the speed is ``slope * units + offset``.
 
-    ``slope``: the slope before anything is learned.
+    The speed and the offset are in nominal units. The argument ``slope`` is the slope before
+    anything is learned.
     """
 
     def __init__(self, slope: float = 1.0) -> None:
@@ -37,7 +40,14 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Learn from a measured speed; ``doubt`` multiplies the standard deviation of the speed."""
+        """Learn from a measured speed.
+
+        ``units``: command units with which the speed was measured.
+
+        ``speed``: the measured speed, in nominal units.
+
+        ``doubt``: factor that multiplies the assumed standard deviation of the speed.
+        """
         self._learned = True
         if self._ss < SLOPE_SD**2:
             self._ss += SLOPE_DRIFT**2
@@ -64,15 +74,15 @@ class MotorLine:
         self._so, self._oo = 0.0, OFFSET_SD**2
 
     def move(self, slope: float, offset: float) -> None:
-        """Add ``slope`` and ``offset`` to this line.
+        """Add these changes to the slope and the offset of the line.
 
-        They are the changes of the other motor's line when it last learned from a measurement.
+        The other motor's line has just been changed by the same amounts, by a measurement.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
 
     def turns(self, units: float) -> bool:
-        """Return whether the motor certainly turns with ``units`` when it is not blocked."""
+        """Return whether the motor certainly turns with ``units`` if nothing blocks it."""
         variance = self._ss * units * units + 2 * self._so * units + self._oo
         noise = NOISE + NOISE_PART * units
         return self._learned and self.speed(units) > SURE * math.hypot(math.sqrt(variance), noise)
@@ -98,5 +108,5 @@ class MotorLine:
         return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:
-        """Return the command units that a positive speed, in nominal units, needs."""
+        """Return the command units that give a positive speed, in nominal units."""
         return (speed - self.offset) / self.slope

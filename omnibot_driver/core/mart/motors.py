@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What is known of the two motors: the speed of each for its command units.
+"""What the driver knows about the two motors: the speed of each for its command units.
 
-Each motor has a line (``MotorLine``) in nominal units, which are the units that an ideal motor
-would need. This module knows units, m/s and rad/s; it does not know what is commanded.
+Each motor has a ``MotorLine``, whose speeds are in nominal units. That is the number of units with
+which an ideal motor has this speed. This module knows units, m/s and rad/s; it does not know what
+is commanded.
 """
 
 import copy
@@ -14,11 +15,11 @@ from omnibot_driver.core.mart.settings import MartSettings
 
 MOST_UNITS: Final = 127
 SLOWEST_TURN_RADPS: Final = 0.01
-"""Slowest turn on the spot from which anything is learned, in rad/s."""
+"""Slowest turn on the spot, in rad/s, from which the driver learns."""
 UNEQUAL: Final = 0.04
 """Standard deviation of the ratio of the two motors' speeds at equal units."""
 MOST_UNEQUAL: Final = 2 * UNEQUAL
-"""Largest relative difference between the gains of the two motors that predictions use."""
+"""Largest difference between the assumed ratio of the motors' speeds and ``motor_balance``."""
 Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Fewest units at which the speeds of the two motors are compared.
@@ -30,7 +31,7 @@ At fewer units the motors are slow, so an error of a line would change the ratio
 class Motors:
     """The right and the left motor.
 
-    ``volts``: battery voltage as last reported.
+    ``volts``: battery voltage as last reported, in V.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -52,7 +53,7 @@ class Motors:
 
     @property
     def per_unit_mps(self) -> float:
-        """Speed in m/s that one unit gives an ideal motor with the present battery voltage."""
+        """Speed in m/s that an ideal motor has with one unit, at the present battery voltage."""
         settings = self.settings
         return settings.speed_per_unit * self.volts / settings.nominal_volts
 
@@ -61,7 +62,11 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the units for a turn at ``rate_radps``, after ``units`` gave ``seen_radps``."""
+        """Return the motor units for a turn on the spot at ``rate_radps``.
+
+        ``seen_radps``: the measured rate of the present turn, with ``units``. This call does not
+        change what the driver has learned.
+        """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
         return _units(lines, self._spin_speed(rate_radps))
@@ -72,11 +77,11 @@ class Motors:
             _learn_spin(self._lines, units, self._spin_speed(rate_radps))
 
     def lines(self) -> Lines:
-        """Return a copy of what is known of the right and the left motor."""
+        """Return a copy of the lines of the right and the left motor."""
         return copy.copy(self._right_line), copy.copy(self._left_line)
 
     def restore(self, lines: Lines) -> None:
-        """Forget what was learned since ``lines`` were copied."""
+        """Forget what the driver has learned since ``lines`` were copied."""
         for line, before in zip(self._lines, lines, strict=True):
             line.restore(before)
 
@@ -89,10 +94,10 @@ class Motors:
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
-        """Return the ratio of the left to the right motor's speed at ``units`` on both sides.
+        """Return the ratio of the left motor's speed to the right motor's, both with ``units``.
 
-        If a change of units is lost or duplicated while the lines are learned, the lines are wrong.
-        So the ratio is limited: it differs from ``motor_balance`` by MOST_UNEQUAL at most.
+        The result differs from ``motor_balance`` by MOST_UNEQUAL at most. The limit is needed
+        because a lost or duplicated change of units can make the learned lines wrong.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))
@@ -106,9 +111,9 @@ class Motors:
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
-        """Return the speeds of the right and left wheel, in m/s.
+        """Return the speeds of the right and the left wheel, in m/s.
 
-        Neither is negative: in a tight turn the inner wheel stands still.
+        The speeds are not negative: in a tight turn the inner wheel stands still.
         """
         half = rate_radps * self._settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)
@@ -119,7 +124,7 @@ def _units(lines: Lines, speed: float) -> int:
 
 
 def _learn_spin(lines: Lines, units: int, speed: float) -> None:
-    """Learn the mean speed of both motors, by changing both lines by the same amounts."""
+    """Learn from the mean speed of both motors, by changing both lines by the same amounts."""
     right, left = lines
     error = speed - (right.speed(units) + left.speed(units)) / 2
     slope, offset = right.slope, right.offset

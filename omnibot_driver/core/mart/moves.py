@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Controlled moves towards a goal, one after another, and the evaluation of finished moves.
+"""Controlled moves to a goal, one after another, and the evaluation of finished moves.
 
-This module knows goals and moves; it does not know when a move may be sent. Time is an argument.
+This module knows goals and moves; it does not know when a move may be sent. The caller passes the
+time.
 """
 
 import math
@@ -110,7 +111,7 @@ class Moves(Asking):
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.
 
-        A second run resets the encoder count, so the count covers only the second run.
+        A second run resets the encoder count, so the count then covers only the second run.
         """
         move, self._last_move = self._last_move, None
         if move is None or not self.conversation.disturbed(now):

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The present pose and twist: predicted from the last count, with the added uncertainty.
+"""The present pose and twist: a prediction from the last encoder count, with its uncertainty.
 
-This module knows poses and speeds; it knows no commands. Time is an argument.
+This module knows poses and speeds; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -35,7 +35,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of the present controlled move, or None.
+        ``blind_since_s``: start time of the present controlled move, or None outside a controlled
+        move.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s
@@ -63,9 +64,12 @@ class MartOdometry(Reckoning):
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
         """Return the errors of a prediction from the last count.
 
-        They come from the motion since that count, and from the uncertain time of that count.
+        These errors come from the motion since that count, and from the uncertain time of that
+        count.
 
-        ``ahead_s``: time since the last count; ``blind_since_s``: as in ``told``.
+        ``ahead_s``: time since the last count.
+
+        ``blind_since_s``: as in ``told``.
         """
         if blind_since_s is not None:
             blind_s = max(0.0, now - blind_since_s)

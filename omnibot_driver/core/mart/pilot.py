@@ -1,10 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The choice of the next command to send to the server.
+"""The choice of the next request to the server.
 
-In this order: stop a motion that must not continue, else carry out the wanted command, else send a
-query. This module knows states, commands and measurements; it does not know where the commands
-come from. Time is an argument.
+The pilot takes the first of these steps that is necessary:
+
+1. Stop a motion that must not continue.
+2. Carry out the wanted command.
+3. Send a query.
+
+This module knows states, commands and measurements; it does not know where the commands come from.
+The caller passes the time.
 """
 
 import math
@@ -36,26 +41,33 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 STOPS_S: Final = 1.0
 """Time in s within which a stop is usually answered."""
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
-"""Time in s from the first reply after an absence to the first query VOLTS.
+"""Time in s from the server's first reply after an absence to the first VOLTS query.
 
-This time is shorter than STARTS_UP_S, so that the first motion uses the measured voltage.
+This time is a little shorter than STARTS_UP_S, so that the voltage is known before the first
+motion.
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s for which unanswered requests delay the query VOLTS."""
+"""Longest time in s for which unanswered requests delay a VOLTS query."""
 SILENT_S, GREET_AGAIN_S = 0.15, 0.1
-"""Times in s: SILENT_S from the last reply to the first HELLO, GREET_AGAIN_S between HELLOs.
+"""Times in s after which the driver sends HELLO to a silent server.
 
-Two exchange durations are added to SILENT_S.
+``SILENT_S``: from the last reply to the first HELLO. The duration of two exchanges is added.
+
+``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
-"""Time in s without an answer to ENC after which a duplicate of the last move may be running."""
+"""Time in s after a move: if ENC is not answered by then, a copy of the move may be running."""
 
 
 class Pilot(Hearing):
     """The pilot of one server: decides which request is sent, and evaluates the replies."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
-        """Replace the wanted command by ``wanted``; a new command cancels the present job."""
+        """Replace the wanted command by ``wanted``.
+
+        A motion command or a stop also cancels the present job. A goal that is only repeated does
+        not cancel the reading of a turn's angle.
+        """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
             move = None
@@ -85,7 +97,7 @@ class Pilot(Hearing):
         return HALTS[self.motion]
 
     def busy(self, now: float) -> bool:
-        """Return whether the server is expected to be silent now, because it is busy."""
+        """Return whether the server is busy, so that the driver expects it to be silent."""
         if self._stopping is not None:
             return self.greeted and now < self._stopping.began_s + STOPS_S
         if self.state is State.MOVING:
@@ -180,7 +192,7 @@ class Pilot(Hearing):
 
     @property
     def _greets_at(self) -> float:
-        """The time at which to send HELLO, whose answer shows that the server was not absent."""
+        """The time at which to send HELLO. An answer shows that the server is not absent."""
         if self.state is State.MOVING:
             return self._greet_s
         if self.state in (State.STILL, State.CHECKING, *ROLLING):
@@ -192,11 +204,9 @@ class Pilot(Hearing):
     def _copy_stop_s(self) -> float:
         """The time at which to stop a suspected duplicate of a move; infinite if none is suspected.
 
-        The duplicate of a controlled move runs after the move and blocks the command port, so ENC
-        is not answered.
-
-        The stops SL and SS would hang a server that drives by RM or B, but the last motion was a
-        controlled move.
+        A duplicate of a controlled move runs after the move. It blocks the command port, so the
+        server does not answer ENC. The stops SL and SS would hang a server that drives by RM or B.
+        They are safe here, because the last motion was a controlled move.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected:
@@ -208,10 +218,11 @@ class Pilot(Hearing):
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def _may_ask_volts(self, now: float) -> bool:
-        """Return whether VOLTS may be sent: it crashes a server that has not started up completely.
+        """Return whether VOLTS may be sent now.
 
-        A restart that takes less than ABSENT_S can show only as an unanswered request. So the query
-        VOLTS also waits after each unanswered request.
+        VOLTS crashes a server that has not started up completely. If a restart takes less than
+        ABSENT_S, its only sign may be an unanswered request. So VOLTS also waits after each
+        unanswered request.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The schedule of queries by the state of motion; they are sent while no request is pending.
+"""The times at which queries are due, in each state of the robot's motion.
 
-The queries for encoder and heading are the most frequent, and alternate. A sonar takes 55 ms, so it
-is queried only while the robot is at rest. This module knows queries and states; time is an
-argument.
+Queries are sent while no request is pending. The queries for encoder and heading are the most
+frequent, and alternate. The query of a sonar takes 55 ms, so it is sent only while the robot is at
+rest. This module knows queries and states; it does not know the replies. The caller passes the
+time.
 """
 
 import math
@@ -32,20 +33,20 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.REVERSING: DRIVING,
     State.TURNING: TURNING,
 }
-"""Period in s of each query by state, the most urgent query first.
+"""Period in s of each query, by state. The most urgent query of a state comes first.
 
-States that are not listed have no queries, because the command port is busy in them.
+In the other states the command port is busy, so the driver sends no queries.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between their queries.
+"""The two sonars, and the least time in s between a query of one and a query of the other.
 
-Both sonars report the same value where nothing is near, so a duplicate of one sonar's reply could
-be taken for the reply of the other.
+Both sonars report the same value where nothing is near. So a late copy of one sonar's reply could
+be mistaken for the reply of the other sonar.
 """
 
 
 class Polls:
-    """The times at which each query was last sent."""
+    """The schedule of the queries: when each query was last sent, and when it is due again."""
 
     def __init__(self) -> None:
         self._asked_s: dict[Word, float] = {}
@@ -55,16 +56,17 @@ class Polls:
         self._asked_s.clear()
 
     def due(self, state: State, now: float) -> list[Word]:
-        """Return the queries that are due, sorted by the sum of due time and period.
+        """Return the queries that are due, the most urgent one first.
 
-        Thus each query gets its turn even if an exchange takes longer than a period.
+        The queries are sorted by due time plus period. So each query gets its turn, even if an
+        exchange takes longer than a period.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]
         return sorted(late, key=lambda word: self._at(word, state) + periods[word])
 
     def asked(self, word: Word, now: float) -> None:
-        """Record that the query was sent; the query of one sonar delays that of the other sonar."""
+        """Record that the query was sent. The query of one sonar also delays that of the other."""
         self._asked_s[word] = now
         if word in SONARS:
             for each in SONARS:

@@ -37,8 +37,9 @@ class DockedReading:
 class JobDone:
     """The result of a job, which is a request to the controller besides motion.
 
-    ``token``: the object by which the caller recognizes the job; ``name``, ``content``: name
-    and bytes of the file, if a file was requested.
+    ``token``: the object by which the caller recognizes the job.
+
+    ``name``, ``content``: name and bytes of the file; empty if the job has no file.
     """
 
     token: object
