@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pose at the last count, from the distance of the right wheel and the relative heading.
+"""Dead reckoning: the robot's pose at the last encoder count.
 
-The server reports the heading while RM drives. A turn on the spot is measured by the wheel until
-the reply to SM reports the angle. A controlled move is not measured before its end. This module
-knows counts, degrees and metres; it knows no commands. Time is an argument.
+The pose is computed from the distance of the right wheel and from the relative heading. The server
+reports the heading while RM drives. In a turn on the spot, the wheel measures the turn until the
+reply to SM reports the angle. A controlled move is measured only after its end. This module knows
+counts, degrees and metres; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -22,13 +23,13 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest accepted difference of a reported turn from the wheel's turn: TOLD_RAD (rad), plus
-TOLD_PART of the wheel's turn.
+"""Largest accepted difference between a reported turn and the turn measured at the wheel.
 
-A number that differs by more is regarded as the answer to another query.
+It is TOLD_RAD (rad), plus TOLD_PART of the wheel's turn. A reported number that differs by more is
+regarded as the answer to another query.
 """
 BEGIN_RADPS: Final = 0.03
-"""Standard deviation in rad/s of the turn rate before RM reports its first heading.
+"""Standard deviation in rad/s of the turn rate in RM before the server reports a heading.
 
 The robot may turn, because the two motors have different speeds at equal units.
 """
@@ -37,19 +38,32 @@ BLIND_MPS: Final = 0.3
 ACCELERATION_RADPS2: Final = 3.0
 """Standard deviation of the turn acceleration since the last count, in rad/s²."""
 FRESH_S: Final = 0.2
-"""Age of the last heading, in s, up to which the measured turn rate is regarded as current."""
+"""Largest age in s of the last heading with which the measured turn rate is still valid."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations in m and rad of the unmeasured motion if a connection was lost in a drive."""
+"""Standard deviations of the motion while a connection was lost in a drive, in m and rad."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
 
 class Reckoning:
-    """Dead reckoning by the encoder count and the heading.
+    """Dead reckoning by the encoder count and the relative heading.
 
-    ``pose``: pose at the last count; ``stands``: whether the robot was stopped;
-    ``left_over_right``: commanded ratio of left to right wheel speed if the heading is unknown,
-    else None; ``bend``: standard deviation of that ratio.
+    ``pose``: pose at the last count.
+
+    ``motion``: the motion whose counts are being processed.
+
+    ``stands``: whether the robot was stopped; it may still coast.
+
+    ``slowing_since_s``: time of the first stop command in this motion, or None.
+
+    ``moved_m``, ``spun_rad``: distance, and turn on the spot, since this motion began.
+
+    ``told_rad``: angle that the server has reported for a turn on the spot, or None.
+
+    ``left_over_right``: expected ratio of left to right wheel speed while the heading is unknown,
+    else None.
+
+    ``bend``: standard deviation of that ratio.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -125,7 +139,7 @@ class Reckoning:
         self.stands, self._stood_s = True, now
 
     def rest(self) -> None:
-        """Record that the motion is over, and that the distance coasted after it is measured."""
+        """End the motion, after the distance that the robot coasted was measured too."""
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
@@ -156,8 +170,11 @@ class Reckoning:
     def guess_changed(self, part: float, late_s: float) -> None:
         """Add the heading error that a change of the wheels' speed ratio causes.
 
-        The error arises because the time of the change is uncertain. ``part``: relative change of
-        the ratio; ``late_s``: length in s of the interval in which the change takes effect.
+        The error arises because the time of the change is not exactly known.
+
+        ``part``: relative change of the ratio.
+
+        ``late_s``: length in s of the interval in which the change takes effect.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -165,7 +182,7 @@ class Reckoning:
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
         """Process a count of the right wheel; return the displacement since the last count.
 
-        Returns None if the count is implausible or may belong to an earlier motion, and
+        Return None if the count is implausible or may belong to an earlier motion. Return
         NOTHING_MEASURED if the displacement is unknown, for example at the first count.
         """
         if when.from_s < self._began_s:
@@ -196,9 +213,10 @@ class Reckoning:
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """Distance of the right wheel in m, and turn in rad, if the last motion has begun.
+        """Distance of the right wheel in m, and turn in rad, that may be missing in the pose.
 
-        Both are zero while it is certain whether the motion has begun.
+        They are missing if the last motion has begun. Both are zero if it is certain whether the
+        motion has begun.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -209,6 +227,7 @@ class Reckoning:
 
     @property
     def on_the_spot(self) -> bool:
+        """Whether the motion is a turn on the spot."""
         return self.motion in (Motion.SPIN, Motion.TURN)
 
     def _turn_rad(self, wheel_m: float, at_s: float, seconds: float) -> float:
@@ -232,7 +251,7 @@ class Reckoning:
         return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct the heading if it was computed from commands until the server reported a turn.
+        """Correct a heading that was computed from commands, once the server reports the turn.
 
         Return the correction in rad. It is not a motion of the robot.
         """
@@ -246,7 +265,7 @@ class Reckoning:
         return wrong_rad
 
     def spin_told(self, degrees: float) -> None:
-        """Correct the heading after a turn on the spot by the angle that the server reports.
+        """Correct the heading by the angle that the server reports after a turn on the spot.
 
         ``degrees``: this angle, with the server's sign.
         """
@@ -278,7 +297,8 @@ class Reckoning:
     def _finish_turn(self) -> None:
         """End a turn on the spot after its last count.
 
-        A reported angle that differs too much from the turn measured at the wheel is discarded.
+        If the reported angle differs too much from the turn measured at the wheel, the measured
+        turn is used.
         """
         told_rad = self.told_rad
         wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad
@@ -314,10 +334,10 @@ class Reckoning:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return the age of the last heading beyond FRESH_S, in s, and the error that results.
+        """Return how much older than FRESH_S the last heading is, in s, and the error that results.
 
-        The age is 0 in each motion but RM. The error is the standard deviation of the robot's turn
-        within this time, in rad.
+        The error is the standard deviation of the robot's turn within this time, in rad. Both
+        values are 0 in every motion except RM.
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

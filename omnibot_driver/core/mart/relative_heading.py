@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The turn of the robot within a motion, from polls of the relative heading.
+"""The turn of the robot within a motion, from the relative heading that the server reports.
 
-RM resets the heading to zero; some servers do not update it in any other motion. This module knows
-rad and times; it knows no commands. Time is an argument.
+RM resets this heading to zero. Some servers update the heading only in RM. This module knows rad
+and times; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -17,15 +17,21 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""A heading that differs by less than this (rad) from the last one before RM may be that one."""
+"""Difference in rad below which the first heading in RM may be a heading from before RM.
+
+It is compared with the last heading before RM, because the server may not have reset it yet.
+"""
 MOST_RAD: Final = 1e7
 """Size in rad from which a heading is rejected, because such a number cannot show small turns.
 
-The server integrates the turn rate over unsigned milliseconds of its wall clock. If that clock was
-set back, the heading is about 1e15 degrees.
+The server integrates the turn rate over unsigned milliseconds of its clock. If that clock was set
+back, the heading is about 1e15 degrees.
 """
 AHEAD_S: Final = 0.3
-"""Longest time in s by which a heading is predicted beyond its report, to the time of a count."""
+"""Longest time in s by which a heading is predicted beyond the time of its report.
+
+The prediction gives the heading at the time of an encoder count.
+"""
 ODD_TIMES: Final = 3
 """Number of implausible headings in a row after which the last of them is accepted."""
 SPREADS: Final = 4
@@ -35,8 +41,12 @@ SPREADS: Final = 4
 class RelativeHeading:
     """The relative heading within a motion.
 
-    ``told_s``: time of the last accepted heading; ``from_s``: earliest possible time of the last
-    heading that certainly answers RMRA; ``changed_s``: time of the last change of heading;
+    ``told_s``: time of the last accepted heading.
+
+    ``from_s``: earliest possible time of the last heading that certainly answers RMRA.
+
+    ``changed_s``: time of the last change of heading.
+
     ``rate_radps``: turn rate in rad/s.
     """
 
@@ -51,7 +61,7 @@ class RelativeHeading:
 
     @property
     def is_known(self) -> bool:
-        """Whether a heading is known from which turns can be measured."""
+        """Whether a heading is known, so that later turns can be measured."""
         return self._angle_rad is not None
 
     @property
@@ -61,7 +71,7 @@ class RelativeHeading:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the heading is exactly zero, as before the first RM of a server."""
+        """Whether the heading is exactly zero, as it is before the first RM of a server."""
         return self._angle_rad == 0.0
 
     def forget(self) -> None:
@@ -69,7 +79,10 @@ class RelativeHeading:
         self._angle_rad = None
 
     def begin(self, now: float, *, anew: bool) -> None:
-        """Record that a motion was started; ``anew``: whether RM resets the heading."""
+        """Record that a motion was started.
+
+        ``anew``: whether the motion is RM, which resets the heading.
+        """
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
         self._turned_rad = 0.0
@@ -77,7 +90,7 @@ class RelativeHeading:
         self.changed_s = now
 
     def started(self) -> None:
-        """Record that RM has certainly begun, so each heading from now on is of this motion."""
+        """Record that RM has certainly begun, so that each heading from now on belongs to it."""
         self._before_rad = 0.0
 
     def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:
@@ -125,6 +138,9 @@ class RelativeHeading:
             self.rate_radps = (self._turned_rad - then_rad) / max(when.at_s - then_s, CLOCK_S)
 
     def turned_rad(self, at_s: float, *, stands: bool) -> float:
-        """Return the turn since the motion began, predicted to ``at_s``, in rad."""
+        """Return the turn since the motion began, predicted to ``at_s``, in rad.
+
+        ``stands``: whether the robot was stopped. If so, nothing is predicted.
+        """
         ahead_s = 0.0 if stands else min(max(0.0, at_s - self.told_s), AHEAD_S)
         return self._turned_rad + self.rate_radps * ahead_s

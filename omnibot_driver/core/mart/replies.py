@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parser of the MART controller's datagrams; no input raises an exception.
+"""The parser of the MART controller's datagrams. It accepts any bytes without an exception.
 
 This module knows the forms of replies; it does not know the requests.
 """
@@ -25,7 +25,10 @@ _FORMS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Ok:
-    """A reply that begins with ``ok``; ``text`` is the text after ``ok``."""
+    """A reply that begins with ``ok``.
+
+    ``text``: the text after ``ok``.
+    """
 
     form: Form
     text: str = ""
@@ -44,7 +47,10 @@ class Ok:
 
 @dataclass(frozen=True, slots=True)
 class Fail:
-    """A reply that begins with ``fail``; ``reason`` is the text after ``fail``, maybe empty."""
+    """A reply that begins with ``fail``.
+
+    ``reason``: the text after ``fail``, which may be empty.
+    """
 
     reason: str
 
@@ -60,9 +66,11 @@ Reply = Ok | Fail | Other
 
 
 class MartDecoder:
-    """The decoder of replies. Each datagram is complete, so no data is kept between calls.
+    """The decoder of replies.
 
-    ``foreign``: number of datagrams that are not replies.
+    ``foreign``: number of datagrams so far that are not replies.
+
+    Each datagram is complete, so the decoder keeps no data between calls.
     """
 
     def __init__(self) -> None:
@@ -97,5 +105,8 @@ def parse(data: bytes) -> Reply:
 
 
 def signed(count: int) -> int:
-    """Return the count as a signed 32-bit number; some servers omit the sign of a negative one."""
+    """Return the count as a signed 32-bit number.
+
+    Some servers omit the sign of a negative count and send an unsigned number instead.
+    """
     return (count + 2**31) % 2**32 - 2**31

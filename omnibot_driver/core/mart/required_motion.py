@@ -2,7 +2,8 @@
 
 """The motion that a command requires, and its twist.
 
-This module knows commands and the track; it does not know the server. Time is an argument.
+This module knows commands and the track width; it does not know the server. The caller passes the
+time.
 """
 
 import math
@@ -15,11 +16,12 @@ from omnibot_driver.core.mart.states import Motion
 
 STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
-"""Commands below both limits, in m/s and rad/s, are regarded as a standstill."""
+"""Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Largest difference of a ramped yaw rate from its final value when a turn on the spot begins.
+"""Largest part of a yaw rate that may still be missing when a turn on the spot begins.
 
-The difference is a part of the final value.
+An acceleration limit changes the yaw rate in a ramp. The turn begins when the yaw rate differs from
+its final value by at most this fraction of the final value.
 """
 
 
@@ -29,7 +31,7 @@ def is_standstill(wanted: Wanted) -> bool:
 
 
 def is_turn_ramped(wanted: Wanted, now: float) -> bool:
-    """Return whether an acceleration limit will still change the yaw rate much."""
+    """Return whether an acceleration limit still changes the yaw rate by more than RAMP_LEFT."""
     if wanted is None or isinstance(wanted, Stop | EmergencyStop):
         return False
     present, final = wanted.order(now), wanted.final
@@ -40,7 +42,7 @@ def is_turn_ramped(wanted: Wanted, now: float) -> bool:
 
 
 def moving_order(wanted: Wanted, now: float) -> Drive | GoTo | None:
-    """Return the order of a command for this time, or None if it requires no motion."""
+    """Return the order that the command gives at this time, or None if it requires no motion."""
     if wanted is None or isinstance(wanted, Stop | EmergencyStop) or wanted.is_zero:
         return None
     order = wanted.order(now)
@@ -48,7 +50,10 @@ def moving_order(wanted: Wanted, now: float) -> Drive | GoTo | None:
 
 
 def required_motion(order: Drive | GoTo | None, track_m: float) -> tuple[Motion, BodyTwist]:
-    """Return the motion that the order requires, and its twist; Motion.NONE for a goal."""
+    """Return the motion that the order requires, and its twist.
+
+    The motion is Motion.NONE for a goal (GoTo), and for a standstill.
+    """
     if not isinstance(order, Drive):
         return Motion.NONE, STANDING
     speed, rate = order.twist.vx_mps, order.twist.yaw_rate_radps
@@ -61,5 +66,5 @@ def required_motion(order: Drive | GoTo | None, track_m: float) -> tuple[Motion,
 
 
 def _is_on_the_spot(speed_mps: float, rate_radps: float, track_m: float) -> bool:
-    """Return whether the twist is more like a turn on the spot than like a turn about one wheel."""
+    """Return whether the twist is nearer to a turn on the spot than to a turn about one wheel."""
     return abs(speed_mps) < 0.5 * abs(rate_radps) * track_m / 2 or math.isclose(speed_mps, 0.0)

@@ -10,15 +10,29 @@ from typing import Literal
 class MartSettings:
     """The settings of one robot with a MART controller.
 
-    ``metres_per_count``: distance in m that the right wheel rolls per encoder count, negative if
-    the encoder counts down when the robot drives forward; ``speed_per_unit``: speed of a wheel in
-    m/s for one unit of RM at ``nominal_volts``; ``heading_sign``: 1 if the relative angle increases
-    when the robot turns left, else -1; ``network_delay_s``: longest time that a datagram may be on
-    its way, in s; ``spin_speed``: whether R and L turn at the commanded speed (set by SSP) or at
-    the server's own SLOW speed; ``motor_balance``: speed of the left motor divided by that of the
-    right one, at equal units; ``max_speed_mps``, ``max_yaw_rate_radps``: limits for the motions to
-    a goal; the server has only a normal and a slow motion, and the driver uses the slow one if the
-    normal one would exceed the limit.
+    ``track_m``: distance between the two wheels, in m.
+
+    ``metres_per_count``: distance in m that the right wheel rolls per encoder count. It is negative
+    if the encoder counts down when the robot drives forward.
+
+    ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at ``nominal_volts``.
+
+    ``motor_balance``: speed of the left motor divided by that of the right motor, at equal units.
+
+    ``heading_sign``: 1 if the server's relative angle increases when the robot turns left, else -1.
+
+    ``network_delay_s``: longest time that a datagram may be on its way, in s.
+
+    ``spin_speed``: "custom" if R and L turn at the commanded speed, which the driver sets by SSP.
+    "fixed" if they turn at the server's own speed SLOW.
+
+    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for the motions to a goal. The server has a
+    normal and a slow motion. The driver uses the slow motion if the normal motion would exceed the
+    limit.
+
+    ``wheel_scale``: standard deviation of the wheel's size, as a fraction.
+
+    ``gyro_drift_radps``: standard deviation of the gyro's drift, in rad/s.
     """
 
     wheel_radius_m: float = 0.0625

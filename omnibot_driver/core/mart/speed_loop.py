@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The conversion of speed and turn rate to command units of two motors, with feedback.
+"""The control of both motors: which command units give the wanted speed and turn rate.
 
 The server applies changes of the units without controlling the speed, so the effect of a unit
-depends on voltage, motor and floor. Each side has a line (``MotorLine``) that is learned from
-windows of steady driving and from turns on the spot. The heading is held by the integral of the
-turn rate error. This module knows units, m/s and rad; it knows no commands. Time is an argument.
+depends on voltage, motor and floor. For each side the driver learns a ``MotorLine``, from windows
+of steady driving and from turns on the spot. The integral of the turn rate's error holds the
+heading. This module knows units, m/s and rad; it does not know commands. The caller passes the
+time.
 """
 
 import math
@@ -19,22 +20,29 @@ from omnibot_driver.core.mart.settings import MartSettings
 MOST_CHANGE: Final = 15
 """Largest allowed change in units by one command.
 
-It is small, because a duplicated command acts twice.
+It is small, because the network may duplicate a command, which then acts twice.
 """
 MOST_BACKWARD: Final = 5
-"""Limit in place of MOST_CHANGE while the robot drives backward on a slow network.
+"""Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-A duplicated command may come on a slow network, and is not noticed while the robot drives backward.
+On a slow network a command may arrive twice. While the robot drives backward, the driver does not
+notice that.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
-"""Times in s: SETTLE_S is the pause in learning after a large change; LEARN_S is the shortest
-window of learning."""
+"""Times in s for learning from steady driving.
+
+``SETTLE_S``: pause in learning after a large change of units.
+
+``LEARN_S``: shortest time in which the driver averages a speed, the window of learning.
+"""
 LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Effects of a longer exchange duration: a longer window of learning, and less certain speeds.
+"""Effect of slow exchanges with the server on learning.
 
-The window grows by LEARN_TRIPS durations. The standard deviation of the speeds is multiplied by
-1 + LESS_PER_S * duration in s.
+``LEARN_TRIPS``: number of exchange durations that are added to the window of learning.
+
+``LESS_PER_S``: increase of the standard deviation of a measured speed, for each s that an exchange
+takes. The standard deviation is multiplied by 1 + LESS_PER_S * duration.
 """
 SLOWEST_MPS: Final = 0.015
 """Measured speed in m/s above which a wheel is regarded as turning."""
@@ -42,30 +50,38 @@ SLOWEST_START_MPS: Final = 0.03
 """Slowest wheel speed in m/s with which a motion starts, so that the server sees the wheel turn."""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
-"""Factor from the units of a start that did not turn the motors to the units of the next start."""
+"""If a start does not turn the motors, the units of the next start are larger by this factor."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""Time in s after a change of the commanded turn rate in which no heading error is integrated."""
+"""Time in s after a new commanded turn rate in which no heading error is integrated."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Factors from a squared relative change of units to the variance of the ratio of wheel speeds.
+"""Effect of an uncertain change of units on the variance of the ratio of the wheel speeds.
 
-A change that may arrive twice adds COPIED times its square to the variance; a change that was not
-answered adds MISSED times its square.
+``COPIED``: the variance grows by this factor times ``part`` squared if the change may arrive twice.
 
-A change may arrive twice if exchanges take longer than SLOW_TRIP_S (s). The variances are
-deliberately large, because a wrong ratio of speeds lasts for the whole motion.
+``MISSED``: the same, if the change was not answered.
+
+``SLOW_TRIP_S``: a change may arrive twice if exchanges take longer than this time in s.
+
+The factors are deliberately large, because a wrong ratio of speeds lasts for the whole motion.
+``part`` is an attribute of ``SpeedLoop``.
 """
 
 
 @dataclass(slots=True)
 class _Side:
-    """One motor.
+    """One motor, and the wheel that it turns.
 
-    ``line``: the learned speed for each number of units; ``units``: commanded units;
-    ``window_units_s``: sum of units times seconds in the present window; ``window_m``: distance in
-    m that the wheel has rolled in this window; ``stood_s``: time in s for which the wheel has stood
-    although its units suffice to turn it.
+    ``line``: the learned speed for each number of units.
+
+    ``units``: commanded units.
+
+    ``stood_s``: time in s for which the wheel has stood although it has enough units to turn.
+
+    ``window_units_s``: sum of units times seconds in the present window of learning.
+
+    ``window_m``: distance in m that the wheel has rolled in this window.
     """
 
     line: MotorLine
@@ -82,8 +98,11 @@ class _Side:
 class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
-    ``trip_s``: duration of an exchange, by which the times of measurements are uncertain; ``part``:
-    sum of the last changes of both sides, each without sign and as a part of that side's units.
+    ``trip_s``: average duration of an exchange with the server, in s. The times of measurements are
+    uncertain by this duration.
+
+    ``part``: size of the last change of units. The change of each side is divided by that side's
+    units, and both results are added without sign.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -108,7 +127,7 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which both sides start a motion of this speed and turn rate.
 
-        Both sides get the units that the slower side needs.
+        Both sides get the same number, which is what the slower side needs.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -116,15 +135,15 @@ class SpeedLoop(Motors):
         return max(self._least_units, units)
 
     def started(self) -> None:
-        """Record that the motors have turned after a start; later starts may need fewer units."""
+        """Record that the motors have turned after a start. Later starts may need fewer units."""
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        MOST_DEAD units or more turn each motor that is not blocked, so nothing is learned from
-        them. If a motor certainly turns with its present units by its line, the line is not
-        changed, but the next start uses more units.
+        MOST_DEAD units or more turn each motor that is not blocked, so nothing is learned from such
+        units. The line of a motor also stays unchanged if it shows that the motor certainly turns
+        with its present units. Then only the next start uses more units.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -140,14 +159,14 @@ class SpeedLoop(Motors):
 
     @property
     def blocked_s(self) -> float:
-        """Time in s for which a wheel has stood although its units suffice to turn it."""
+        """Longest time in s for which a wheel has stood although it has enough units to turn."""
         return max(self._right.stood_s, self._left.stood_s)
 
     @property
     def left_over_right(self) -> float:
-        """Ratio of left to right wheel speed, by the units and the learned lines.
+        """Expected ratio of left to right wheel speed, by the units and the learned lines.
 
-        At equal units of both sides, the ratio is ``balance``.
+        If both sides have equal units, the ratio is ``balance``.
         """
         right, left = self._right, self._left
         if not right.units:
@@ -157,15 +176,16 @@ class SpeedLoop(Motors):
 
     @property
     def balance(self) -> float:
-        """Ratio of the left to the right motor's speed if both had the present motion's units.
+        """Ratio of left to right motor speed, if both sides had equal units.
 
-        The ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
+        The units are those of the present motion. The ratio differs from ``motor_balance`` by
+        MOST_UNEQUAL at most.
         """
         return self._balance(self.units)
 
     @property
     def measured_balance(self) -> float | None:
-        """The ratio ``balance`` as learned in a drive, not limited; None before the first drive."""
+        """The ratio ``balance`` without its limit, or None if it was not measured yet."""
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
     @property
@@ -182,9 +202,9 @@ class SpeedLoop(Motors):
         *,
         right_only: bool = False,
     ) -> None:
-        """Learn from a displacement measured over ``seconds``, and hold the heading.
+        """Learn from a displacement measured over ``seconds``, and update the heading error.
 
-        ``right_only``: whether only the right wheel was measured; then the left motor's line is
+        ``right_only``: whether only the right wheel was measured. If so, the left motor's line is
         changed by as much as the right motor's line.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
@@ -212,7 +232,7 @@ class SpeedLoop(Motors):
             self._clear(now)
 
     def _learn(self, side: _Side) -> None:
-        """Learn a side's line from the finished window."""
+        """Learn the line of one side from the finished window."""
         units = side.window_units_s / self._window_s
         speed = side.window_m / self._window_s / self.per_unit_mps
         slowest = SLOWEST_MPS / self.per_unit_mps
@@ -223,9 +243,13 @@ class SpeedLoop(Motors):
             side.line.learn(units, max(0.0, speed), 1.0 + LESS_PER_S * self.trip_s)
 
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
-        """Return the changes of right and left units, positive along the motion; None if zero.
+        """Return the changes of the right and the left motor's units, or None if both are zero.
 
-        ``speed_mps`` is along the motion and not negative; ``rate_radps`` is positive to the left.
+        A positive change makes the wheel turn faster in the direction of the motion.
+
+        ``speed_mps``: wanted speed along the motion, not negative.
+
+        ``rate_radps``: wanted turn rate, positive to the left.
         """
         if abs(rate_radps - self._rate_radps) > NEW_RADPS:
             self._rate_changed_s, self._error_rad = now, 0.0
@@ -244,10 +268,7 @@ class SpeedLoop(Motors):
         return (right, left) if right or left else None
 
     def changed(self, right: int, left: int, now: float) -> None:
-        """Record that a change was sent.
-
-        The motors are assumed to obey the change.
-        """
+        """Record that a change was sent. The motors are assumed to obey it."""
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
         self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
         self._right.units = min(MOST_UNITS, max(0, self._right.units + right))

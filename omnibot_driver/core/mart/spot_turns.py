@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Turns on the spot: the setting of their speed, and what is learned from their rate and stop.
+"""Turns on the spot: how the driver sets their speed, and what it learns from them.
 
 The server cannot change the rate of a turn, so another rate needs another turn. This module knows
-rates and motor units; it does not know when a turn begins or ends. Time is an argument.
+rates and motor units; it does not know when a turn begins or ends. The caller passes the time.
 """
 
 import math
@@ -18,44 +18,60 @@ from omnibot_driver.core.mart.speed_loop import SpeedLoop
 from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
-"""Relative change of the commanded rate above which the driver begins the turn anew."""
+"""Relative change of the commanded rate above which the driver begins a new turn."""
 OFF, OFF_AGAIN = 0.05, 0.12
-"""Relative errors of a turn's rate at which the turn is begun anew, with other units.
+"""Relative error of a turn's rate above which the driver begins the turn anew, with other units.
 
-The driver uses OFF until a turn has shown how fast the motors turn. Then it uses OFF_AGAIN, because
-to stop and start again would often disturb the motion more than a smaller error does.
+``OFF``: limit until a turn has shown how fast the motors turn.
+
+``OFF_AGAIN``: limit after that. To stop and start again would often disturb the motion more than a
+smaller error does.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Parts of the commanded rate: limits for turns that are slow because something holds the robot.
+"""Limits for turns that are slow because something holds the robot.
 
-If the motors are known, a rate below HELD is not learned. Otherwise the driver learns LEAST_LESSON
-in place of a lower rate, so that the next turn has at most 1.7 times the units.
+Both are fractions of the commanded rate.
+
+``HELD``: if the motors are known, the driver does not learn from a lower rate.
+
+``LEAST_LESSON``: if the motors are not known, the driver learns this rate in place of a lower rate.
+So the next turn has at most 1.7 times the units.
 """
 EVEN: Final = 0.15
-"""Relative change of a turn's rate below which the turn shows how fast the motors turn."""
+"""Relative change of a turn's rate below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Parts of the commanded rate. If a turn slower than HINDERED is followed by one faster than
-TOO_FAST, something held the robot in the slow turn. The driver forgets what it learned from it."""
-SAME, CORRECTIONS = 0.2, 2
-"""Two rates count as equal if their relative difference is at most SAME. While the commanded rate
-stays equal, the driver begins the turn anew at most CORRECTIONS times to correct its rate."""
-STEADY: Final = 0.03
-"""Relative change of the commanded rate above which it counts as a new rate."""
-SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
-"""A turn shows how fast the motors turn if it takes SPINS_UP_S (s) plus the averaging time of
-speeds, and exceeds SEEN_RAD (rad).
+"""Rates of two turns, as fractions of the commanded rate, which show that the first was hindered.
 
-From TOLD_RAD (rad) on, the angle that the server reports in whole degrees is more precise than the
-wheel.
+The first turn is slower than HINDERED, and the next turn is faster than TOO_FAST. So something held
+the robot in the first turn. The driver forgets what it learned from that turn.
+"""
+SAME, CORRECTIONS = 0.2, 2
+"""Limits for turns that the driver begins anew to correct their rate.
+
+``SAME``: largest relative difference of two commanded rates that are regarded as equal.
+
+``CORRECTIONS``: largest number of corrections while the commanded rate stays equal.
+"""
+STEADY: Final = 0.03
+"""Relative change of the commanded rate above which it is regarded as a new rate."""
+SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
+"""Conditions for learning from a turn how fast the motors turn.
+
+``SPINS_UP_S``: the turn takes at least this time in s, plus the averaging time of speeds.
+
+``SEEN_RAD``: the turn exceeds this angle in rad.
+
+``TOLD_RAD``: above this angle in rad, the driver uses the angle that the server reports. The server
+reports whole degrees, which are then more precise than the wheel.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
-"""Largest accepted difference between the turn that a stop reports and the expected turn:
-UNSURE_RAD (rad), plus UNSURE_PART of the expected turn.
+"""Largest accepted difference between the angle in the reply to a stop and the expected turn.
 
+It is UNSURE_RAD (rad), plus UNSURE_PART of the expected turn, plus the turn during two exchanges.
 The expected turn comes from the encoder count and the commanded rate.
 """
 JUST_SET_S: Final = 2.0
-"""Time in s after SSP within which the server certainly knows the speed of R and L."""
+"""Time in s after SSP in which the server certainly still knows the speed of R and L."""
 SLOW_UNITS: Final = 20
 """Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 SETTING_REFUSED: Final = (
@@ -65,10 +81,13 @@ SETTING_REFUSED: Final = (
 
 
 class SpotTurns:
-    """The turns by R and L.
+    """The turns on the spot, by R and L.
 
-    ``settings`` may be replaced. ``units``: motor units of the last turn; ``seen_radps``: measured
-    rate of the last turn.
+    ``units``: motor units of the last turn.
+
+    ``seen_radps``: measured rate of the last turn.
+
+    ``settings`` may be replaced.
     """
 
     def __init__(self, settings: MartSettings, odometry: MartOdometry, loop: SpeedLoop) -> None:
@@ -98,10 +117,14 @@ class SpotTurns:
         return word.request("SLOW" if self.is_fixed else "CUSTOM")
 
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
-        """Return the command to send before a turn with this rate (SSP), or None if none is needed.
+        """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
 
-        SSP must be sent before the check of the IMU. ``delay_s``: longest delay of a datagram; a
-        copy of an older setting must not come after a newer one.
+        ``rate_radps``: the rate of the turn.
+
+        The driver must send SSP before it checks the IMU.
+
+        ``delay_s``: longest delay of a datagram, in s. The next setting waits for this time, so
+        that a copy of the older setting cannot arrive after it.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -139,8 +162,9 @@ class SpotTurns:
     def fits(self, rate_radps: float, now: float, *, turned_s: float, disturbed: bool) -> bool:
         """Return whether the present turn may continue while this rate is commanded.
 
-        ``turned_s``: time since the turn began; ``disturbed``: whether measurements may be
-        missing.
+        ``turned_s``: time since the turn began, in s.
+
+        ``disturbed``: whether measurements may be missing.
         """
         if abs(rate_radps - self._wanted_radps) > STEADY * abs(rate_radps):
             self._wanted_radps, self._wanted_s = rate_radps, now
@@ -153,7 +177,7 @@ class SpotTurns:
         return near and not self._is_off(rate_radps, steady_s, disturbed=disturbed)
 
     def _is_off(self, rate_radps: float, steady_s: float, *, disturbed: bool) -> bool:
-        """Return whether the turn's rate is so wrong that the turn must be begun anew.
+        """Return whether the turn's rate is so wrong that the driver must begin the turn anew.
 
         The stop of the turn shows how fast the motors turn with their units, so the next turn is
         better. While the commanded rate changes, the result is False.
@@ -186,14 +210,17 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the measured rate for learning; if it is too low, return a minimum instead."""
+        """Return the rate to learn: the measured rate, or a minimum in place of a lower rate."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
-        """Return whether a number cannot be the angle that the stop of this turn reports.
+        """Return whether a number in a reply cannot be the angle of the turn that was stopped.
 
-        Such a number is a late reply to a query, for example an encoder count. ``unseen_s``: time
-        from the last count to the stop; ``trip_s``: average duration of a query.
+        Such a number is a late reply to a query, for example an encoder count.
+
+        ``unseen_s``: time from the last count to the stop, in s.
+
+        ``trip_s``: average duration of a query, in s.
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
             return False
@@ -207,10 +234,16 @@ class SpotTurns:
     def stopped(
         self, degrees: float, uncounted_s: float, turned_s: float, *, disturbed: bool
     ) -> None:
-        """Evaluate the angle that the stop has reported, in degrees.
+        """Evaluate the angle in the reply to the stop of a turn.
 
-        ``uncounted_s``: time from the last count to the stop; ``turned_s``: time since the turn
-        began; ``disturbed``: whether the reply to SSP may have belonged to another command.
+        ``degrees``: this angle.
+
+        ``uncounted_s``: time from the last count to the stop.
+
+        ``turned_s``: time since the turn began.
+
+        ``disturbed``: whether the reply to SSP may have belonged to another command. If so, nothing
+        is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.spun_rad
@@ -228,14 +261,16 @@ class SpotTurns:
         self._has_learned = True
 
     def keep_lessons(self) -> None:
-        """Keep what was learned until now: no later turn can undo it."""
+        """Keep what the driver has learned until now, so that no later turn can undo it."""
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from a slow turn if this turn shows that it was hindered.
+        """Forget what was learned from a slow turn, if this turn shows that it was hindered.
 
-        ``part``: rate of this turn as a part of the commanded one. From the slow and the fast turn
-        together, the driver would learn a dead zone that the motors do not have.
+        ``part``: rate of this turn, as a fraction of the commanded rate.
+
+        From the slow and the fast turn together, the driver would learn a dead zone that the motors
+        do not have.
         """
         if self._before_slow is not None and part > TOO_FAST:
             self._loop.restore(self._before_slow)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The start of motions: a new check that the IMU works, then the start command.
+"""The start of motions: a new check of the IMU, then the start command.
 
 This module knows the wanted motion and the start commands; it does not know when a motion must end.
-Time is an argument.
+The caller passes the time.
 """
 
 import math
@@ -34,18 +34,20 @@ from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 TIMED_OUT_S: Final = 0.5
-"""Shortest time in s in which the server finds that no wheel turns after a start."""
+"""Shortest time in s after which the server reports that no wheel turns after a start."""
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Times in s that a controlled move may take in addition to 3 s, for each inch or degree.
+"""Longest duration of a controlled move, beyond 3 s.
 
-STRAIGHT_S_PER_IN is for an inch of a straight move, TURN_S_PER_DEG for a degree of a turn.
+``STRAIGHT_S_PER_IN``: time in s for each inch of a straight move.
+
+``TURN_S_PER_DEG``: time in s for each degree of a turn.
 """
 REFERENCE_FAILS: Final = 2
-"""Number of bare ``fail`` replies to RM in a row after which RM is not tried again.
+"""Number of bare ``fail`` replies to RM in a row after which the driver does not try RM again.
 
-A single bare ``fail`` also comes from an intact server, after a stop that took long.
+An intact server also gives a single bare ``fail``, after a stop that took long.
 """
 
 
@@ -90,7 +92,7 @@ class Starts(Adjusting):
         return self._begin(start, now)
 
     def _spin_setting(self, now: float) -> Request | None:
-        """Return the request that sets the speed of turns on the spot, if it must be sent now."""
+        """Return the request that sets the speed of a turn on the spot, if it must be sent now."""
         motion, twist = self._wish(now)
         if motion is not Motion.SPIN or is_turn_ramped(self._wanted, now):
             return None
@@ -104,7 +106,7 @@ class Starts(Adjusting):
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
 
-        A copy of a move would block the port; a copy of a stop would end the next motion.
+        A copy of a move would block the command port. A copy of a stop would end the next motion.
         """
         moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
         return moves or now < self._halted_s + self._delay_s
@@ -129,7 +131,7 @@ class Starts(Adjusting):
         return words.B.request("SLOW")
 
     def _check(self, now: float) -> Packets:
-        """Return the check of the IMU, once no late reply can be mistaken for the check's reply."""
+        """Return the check of the IMU, unless a late reply could be mistaken for its reply."""
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS
@@ -249,8 +251,9 @@ class Starts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure text of RM may be about another motion.
 
-        On some servers the text belongs to the last B. So a reported obstacle is believed only if
-        the front sonar sees an obstacle too, or if RM has reported an obstacle twice in a row.
+        On some servers the text belongs to the last B. The driver believes a reported obstacle in
+        two cases: the front sonar sees an obstacle too, or RM has reported an obstacle twice in a
+        row. It does not rely on any other text.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of commands that may be sent to the MART controller in each state of motion.
+"""The commands that the driver may send to the MART controller in each state of motion.
 
 Some commands, sent in the wrong state, hang the real server permanently while the motors turn. So
-each command is looked up here before it is sent. This module knows commands and states; it does not
-know times or measurements.
+the driver looks up each command here before it sends the command. This module knows commands and
+states; it does not know times or measurements.
 """
 
 from collections.abc import Mapping
@@ -72,7 +72,7 @@ ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
 
 
 class Motion(Enum):
-    """The command by which the server moves, or may move, the robot."""
+    """A kind of motion. Its value names the commands with which the server begins such a motion."""
 
     NONE = "none"
     REFERENCE = "RM"
@@ -116,7 +116,7 @@ HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SRM, SM),
 }
-"""The commands that stop each motion. Other stop commands have no effect or hang the server."""
+"""The commands that stop each motion. Other stop commands have no effect, or hang the server."""
 
 LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.NONE: (),
@@ -127,7 +127,10 @@ LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SL, SS),
 }
-"""The commands that stop the motors when the command port is silent; they may hang the server."""
+"""For each motion, the commands that stop the motors when the command port is silent.
+
+These commands are the last resort, because they may hang the server.
+"""
 
 STARTS: Final[Mapping[Word, Motion]] = {
     RM: Motion.REFERENCE,
@@ -144,16 +147,16 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, these commands start the motors and are never answered, or take effect when the IMU
-works again. MCR and MCL notice the dead IMU, but some servers turn the robot for half a second
-first.
+With a dead IMU, the server starts the motors on these commands, but never answers. Or it carries
+the command out later, when the IMU works again. MCR and MCL notice the dead IMU, but some servers
+turn the robot for half a second first.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
-"""Commands that do harm if a duplicate of them arrives late, when another motion has begun.
+"""Commands that do harm if a duplicate arrives late, when another motion has begun.
 
-So after one of these commands, the driver starts no other motion, and does not check the IMU for a
-start, until a duplicate can no longer come.
+After one of these commands, the driver waits until a duplicate can no longer come. Before that, it
+does not start another motion, nor check the IMU for a start.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {
@@ -164,7 +167,7 @@ WHILE: Final[Mapping[Motion, State]] = {
     Motion.STRAIGHT: State.MOVING,
     Motion.TURN: State.MOVING,
 }
-"""By motion: the state of the robot as soon as the server has begun the motion."""
+"""The state of the robot in each motion, from the time at which the server has begun the motion."""
 
 
 def may_say(state: State, word: Word, motion: Motion) -> bool:

@@ -1,14 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stop of one motion: the commands to send until the server has acknowledged it.
+"""The stop of one motion: the commands to send until the server has acknowledged the stop.
 
-The stop command is sent at once, even if another request is pending, and repeated until it is
-answered. The stop may overtake a start that is still on its way. So a reply is accepted only if it
-certainly answers a stop, and if no duplicate of the start could arrive after that stop. A bare
-``ok`` is accepted only if it cannot be the reply to the start; else the stop is repeated. The stop
-port is the last resort. It is not used right after SM or SRM, because its command would then run at
-the same time as SM or SRM, and a port could hang. This module knows commands, replies and times; it
-does not know why the robot is stopped.
+The driver sends the stop command at once, even if another request is pending. It repeats the
+command until the server answers. The network may deliver a stop before a start that was sent
+earlier. So the driver accepts a reply only under these conditions:
+
+- The reply certainly answers a stop. A bare ``ok`` is accepted only if it cannot be the reply to
+  the start.
+- A duplicate of the start can no longer arrive after that stop.
+
+The stop port is the last resort. The driver does not use it right after SM or SRM, because both
+commands would run at the same time, and a port could hang. This module knows commands, replies and
+times; it does not know why the robot is stopped.
 """
 
 import math
@@ -20,7 +24,7 @@ from omnibot_driver.core.mart.words import NO_MOTION, NOT_IN_MOTION, Form, Word
 
 REPEAT_S: Final = 0.3
 ROUNDS: Final = 3
-"""Number of stops on the command port before the stop port is used."""
+"""Number of stops that the driver sends to the command port before it uses the stop port."""
 STOP_PORT_TIMES: Final = 3
 ANSWERS: Final = {
     Motion.REFERENCE: (Form.NOTHING,),
@@ -28,21 +32,25 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""The forms of the reply ``ok`` with which the server reports that it has stopped each motion."""
+"""For each motion, the forms of the ``ok`` with which the server reports that it has stopped it."""
 ASK_NAME_S: Final = 0.9
 """Time in s from the first stop of a controlled move until the driver asks for the server's name.
 
-The move is expected to end within this time.
+By then, the move is expected to have ended.
 """
 
 
 class Stopping:
     """The stop of one motion.
 
-    ``began_s``: time of the first stop command; ``started_s``: time at which the motion's start
-    was sent; ``owed``: number of other requests whose reply is still to come and looks like a
-    reply to the stop; ``move``: the controlled move to stop, or None; the reply to the move itself
-    ends the stop.
+    ``began_s``: time of the first stop command.
+
+    ``started_s``: time at which the start of the motion was sent.
+
+    ``owed``: number of other requests whose reply is still to come and looks like a reply to the
+    stop.
+
+    ``move``: the controlled move to stop, or None. The reply to the move itself ends the stop.
     """
 
     def __init__(
@@ -142,8 +150,8 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The last doubtful reply, if it is probably the reply to the stop; else None.
 
-        It is regarded as such if more replies came than were missing when the stop began. This is
-        certain only on a network that neither delays nor duplicates datagrams.
+        It probably is the reply to the stop if more replies came than were missing when the stop
+        began. This is certain only on a network that neither delays nor duplicates datagrams.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

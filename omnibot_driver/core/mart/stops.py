@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The reasons to stop a motion, and the stop itself. An uncertain motion is stopped too.
+"""The reasons to stop a motion, and the stop itself.
 
-This module knows the wanted command, measurements and the stop commands; it does not know how a
-motion begins. Time is an argument.
+The driver also stops a motion if it is not certain what the robot does. This module knows the
+wanted command, measurements and the stop commands; it does not know how a motion begins. The caller
+passes the time.
 """
 
 import math
@@ -29,12 +30,12 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 3
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S: Final = 0.5
-"""The robot is stopped if its heading is constant for this time in s plus two exchange durations.
+"""Longest time in s for which the heading may stay constant, plus two exchange durations.
 
-In that case, the IMU is dead or the robot is stuck.
+After this time the driver stops the robot, because the IMU is dead or the robot is stuck.
 """
 NO_START_S: Final = 1.5
-"""Time in s after the start within which the wheel must turn."""
+"""Time in s after a start within which the robot must begin to move."""
 LATE: Final = " while the robot drives: check the network"
 STUCK: Final = (
     "the robot is commanded to move and does not: check motors, wheels and power, and whether"
@@ -46,9 +47,9 @@ HALF_STUCK: Final = (
 )
 UNCONTROLLED: Final = (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
-"""Measured speeds in m/s and rad/s; a robot that exceeds either of them certainly moves."""
+"""Measured speeds in m/s and rad/s. A robot that exceeds either of them certainly moves."""
 BLOCKED_S: Final = 0.6
-"""Time in s for which a wheel must stand in a drive before it is regarded as blocked."""
+"""Time in s for which a wheel must stand in a drive before the driver regards it as blocked."""
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
     Motion.REFERENCE: "RM",
@@ -86,10 +87,9 @@ class Stops(Ground, ABC):
         return True
 
     def _why_stop(self, now: float) -> str:
-        """Return why the present motion must not continue: a sentence, "wanted", or empty.
+        """Return why the present motion must not continue, as a sentence for the user.
 
-        "wanted" means that another motion is wanted; an empty text means that the motion may
-        continue.
+        The result is "wanted" if another motion is wanted, and empty if the motion may continue.
         """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""
@@ -131,11 +131,13 @@ class Stops(Ground, ABC):
         return odometry.heading.told_s - max(odometry.heading.changed_s, self._begun_s)
 
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
-        """Begin to stop any motion in progress; a nonempty ``why`` is reported to the user.
+        """Begin to stop any motion in progress.
 
-        With a nonempty ``why``, the driver also discards the user's command. It keeps the command
-        if the direction of the present motion is already refused (see ``_block``). ``arrived``:
-        whether the start has certainly arrived, so that a stop cannot overtake it.
+        ``why``: the reason to report to the user, or empty. With a reason, the driver also discards
+        the user's command. It keeps the command if the direction of the present motion is already
+        refused (see ``_block``).
+
+        ``arrived``: whether the start has certainly arrived, so that a stop cannot overtake it.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
@@ -218,7 +220,7 @@ class Stops(Ground, ABC):
         self._rest(now)
 
     def _may_be_count(self, reply: Reply) -> bool:
-        """Return whether a number cannot be the angle that the stop of a turn on the spot reports.
+        """Return whether a number in a reply cannot be the angle of the turn that was stopped.
 
         Such a number is a late reply to a query, for example an encoder count.
         """
@@ -250,11 +252,11 @@ class Stops(Ground, ABC):
         )
 
     def _outlives(self, reply: Reply) -> None:
-        """Record a reply to a stop on the command port that comes after the stop port was used.
+        """Record that the server answers a stop only after the driver has used the stop port.
 
-        So the server has not been restarted, and its stop port may still wait for the end of the
-        motion. The stop port would mistake the start of the next RM for that end. The next RM would
-        then never be answered, and nothing could stop it.
+        So the server was not restarted, and its stop port may still wait for the end of the motion.
+        The stop port would mistake the start of the next RM for that end. The server would then
+        never answer that RM, and nothing could stop it.
         """
         ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
         if ends and self.motion is not Motion.SPIN:
@@ -276,7 +278,7 @@ class Stops(Ground, ABC):
         """Begin to find out which motion is in progress, after the stop port was used."""
 
     def _obstacle(self, reply: Fail, motion: Motion) -> str:
-        """Return why a motion failed, as text; refuse its direction if an obstacle is the cause."""
+        """Return why a motion failed, as text. Refuse its direction if the cause is an obstacle."""
         if reply.reason in words.OBSTACLES:
             self._block(motion, reply.reason)
             return f"the controller reports an obstacle ({reply.reason})"
@@ -305,7 +307,7 @@ class Stops(Ground, ABC):
             self._notice(self._obstacle(reply, motion), halt=True)
 
     def _block(self, motion: Motion, why: str) -> None:
-        """Refuse the direction of ``motion`` until the command has ended or is zero."""
+        """Refuse the direction of ``motion`` until the command ends or is zero."""
         if self._blocked is not motion:
             self._blocked = motion
             where = "behind" if motion is Motion.REVERSE else "in front"

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The distance rolled by the right wheel, from an encoder count that restarts with each motion.
+"""The distance rolled by the right wheel, from an encoder count that begins anew in each motion.
 
-A reply may answer an earlier query, or contain another number than the count. So an implausible
-count is discarded. If several counts in a row are implausible, the last of them is accepted; an
-impossibly large step to this count adds no distance. This module knows counts and times; time and
-metres per count are arguments.
+A reply may answer an earlier query, or contain another number than the count. So the driver
+discards an implausible count. After several implausible counts in a row, it accepts the last of
+them. An impossibly large step to this count then adds no distance. This module knows counts and
+times; it does not know the robot's motion. The caller passes the time and the metres per count.
 """
 
 import math
@@ -17,28 +17,35 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Largest accepted error of a count that may answer another query.
 
-The error is DOUBT_M (m), plus DOUBT_MPS (m/s) times the sum of two times: the driving time since
-the last count, and the time uncertainty of the reply.
+``DOUBT_M``: fixed part of the error, in m.
+
+``DOUBT_MPS``: further error in m for each s. The time is the driving time since the last count plus
+the time uncertainty of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
-"""Largest plausible distance between two counts: MOST_M (m), plus MOST_MPS (m/s) times the time.
+"""Largest plausible distance between two counts.
 
-A larger distance shows that one of the two counts is false.
+It is MOST_M (m), plus MOST_MPS (m/s) times the time between the counts. A larger distance shows
+that one of the two counts is wrong.
 """
 STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""The start is regarded as lost if this number of counts equal the last count before the start."""
+"""Number of counts, equal to the last count before a start, that show that the start is lost."""
 
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """The distance between two counts.
+    """The distance that the wheel has rolled between two counts.
 
-    ``wheel_m``: distance in m; ``seconds``: time between the counts. ``lost``: whether the
-    robot has also moved by an unknown amount; ``unsure``: whether the true distance may be zero,
-    because the start may have been lost.
+    ``wheel_m``: distance in m.
+
+    ``seconds``: time between the counts.
+
+    ``lost``: whether the robot has also moved by an unknown amount.
+
+    ``unsure``: whether the true distance may be zero, because the start may have been lost.
     """
 
     wheel_m: float
@@ -50,10 +57,16 @@ class Step:
 class WheelCount:
     """The count of the right wheel's encoder.
 
-    ``last``: last accepted count, or None before the first; ``told_s``: time of that count;
-    ``from_s``: earliest possible time of that count; ``certain``: whether the last reply cannot be
-    the answer to another query. ``maybe``: the last count if it equals the last count before
-    the start, so that it does not show whether the motion has begun; else 0.
+    ``last``: last accepted count, or None before the first.
+
+    ``told_s``: time of that count.
+
+    ``from_s``: earliest possible time of that count.
+
+    ``certain``: whether the last reply cannot be the answer to another query.
+
+    ``maybe``: the last count, if it equals the last count before the start, else 0. Such a count
+    does not show whether the motion has begun.
     """
 
     def __init__(self) -> None:
@@ -69,7 +82,7 @@ class WheelCount:
         self._same = self._odd = 0
 
     def begin(self) -> None:
-        """Record that a start was sent; the count begins at zero if the start has arrived."""
+        """Record that a start was sent. The count begins at zero if the start has arrived."""
         self._before, self.last = self.last, 0
         self.may_begin_anew = self._begins = True
         self.certain = self._confirmed = False
@@ -92,7 +105,7 @@ class WheelCount:
         self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
-        """Record that the motion is over; the next step begins at the last count received."""
+        """Record that the motion is over. The next step begins at the last count received."""
         self.last, self._begins = self._raw, False
         self.maybe = 0
 
@@ -108,8 +121,11 @@ class WheelCount:
     ) -> Step | None:
         """Process a count; return the step since the last count, or None for an implausible count.
 
-        ``expected_mps``: expected speed of the wheel; ``stood_s``: time at which the robot was
-        stopped, infinite while it is driven; ``rests``: whether the last motion is over.
+        ``expected_mps``: expected speed of the wheel.
+
+        ``stood_s``: time at which the robot was stopped, infinite while it is driven.
+
+        ``rests``: whether the last motion is over.
         """
         before, before_s = self.last, self.told_s
         self.certain = count == before or not when.doubtful
@@ -153,7 +169,7 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether the count goes back within this motion, which shows a wrong reply."""
+        """Return whether the count goes back within this motion. Such a count is a wrong reply."""
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:
             return False

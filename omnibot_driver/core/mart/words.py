@@ -2,9 +2,9 @@
 
 """The table of all commands of the MART controller: port, replies and times of each.
 
-One command is one ASCII datagram without a terminator, and it is case-sensitive. This module does
-not know in which state a command is allowed (see ``states``) or when it is sent (see
-``conversation``).
+A command is one ASCII datagram without a terminator, and it is case-sensitive. This module knows
+the commands; it does not know in which state a command is allowed (see ``states``) or when it is
+sent (see ``conversation``).
 """
 
 from dataclasses import dataclass, field
@@ -14,11 +14,11 @@ from typing import Final
 COMMAND, STOP = 0, 1
 """The channels: the command port P, and the stop port P+1, which never answers."""
 LONGEST_REQUEST: Final = 49
-"""Longest request in bytes. The shortest is 1: an empty datagram shuts the server down."""
+"""Longest request in bytes. The shortest has 1 byte: an empty datagram shuts the server down."""
 
 
 class Form(Enum):
-    """The kind of text that follows ``ok`` in a successful reply, each with an example."""
+    """The kind of text that follows ``ok`` in a reply. The value of each form is an example."""
 
     NOTHING = "ok"
     NAME = "ok BBB"
@@ -29,7 +29,7 @@ class Form(Enum):
 
 
 class Kind(Enum):
-    """The effect of a command."""
+    """What a command does."""
 
     QUERY = "asks"
     CHECK = "proves that the IMU is alive"
@@ -44,8 +44,13 @@ class Kind(Enum):
 class Word:
     """One command of the server.
 
-    ``forms``: the forms of a successful reply; ``takes_s``: longest time in s that the server
-    needs; ``least_s``: shortest time in s, so that an earlier reply belongs to another command;
+    ``forms``: the forms of a successful reply.
+
+    ``takes_s``: longest time in s that the server needs.
+
+    ``least_s``: shortest time in s that the server needs. A reply that comes earlier belongs to
+    another command.
+
     ``fails``: the texts after ``fail`` that this command can return. A text that no command lists
     is accepted with every command.
     """
@@ -127,8 +132,8 @@ NO_IMU: Final = "could not init"
 RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
 """The check of the IMU without a motion.
 
-If the check fails, the server closes the IMU. So the driver repeats a failed check before it
-regards the IMU as dead.
+If the check fails, the server closes the IMU. So the driver repeats a failed check several times
+before it regards the IMU as dead.
 """
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
 """The check of the IMU for servers without RST IMU: a turn by 0 degrees.
