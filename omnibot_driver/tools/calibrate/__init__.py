@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Calibration: move the robot through its driver, and measure the driver's parameters."""
+"""The calibration tool: it moves the robot through the driver, and measures driver parameters."""

@@ -2,7 +2,8 @@
 
 """Run a calibration: ``python -m omnibot_driver.tools.calibrate imu|scale|geometry|...``.
 
-Each subcommand is a module of this package with ``run(robot, console, arguments) -> Result``.
+Each subcommand is a module of this package that has a function ``run(robot, console, arguments)``.
+This function returns a ``Result``.
 """
 
 import argparse
@@ -19,10 +20,12 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Run the subcommand; return 0 if it succeeds, 1 if it fails.
+    """Run the subcommand; return the exit code.
 
-    Return 2 on wrong usage, 130 when interrupted. On a failure, stderr shows the reason. ``read``
-    asks the user a question and returns the answer.
+    The code is 0 on success, 1 on failure, 2 on wrong usage, and 130 when interrupted. After a
+    failure, stderr shows the reason.
+
+    ``read``: a function that asks the user a question and returns the answer.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Allan deviation of a sensor at rest, and the noise terms that fit it. Pure calculation.
+"""The Allan deviation of a sensor at rest, and the noise terms that fit it.
 
 The overlapping estimator is that of NIST Special Publication 1065. The noise terms and the standard
-deviation of an estimate are those of IEEE Std 952-1997, annex C.
+deviation of an estimate are those of IEEE Std 952-1997, annex C. This module knows readings and
+their period; it does not know the sensor.
 """
 
 from dataclasses import dataclass
@@ -17,19 +18,23 @@ from omnibot_driver.tools.calibrate.log import Column
 FEWEST_CLUSTERS: Final = 9
 """Least number of averages from which the tool computes an Allan deviation.
 
-Each of them is the mean of the readings over one averaging time. The longest averaging time is
-therefore one ninth of the recorded time.
+Each average is the mean of the readings over one averaging time. So the longest averaging time is
+one ninth of the recorded time.
 """
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
-"""Shortest recording, in s, from which the tool estimates instability and random walk of a bias."""
+"""Shortest recording, in s, from which the tool estimates bias instability and random walk."""
 
 
 @dataclass(frozen=True, slots=True)
 class Allan:
-    """Allan deviations and their standard deviations ``sigma``, in the unit of the readings.
+    """Allan deviations for several averaging times. All arrays have the shape (n,).
 
-    ``tau_s``: averaging times, in s. All arrays have the shape (n,).
+    ``tau_s``: averaging times, in s.
+
+    ``deviation``: Allan deviations, in the unit of the readings.
+
+    ``sigma``: standard deviations of these Allan deviations.
     """
 
     tau_s: Column
@@ -41,8 +46,13 @@ class Allan:
 class Noise:
     """Noise terms of a sensor whose readings have the unit U.
 
-    ``density``: white noise in U/√Hz, with its standard deviation ``sigma``; ``instability``: bias
-    instability (flicker noise) in U; ``walk``: random walk of the bias in U/√s.
+    ``density``: density of the white noise, in U/√Hz.
+
+    ``sigma``: standard deviation of ``density``.
+
+    ``instability``: bias instability (flicker noise), in U.
+
+    ``walk``: random walk of the bias, in U/√s.
     """
 
     density: float
@@ -51,15 +61,15 @@ class Noise:
     walk: float
 
     def deviation(self, tau_s: Column) -> Column:
-        """Return the Allan deviation that this noise has at the averaging times ``tau_s``."""
+        """Return the Allan deviation that this noise has at the averaging times ``tau_s``, in U."""
         variance = self.density**2 / tau_s + FLICKER * self.instability**2
         return np.asarray(np.sqrt(variance + self.walk**2 * tau_s / 3))
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Return the Allan deviations of evenly spaced readings of shape (n,).
+    """Return the Allan deviations of readings at a constant period, of shape (n,).
 
-    Successive averaging times are a quarter of an octave apart.
+    The averaging times grow by a quarter of an octave from one to the next.
     """
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS

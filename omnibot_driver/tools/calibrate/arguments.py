@@ -2,7 +2,8 @@
 
 """The command line of the calibrations.
 
-Must not import libraries that only a calibration needs, so that ``--help`` works without them.
+This module must not import libraries that only a calibration needs, so that ``--help`` works
+without them.
 """
 
 import argparse
@@ -18,7 +19,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter that exists only if the board records encoder ticks and accepts gains."""
+"""Name of a parameter. A board has this parameter if it records encoder ticks and accepts gains."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -32,10 +33,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
 }
-"""For each subcommand, names of parameters, and what the driver's board must have.
+"""What each subcommand needs: names of parameters, and a text for the error message.
 
-The driver must have at least one of these parameters. If it has none, the board lacks what the
-subcommand needs, and the tool names this in its error message.
+The driver must have at least one of these parameters. Otherwise the board lacks what the subcommand
+needs. The text names what is missing.
 """
 
 

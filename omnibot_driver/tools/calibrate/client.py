@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the running driver, use its parameters and call its services.
+"""A ROS client that finds the running driver, uses its parameters and calls its services.
 
-Must not know how the robot moves.
+This module knows parameters and services; it does not know how the robot moves.
 """
 
 import time
@@ -29,8 +29,11 @@ ANSWER_WITHIN_S: Final = 12.0
 class Client:
     """A ROS client of one running driver.
 
-    ``driver``: the full name of the driver's node; ``parameters``: values of the driver's
-    parameters, by name; ``table``: the descriptions of these parameters.
+    ``driver``: the full name of the driver's node.
+
+    ``parameters``: the values of the driver's parameters, by name.
+
+    ``table``: the descriptions of these parameters.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -120,7 +123,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set those of ``values`` that may change while the driver runs; ignore the others."""
+        """Set those of ``values`` that may change while the driver runs. Ignore the others."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }
@@ -128,10 +131,10 @@ class Client:
             self.set_parameters(changeable)
 
     def call(self, service: str, on: bool | None = None) -> str:
-        """Call a service of the driver; return the message of its response.
+        """Call a service of the driver; return the message in its response.
 
-        ``on``: the data of a SetBool, or None for a Trigger. Raises ToolError if the driver reports
-        a failure.
+        ``on``: the data for a service of type SetBool. It is None for a service of type Trigger.
+        Raises ToolError if the driver reports a failure.
         """
         kind = Trigger if on is None else SetBool
         request = Trigger.Request() if on is None else SetBool.Request(data=on)

@@ -2,10 +2,10 @@
 
 """``calibrate commission``: a guided procedure that finds how motors and IMU are oriented.
 
-The procedure uses the board's data where they are sufficient. For the rest, it asks the user in
-which directions the wheels really turn, and lets the user hold the robot in several postures. If an
-answer contradicts the command or another answer, the procedure explains why and repeats the
-question.
+Where the board's data are sufficient, the procedure uses only these data. For the rest, it asks the
+user in which directions the wheels turn. It also asks the user to hold the robot in several
+postures. If an answer contradicts the command or another answer, the procedure explains why, and
+repeats the question.
 """
 
 import argparse
@@ -55,9 +55,9 @@ WHEEL_RADPS: Final = 2.0
 """Speed of a wheel while its direction is shown to the user, in rad/s (docs/commissioning.md)."""
 AXIS_SPEEDS: Final[tuple[Vector3, ...]] = ((0.05, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 0.3))
 SLOW_LSB: Final = 4
-"""Value of Vx for the slow drive, in the board's units (0.06 m/s by default).
+"""Value of Vx in the slow drive, in the board's units (0.06 m/s by default).
 
-The fast drive is commanded with exactly twice this number.
+The fast drive has exactly twice this value.
 """
 TURN_RADPS: Final = 0.5
 TURN_RAD: Final = 1.6
@@ -69,9 +69,9 @@ T = TypeVar("T")
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Run the selected parts of the procedure.
+    """Run the selected parts of the procedure; return the results.
 
-    Raises ToolError if repeated answers remain contradictory.
+    Raises ToolError if the answers are still contradictory after several tries.
     """
     walk = Walk(robot, console)
     found = Found(before=robot.parameters)
@@ -101,7 +101,7 @@ class Walk:
     def board(self, found: Found) -> None:
         """Find the position of the board's mode switch, and the frame of the odometry deltas.
 
-        ``found`` receives the results.
+        The results are written to ``found``.
         """
         say = self._console.say
         slow_mps = SLOW_LSB / self._robot.parameters["linear_scale"]
@@ -142,7 +142,10 @@ class Walk:
         say(f"After a turn by {turned_rad:.2f} rad: delta_frame is {found.delta_frame}, {verdict}.")
 
     def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
-        """Return the motions at ``slow_mps`` and at twice that speed, and the control method."""
+        """Return the motions in the slow and in the fast drive, and the control method.
+
+        ``slow_mps``: commanded speed of the slow drive. The fast drive has twice this speed.
+        """
         for _ in range(TRIES):
             log = self._drive(
                 [(JOG_S, (slow_mps, 0.0, 0.0)), (JOG_S, (2 * slow_mps, 0.0, 0.0))], obeys=False
@@ -169,7 +172,7 @@ class Walk:
     def wheels(self, found: Found) -> None:
         """Check the order of the wheels, and find the signs of the axes.
 
-        ``found`` receives the results.
+        The results are written to ``found``.
         """
         self._console.say(
             "Look at each wheel from outside, towards the robot's centre. According to the"
@@ -214,7 +217,7 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Run a motion that the user watches; return how the user saw the wheels turn.
+        """Run a motion that the user watches; return how the wheels turned, as the user saw it.
 
         The user may ask to see the motion again.
         """
@@ -266,8 +269,8 @@ class Walk:
     def _until_possible(self, find: Callable[[], T]) -> T:
         """Call ``find`` until it succeeds, at most ``TRIES`` times; return its result.
 
-        ``find`` raises Contradiction if an answer or a measurement cannot be right. Raises
-        ToolError if the last try fails, too.
+        ``find`` raises Contradiction if an answer or a measurement cannot be right. If the last try
+        fails too, this method raises ToolError.
         """
         for _ in range(TRIES):
             try:
@@ -294,5 +297,8 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the pattern in the user's answer: empty for ``r`` (repeat), None if not valid."""
+    """Return the pattern in the user's answer; None if the answer is not valid.
+
+    The pattern is empty if the answer is ``r``, by which the user asks to see the motion again.
+    """
     return () if answer == "r" else understand(answer)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WHEEL_BEARINGS_RAD: Final = (-math.pi / 3, math.pi / 3, math.pi)
-"""Bearings of wheels A, B, C, in rad, counter-clockwise from the front.
+"""Directions from the robot's centre to wheels A, B, C, in rad, counter-clockwise from the front.
 
 Source: manual, "Control equation".
 """
@@ -28,7 +28,7 @@ COLOURS: Final = {"x": "C3", "y": "C2", "z": "C0"}
 
 @dataclass(slots=True)
 class Found:
-    """The results of a commissioning; a result that was not determined is None.
+    """The results of a commissioning. A result that was not determined is None.
 
     ``before``: the driver's parameters before the commissioning.
     """
@@ -116,7 +116,7 @@ def _remarks(found: Found) -> list[str]:
 
 
 def draw(figure: "Figure", found: Found) -> None:
-    """Draw a view from above: the board's x and y axes, and the IMU's axes."""
+    """Draw two views of the robot from above: the board's x and y axes, and the IMU's axes."""
     left, right = figure.subplots(1, 2)
     for axes in (left, right):
         axes.add_artist(Circle((0.0, 0.0), 1.0, fill=False, color="0.7"))

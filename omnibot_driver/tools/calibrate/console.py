@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The dialogue with the user beside the robot: questions, progress, and the table of results.
-
-``read`` asks a question and returns the answer; tests replace it.
-"""
+"""The dialogue with the user beside the robot: questions, progress, and the table of results."""
 
 import math
 import sys
@@ -25,10 +22,12 @@ PLAIN_WIDTH: Final = 100
 
 
 class Console:
-    """The dialogue on a terminal.
+    """The dialogue with the user on a terminal.
 
-    With ``yes``, every yes-or-no question is answered with yes; numbers are still asked for, since
-    only the user knows them.
+    ``yes``: whether every yes-or-no question is answered with yes. The user must still enter
+    numbers, because only the user knows them.
+
+    ``read``: a function that asks a question and returns the answer. Tests replace it.
     """
 
     def __init__(
@@ -76,9 +75,10 @@ class Console:
             self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
 
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
-        """Ask until ``understand`` accepts the answer; print ``otherwise`` after a rejected one.
+        """Ask until ``understand`` accepts the answer; return what ``understand`` returned.
 
-        Return what ``understand`` returned; None means a rejected answer.
+        ``understand`` returns None for an answer that it does not accept. The tool then prints
+        ``otherwise`` and asks again.
         """
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)
@@ -92,7 +92,8 @@ class Console:
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
         """Show the progress of a task while the context lasts.
 
-        The context provides a function. The caller passes it the completed fraction, from 0 to 1.
+        The context provides a function. The caller calls this function with the completed fraction,
+        from 0 to 1.
         """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")
@@ -127,7 +128,7 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value as text.
 
-    All three are rounded to the second significant digit of the uncertainty.
+    All three texts end at the second significant digit of the uncertainty.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

@@ -21,9 +21,13 @@ PICTURES = (".png", ".svg", ".pdf")
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
     """Return the path of the file to which the tool saves the result.
 
-    It is the first of these that is not empty: ``given`` (by the user), ``drivers`` (the driver's
-    calibration file), ``DEFAULT`` (in the current folder). Raises ToolError if the file cannot be
-    written, or is not a calibration file.
+    The path is the first of these that is not empty:
+
+    - ``given``, the user's choice
+    - ``drivers``, the driver's calibration file
+    - ``DEFAULT``, a file in the current folder
+
+    Raises ToolError if the file cannot be written, or is not a calibration file.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)
@@ -44,7 +48,8 @@ def picture_file(given: str | None, subcommand: str) -> Path:
     """Return the path of the picture.
 
     If ``given`` is a folder, the picture is the file ``calibrate_<subcommand>.png`` in this folder.
-    If ``given`` is None, the picture is the file of that name in the current folder.
+    If ``given`` is None, it is the file of that name in the current folder.
+
     Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """
     path = Path(given or ".").expanduser()
@@ -60,7 +65,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
 
 
 def save(result: Result, output: Path, table: Table) -> None:
-    """Save the result. Raises ToolError on failure; the file is then unchanged."""
+    """Save the result. Raises ToolError on failure, which leaves the file unchanged."""
     try:
         for name, value in result.parameters.items():
             table.by_name[name].check(value)
@@ -71,7 +76,7 @@ def save(result: Result, output: Path, table: Table) -> None:
 
 
 def draw(result: Result, output: Path, picture: Path) -> None:
-    """Draw the picture. Raises ToolError on failure; its message says that the result is saved."""
+    """Draw the picture. The message of a ToolError also says whether the result is saved."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drive on the floor several times; the user measures each drive with a tape.
+"""Drives on the floor, each of which the user measures with a tape.
 
-Must not know what is computed from the drives.
+This module knows how to run a drive and how to ask the user; it does not know what is computed from
+the drives.
 """
 
 import argparse
@@ -19,7 +20,7 @@ from omnibot_driver.tools.needs import ToolError
 
 
 class Planned(Protocol):
-    """A planned drive; ``name`` describes the drive to the user."""
+    """A planned drive. Its ``name`` describes the drive to the user."""
 
     @property
     def name(self) -> str: ...
@@ -36,10 +37,14 @@ def measured(
     go: Callable[[Drive], Column],
     measure: Callable[[Drive, Column], Measured],
 ) -> list[Measured]:
-    """Run each drive with ``go``, then call ``measure``; return the results of ``measure``.
+    """Run each drive and let the user measure it; return the measurements.
 
-    ``go`` returns the poses of the drive by the odometry; ``measure`` receives the drive and these
-    poses. Raises ToolError if the user does not confirm that there is room, or if a drive fails.
+    ``go``: a function that runs a drive and returns the poses of the robot by the odometry.
+
+    ``measure``: a function that asks the user. It receives the drive and these poses, and returns
+    the measurement.
+
+    Raises ToolError if the user does not confirm that there is room, or if a drive fails.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
@@ -81,8 +86,11 @@ def driven(
 ) -> Column:
     """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``: the size of the whole turn from start to end, in rad; ``seconds``: the expected
-    duration. Raises ToolError if the drive fails.
+    ``turn_rad``: size of the whole turn from start to end.
+
+    ``seconds``: expected duration.
+
+    Raises ToolError if the drive fails.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(
@@ -101,10 +109,9 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask by what angle the robot has turned past the mark on the floor.
+    """Ask how far the robot has turned past the mark on the floor; return this angle in rad.
 
-    The mark shows where the robot's front should point. Return the angle in rad, positive to the
-    left.
+    The mark shows where the robot's front should point. The angle is positive to the left.
     """
     return math.radians(
         console.number(

@@ -22,7 +22,7 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""The tool warns the user if a wheel's radius differs from the mean by more than this fraction."""
+"""Difference between a wheel's radius and the mean, as a fraction, above which the tool warns."""
 INTRODUCTION: Final = (
     "You need a tape measure, something to mark the floor with, and a plumb or a fixed point"
     " under the robot's centre. Before each drive mark where the centre is and where the front"
@@ -35,7 +35,7 @@ INTRODUCTION: Final = (
 class Drive:
     """A drive through the poses ``places``.
 
-    If ``heading`` is true, the user measures the heading at the end, otherwise the position.
+    ``heading``: whether the user measures the heading at the end of the drive, not the position.
     """
 
     name: str
@@ -62,11 +62,11 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def believed(now: Mapping[str, Any]) -> dict[str, float]:
-    """Return the sizes in m and the scales on which ``odom`` is based, by parameter name.
+    """Return the sizes in m and the scales from which ``odom`` is computed, by parameter name.
 
-    If the board sends wheel counts, the driver computes the odometry from its parameters for the
-    sizes. Otherwise the board computes the odometry from the manual's sizes, and the driver scales
-    the board's result.
+    If the board sends wheel counts, the driver computes the odometry from its own parameters for
+    the sizes. Otherwise the board computes the odometry from the manual's sizes, and the driver
+    scales the board's result.
     """
     if now["delta_frame"] == "wheel_counts":
         return {name: now[name] for name in ("wheel_radius", "base_radius")}
@@ -132,7 +132,9 @@ def _reading(
 
 
 def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any]) -> Result:
-    """Return the result to show and to save, for the fitted geometry ``found``.
+    """Return the result to show and to save.
+
+    ``found``: the geometry that was fitted to the readings.
 
     ``now``: the driver's parameters before the calibration.
     """
@@ -185,10 +187,11 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
 def misses(
     readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> tuple[float, float]:
-    """Return the mean distances, in m, between the ends of the drives by odometry and by tape.
+    """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    The first value is for the driver's present geometry, the second for ``found``. The driver has
-    one radius for all wheels, so differences between the wheels are not used.
+    An error is the distance from the end by the tape to the end by the odometry. The first value is
+    for the driver's present geometry, the second value for ``found``. Differences between the
+    wheels in ``found`` are not used, because the driver has one radius for all wheels.
     """
     before: list[float] = []
     after: list[float] = []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw the picture of ``calibrate geometry``."""
+"""The picture of ``calibrate geometry``."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw each drive's path with the old and the new geometry, and its end as measured by tape.
+    """Draw the path of each drive with the old and with the new geometry, and its measured end.
 
-    Beside the paths, draw the errors of the odometry with both geometries, in standard deviations
-    of the tape reading.
+    Beside the paths, draw the errors of the odometry with both geometries. Their unit is the
+    standard deviation of the reading.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

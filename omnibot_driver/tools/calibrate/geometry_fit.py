@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fit the robot's geometry to drives whose ends were measured with a tape. Pure calculation.
+"""Fit the robot's geometry to drives whose ends the user measured with a tape.
 
-Each path of the odometry is converted to the distances that the wheels rolled. From these distances
-the path is computed again with other radii of the wheels and of the base, until the ends fit the
-tape. Any mixture of lines, turns and squares can be used, if it determines the radii. The method is
-that of J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry errors in
-mobile robots" (1995), extended to three wheels.
+The module converts each path of the odometry to the distances that the wheels rolled. From these
+distances it computes the path again with other radii of the wheels and of the base, until the ends
+fit the tape. Any mixture of lines, turns and squares can be used if it determines the radii. The
+method is that of J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry
+errors in mobile robots" (1995), extended to three wheels. This module knows paths and readings; it
+does not know how the robot was driven.
 """
 
 import math
@@ -23,7 +24,7 @@ from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 
 WHEELS_ALIKE: Final = 0.01
-"""Relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
+"""Relative standard deviation of the wheels' radii, which comes from manufacturing tolerances."""
 UNKNOWN: Final = 0.2
 """Largest accepted relative error of an assumed radius.
 
@@ -33,11 +34,14 @@ If the error is larger, the readings are regarded as wrong.
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One measured drive.
+    """One drive with the user's measurement.
 
-    ``path``: (n, 3) poses of the odometry, the last one at rest; ``end``: (3,) true pose at the end
-    relative to the start, in m, m and unwrapped rad, with NaN for values that were not measured;
-    ``sigma``: (3,) standard deviations of ``end``.
+    ``path``: poses of the odometry, (n, 3), in m, m and rad. The robot is at rest at the last pose.
+
+    ``end``: the true pose at the end relative to the start, (3,), in m, m and unwrapped rad. A
+    value that was not measured is NaN.
+
+    ``sigma``: standard deviations of ``end``, (3,).
     """
 
     name: str
@@ -50,10 +54,16 @@ class Reading:
 class Geometry:
     """The robot's sizes, as ratios to the assumed sizes.
 
-    ``wheels``: mean radius of the wheels; ``base``: base radius; ``unlike``: (3,) relative
-    difference of each wheel's radius from the mean. ``covariance``: (4, 4) covariance matrix of
-    ``wheels``, ``base`` and the first two elements of ``unlike``; ``excess``: ratio of the
-    residuals to the expected ones, at least 1.
+    ``wheels``: ratio of the mean radius of the wheels.
+
+    ``base``: ratio of the base radius.
+
+    ``unlike``: relative difference of each wheel's radius from the mean, (3,).
+
+    ``covariance``: covariance of ``wheels``, ``base`` and the first two elements of ``unlike``, (4,
+    4).
+
+    ``excess``: ratio of the residuals to the expected residuals, at least 1.
     """
 
     wheels: float
@@ -83,9 +93,12 @@ class Geometry:
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
     """Return the geometry that explains the readings best.
 
-    ``base_radius_m``: the assumed base radius; ``drift``: standard deviation, in m, of a wheel's
-    distance after 1 m, due to slip. Raises ToolError if the fit fails, or if a radius differs from
-    the assumed one by more than ``UNKNOWN``.
+    ``base_radius_m``: the assumed base radius.
+
+    ``drift``: standard deviation in m that slip causes in a wheel's distance of 1 m.
+
+    Raises ToolError if the fit fails, or if a radius differs from the assumed radius by more than
+    ``UNKNOWN``.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -114,10 +127,18 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the poses, (n, 3), that the wheel rotations of ``path`` give with other radii.
+    """Return the poses, (n, 3), that result from the same wheel rotations with other radii.
 
-    The new path begins at the origin. ``factors``: ratios of the new to the assumed wheel radii,
-    (3,) or for each step (n - 1, 3); ``base``: ratio of the new to the assumed base radius.
+    The new path begins at the origin.
+
+    ``path``: the path that was computed with the assumed radii.
+
+    ``factors``: ratio of the new to the assumed radius for each wheel, (3,). It may also be given
+    for each step, (n - 1, 3).
+
+    ``base``: ratio of the new to the assumed base radius.
+
+    ``base_radius_m``: the assumed base radius.
     """
     rims = rims_of(path, base_radius_m) * factors
     body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
@@ -130,7 +151,7 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
 
 def rims_of(path: Column, base_radius_m: float) -> Column:
-    """Return the distance that each wheel rolled between successive poses, in m: (n - 1, 3)."""
+    """Return the distance that each wheel rolled between successive poses, in m, (n - 1, 3)."""
     steps = np.diff(path, axis=0)
     middle = path[:-1, 2] + steps[:, 2] / 2
     cos, sin = np.cos(middle), np.sin(middle)
@@ -139,7 +160,7 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """Return the matrix that makes the errors of a reading independent, with unit variance."""
+    """Return the matrix by which the errors of a reading become independent, with unit variance."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2

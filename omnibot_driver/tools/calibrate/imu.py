@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
-"""Largest number of readings to draw; more would enlarge the file, but not improve the picture."""
+"""Largest number of readings to draw. More readings enlarge the file, but not what can be seen."""
 GRAVITY_SIGMA: Final = 0.01
-"""Standard deviation of the local gravity that the user gives, in m/s²."""
+"""Standard deviation of the user's value for the local gravity, in m/s²."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record the IMU at rest and evaluate the readings.
+    """Record the IMU while the robot is at rest, and evaluate the readings.
 
     Raises ToolError if the robot moves, or if the readings cannot be used.
     """
@@ -57,7 +57,11 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
-    """Return the result of a measurement at rest, to show and to save.
+    """Return the result to show and to save.
+
+    ``found``: the evaluation of the IMU at rest.
+
+    ``imu``: the readings, without the driver's corrections of the biases.
 
     ``now``: the driver's parameters before the calibration.
     """

@@ -1,12 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Handle the signals of Ctrl-C, of a lost SSH session and of kill.
+"""The reaction to Ctrl-C, to a lost SSH session and to kill.
 
-The program notes a signal; the next call of `check` raises Interrupted.
-
-A signal does not raise an exception at once, because an exception inside ROS could leave the
-executor in an undefined state. A signal raises Interrupted at once only while the program waits
-for the user's answer.
+When such a signal arrives, the program notes it. The next call of ``check`` raises Interrupted. The
+signal itself does not raise an exception, because an exception inside ROS could leave the executor
+in an undefined state. Only while the program waits for the user's answer, a signal raises
+Interrupted at once.
 """
 
 import signal
@@ -26,7 +25,7 @@ class Interrupted(ToolError):
 
 
 class Interruption:
-    """A context manager that handles ``SIGNALS``; outside the main thread it does nothing."""
+    """A context manager that handles ``SIGNALS``. Outside the main thread it does nothing."""
 
     def __init__(self) -> None:
         self._requested = self._asking = self._deferred = False
@@ -53,9 +52,9 @@ class Interruption:
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """A context in which `check` does not raise.
+        """A context in which ``check`` does not raise.
 
-        After the context, `check` raises if a signal was received in it.
+        If a signal was received in the context, ``check`` raises after the context.
         """
         self._deferred = True
         try:
@@ -64,7 +63,7 @@ class Interruption:
             self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
-        """Return a function that calls ``read``; a signal interrupts this function at once."""
+        """Return a function that calls ``read``, and that a signal interrupts at once."""
 
         def ask(question: str) -> str:
             self.check()

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Receive a robot's data for a calibration, and check them. Sends no commands."""
+"""The client that receives a robot's data for a calibration, and checks them.
+
+This module knows data; it does not know commands.
+"""
 
 import math
 import time
@@ -32,7 +35,10 @@ LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCA
 
 
 class Listener(Client):
-    """A client that records the robot's data in ``log``; each motion or rest begins a new log."""
+    """A client that records the robot's data in ``log``.
+
+    Each motion, and each rest, begins a new log.
+    """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
         super().__init__(node, context, interruption)
@@ -61,7 +67,7 @@ class Listener(Client):
     def diagnosed(self, key: str) -> str:
         """Return the value of ``key`` in the driver's next diagnostics.
 
-        If the driver does not report it in time, return an empty text.
+        The result is empty if the driver does not report this key in time.
         """
         values: dict[str, str] = {}
 
@@ -110,10 +116,9 @@ class Listener(Client):
         self._estop = message.data
 
     def _begin(self, states: Sequence[str]) -> None:
-        """Wait for fresh data, then start a new log.
+        """Wait for fresh data, then begin a new log.
 
-        While the tool waits for the user's answer, it receives no data, so its last data may be
-        old.
+        The tool receives nothing while it waits for the user's answer, so its last data may be old.
         """
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
@@ -150,7 +155,7 @@ class Listener(Client):
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
-    """Return those of the topics ``wanted`` that have been silent for more than ``LOST_S``.
+    """Return those of the topics ``wanted`` that were silent for more than ``LOST_S``.
 
     ``heard_s``: time of the last message of each topic, in s.
     """

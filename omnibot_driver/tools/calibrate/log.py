@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A log of a robot's data and commands during one motion or one rest, as columns.
+"""A log of the robot's data and commands during one motion or one rest.
 
-Times are in seconds of ROS's clock; the time of a measurement is its sampling time. Must not use
-ROS.
+Times are in seconds of ROS's clock. The time of a measurement is its sampling time. This module
+knows rows and columns of numbers; it does not know ROS.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,10 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """IMU readings: ``force_mps2`` and ``rate_radps`` of shape (n, 3), in the sensor's axes."""
+    """IMU readings in the sensor's axes.
+
+    ``force_mps2``, ``rate_radps``: specific forces and rates of rotation, both (n, 3).
+    """
 
     stamp_s: Column
     force_mps2: Column
@@ -27,8 +30,12 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """Odometry: ``pose`` (n, 3) in m, m and unwrapped rad; body ``twist`` (n, 3) in m/s and
-    rad/s."""
+    """The poses and velocities that the driver published.
+
+    ``pose``: (n, 3), in m, m and unwrapped rad.
+
+    ``twist``: velocities in the body's axes, (n, 3), in m/s, m/s and rad/s.
+    """
 
     stamp_s: Column
     pose: Column
@@ -37,8 +44,10 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True)
 class Wheels:
-    """Wheel data: ``angle_rad`` and ``rate_radps``, (n, wheels), in the order of
-    ``joint_states``."""
+    """The angles and rates of the wheels, in the order of ``joint_states``.
+
+    ``angle_rad``, ``rate_radps``: both (n, number of wheels).
+    """
 
     stamp_s: Column
     angle_rad: Column
@@ -47,7 +56,10 @@ class Wheels:
 
 @dataclass(frozen=True, slots=True)
 class Commands:
-    """Commands with sending times; ``values``: (n, 3) in m/s and rad/s, or wheel rates in rad/s."""
+    """The commands, and the times at which they were sent.
+
+    ``values``: (n, 3), either velocities in m/s, m/s and rad/s, or wheel rates in rad/s.
+    """
 
     stamp_s: Column
     values: Column
@@ -55,7 +67,10 @@ class Commands:
 
 @dataclass(slots=True)
 class Log:
-    """Received data and sent commands: rows in order of time; the properties return columns."""
+    """The received data and the sent commands, as rows in order of time.
+
+    The properties return the rows as columns.
+    """
 
     imu_rows: list[Row] = field(default_factory=list)
     odometry_rows: list[Row] = field(default_factory=list)
@@ -64,13 +79,13 @@ class Log:
 
     @property
     def imu(self) -> Imu:
-        """The IMU rows as columns; a row is a timestamp, three forces and three rates."""
+        """The IMU's rows as columns. A row is a timestamp, three forces and three rates."""
         rows = _columns(self.imu_rows, 7)
         return Imu(rows[:, 0], rows[:, 1:4], rows[:, 4:7])
 
     @property
     def odometry(self) -> Odometry:
-        """The odometry rows as columns; a row is a timestamp, a pose and a twist."""
+        """The odometry's rows as columns. A row is a timestamp, a pose and a twist."""
         rows = _columns(self.odometry_rows, 7)
         pose = rows[:, 1:4].copy()
         pose[:, 2] = np.unwrap(pose[:, 2])
@@ -78,14 +93,14 @@ class Log:
 
     @property
     def wheels(self) -> Wheels:
-        """The wheel rows as columns; a row is a timestamp, angles and rates (NaN: not reported)."""
+        """The wheels' rows as columns. A row is a timestamp, angles and rates (NaN if missing)."""
         wheels = len(self.wheel_rows[0]) // 2 if self.wheel_rows else 0
         rows = _columns(self.wheel_rows, 1 + 2 * wheels)
         return Wheels(rows[:, 0], rows[:, 1 : 1 + wheels], rows[:, 1 + wheels :])
 
     @property
     def commands(self) -> Commands:
-        """The command rows as columns; a row is a time and three values."""
+        """The rows of commands as columns. A row is a time and three values."""
         rows = _columns(self.command_rows, 4)
         return Commands(rows[:, 0], rows[:, 1:4])
 
