@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the control method and the frame of the odometry deltas. Pure calculation.
+"""Find how the board interprets commands, and in which frame it reports odometry deltas.
 
 Only the odometry is used: no observer and no measured distance are needed. The signs and scales of
-the odometry may be wrong.
+the odometry may be wrong. This module knows odometry; it does not know how the robot is moved.
 """
 
 import math
@@ -21,20 +21,26 @@ STANDS_PART: Final = 0.1
 """Fraction of the commanded speed up to which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""The robot is regarded as stopping if its later speed is at most this fraction of the earlier."""
+"""The robot is regarded as stopping if its speed has decreased to this fraction or less.
+
+The speed in the second half of a drive is compared with that in the first half.
+"""
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""DOUBLED: range of speed ratios that mean a doubled speed. UNCHANGED: largest ratio that means an
-equal speed.
+"""Ratios of the speeds with two commands, the second of which is twice the first.
+
+``DOUBLED``: range of ratios that mean that the speed has doubled.
+
+``UNCHANGED``: largest ratio that means that both speeds are equal.
 
 Both allow for friction and rounding.
 """
 PURE_TURN: Final = 0.5
-"""Largest accepted ratio of sideways motion to rim speed in a turn on the spot.
+"""Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
 
-The ratio is 0 if the odometry deltas are interpreted correctly, else 2 or more.
+The ratio is 0 if the driver interprets the odometry deltas correctly. Otherwise it is 2 or more.
 """
 ALIKE: Final = 0.35
-"""Difference below which two angles are regarded as equal, as a fraction of the robot's turn."""
+"""Largest difference of angles that are regarded as equal, as a fraction of the robot's turn."""
 
 
 LEAST_M: Final = 1e-3
@@ -42,7 +48,7 @@ LEAST_M: Final = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """Mean velocity over a time span by the driver's odometry, in the body's axes.
+    """Mean velocity of the robot over a time span, by the odometry, in the body's axes.
 
     ``early_mps``, ``late_mps``: speeds in the first and in the second half of the time span.
     """
@@ -85,15 +91,19 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod | None:
-    """Return whether the board controls velocity or position, from the motion at two commands.
+    """Return whether the board controls velocity or position, from the motion with two commands.
 
-    ``slow``: the motion with the command for ``slow_mps``; ``fast``: the motion with twice that
-    command. In velocity control the speed is constant, and doubles with the command. In positional
-    control the command is a position a few millimetres from the origin of the board's frame. The
+    ``slow``: the motion with the command for ``slow_mps``.
+
+    ``fast``: the motion with twice that command.
+
+    In velocity control the speed is constant, and doubles with the command. In positional control
+    the command is a position a few millimetres from the origin of the board's frame. Either the
     robot has reached this position and stopped, or it is still driving there. While it drives, its
     speed is the same with both commands.
-    Returns None if the motion fits neither control method, for example because a busy computer
-    delayed the commands.
+
+    Returns None if the motion fits neither control method. This happens, for example, if a busy
+    computer delays the commands.
     """
     both = slow, fast
     if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):
@@ -112,11 +122,12 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Return whether the odometry shows the same body direction before and after a turn.
+    """Return whether the frame of the odometry deltas is set correctly, "earth" or "body".
 
-    ``before``, ``after``: motions with the same command. If the wrong one of the frames "earth"
-    and "body" is set, the direction changes by the angle of the turn. Raises ToolError if the
-    direction neither stays the same nor changes by this angle.
+    ``before``, ``after``: motions with the same command, before and after a turn by ``turned_rad``.
+
+    With the correct frame, both motions have the same direction in the body's axes. With the wrong
+    frame, the directions differ by the angle of the turn. Raises ToolError if neither is the case.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

@@ -2,7 +2,8 @@
 
 """Motions of a calibration: control laws, their bounds, and a check that the robot follows.
 
-Pure calculation. A law computes the command from the time and from the pose by the odometry.
+A law computes the command from the time and from the pose by the odometry. This module knows
+commands and poses; it does not know ROS.
 """
 
 import math
@@ -19,38 +20,51 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A function of the time in s and the pose, both relative to the start; it returns a command.
+"""A control law: a function of the time in s and of the pose, both relative to the start.
 
-The yaw is unwrapped. The command is in m/s, m/s and rad/s for ``cmd_vel``, and in rad/s of wheels
-A, B, C for ``wheel_cmd``; None ends the motion.
+The yaw of the pose is unwrapped. The function returns the command, or None to end the motion. A
+command for ``cmd_vel`` is in m/s, m/s and rad/s. A command for ``wheel_cmd`` has the rates of
+wheels A, B and C in rad/s.
 """
 
 LOOK_S: Final = 1.0
-"""Time, in s, over which the tool compares commanded and measured motion."""
+"""Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Time, in s, that replaces ``LOOK_S`` if the board measures motion only rarely.
+"""Time, in s, that replaces ``LOOK_S`` if the board measures its motion only rarely.
 
-The odometry is then partly a prediction, so a longer time is needed.
+Then a part of the odometry is only predicted, so the comparison needs a longer time.
 """
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""For each topic, the linear and the angular speed below which a command is not checked.
+"""Limits of speed, for each topic, below which the tool does not check that the robot moves.
 
-At lower speeds friction may hold the robot. The units are m/s and rad/s, or rad/s of a wheel.
+The first limit is for linear motion, the second limit for turns. At lower speeds, friction may hold
+the robot. The units are m/s and rad/s for ``cmd_vel``, and rad/s of a wheel for ``wheel_cmd``.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Limits of one motion, in m, m/s, rad and rad/s.
+    """Limits of one motion.
 
-    ``speed``, ``turning``: largest commanded speed and yaw rate (for wheels, ``speed`` is that of
-    the fastest wheel, in rad/s); ``way``, ``turn``: largest distance and turn from the start, by
-    the odometry; ``seconds``: longest duration; ``acceleration``, ``angular_acceleration``: largest
-    change of a command per s (for wheels, ``acceleration`` in rad/s²). If both accelerations are
-    infinite, commands change at once.
+    ``speed``: largest commanded speed, in m/s. For ``wheel_cmd``, the largest rate of a wheel, in
+    rad/s.
+
+    ``turning``: largest commanded yaw rate, in rad/s.
+
+    ``way``, ``turn``: largest distance in m and largest turn in rad from the start, by the
+    odometry.
+
+    ``seconds``: longest duration.
+
+    ``acceleration``: largest change of the commanded speed per s, in m/s². For ``wheel_cmd``, of
+    the wheels' rates, in rad/s².
+
+    ``angular_acceleration``: largest change of the commanded yaw rate per s, in rad/s².
+
+    If an acceleration is infinite, the command changes at once.
     """
 
     speed: float
@@ -97,7 +111,8 @@ class Bounds:
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
         """Return the next command on a ramp from the command ``now`` to the command ``wanted``.
 
-        ``seconds``: time since ``now`` was sent. It limits the change, by the accelerations.
+        ``seconds``: time since ``now`` was sent. The change in this time does not exceed the
+        acceleration.
         """
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
@@ -108,10 +123,13 @@ class Bounds:
 
 
 class Obedience:
-    """Checks at short intervals that the robot roughly follows its commands."""
+    """A check, at short intervals, that the robot roughly follows its commands."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
-        """Check commands on this topic; ``parameters``: the driver's parameters, by name."""
+        """Check commands on this topic.
+
+        ``parameters``: the driver's parameters, by name.
+        """
         self._topic = topic
         self._look_s = SLOW_LOOK_S if "odom_rate" in parameters else LOOK_S
         self._has_scales = "linear_scale" in parameters
@@ -119,9 +137,11 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raise ToolError if the robot has been commanded to move for some time, but has not moved.
+        """Raise ToolError if the robot was commanded to move for some time, but has not moved.
 
-        ``seconds``: time since the last call; ``measured``: velocity, in the units of ``command``.
+        ``seconds``: time since the last call.
+
+        ``measured``: measured velocity, in the units of ``command``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s
@@ -154,7 +174,10 @@ def steady(command: Vector3, seconds: float) -> Law:
 
 
 def stairs(steps: list[tuple[float, Vector3]]) -> Law:
-    """Return a law that gives these commands one after the other, each for its time in s."""
+    """Return a law that gives these commands one after the other.
+
+    ``steps``: for each command, its duration in s and the command.
+    """
 
     def law(now_s: float, _pose: Pose) -> Vector3 | None:
         for seconds, command in steps:

@@ -1,12 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the IMU's mounting from gravity in three postures. Pure calculation.
+"""Find how the IMU is mounted, from gravity in three postures of the robot.
 
-The postures are level, nose up and left side up. The sensor measures the direction of up in each.
-A tilt angle is the angle between the directions measured in the level and in the tilted posture.
-With the tilt angles, the three directions are also known in the body's axes. The mounting is the
-rotation that fits the three pairs of directions best (Wahba's problem, solved by a singular value
-decomposition). A turn to the left then shows whether gyro and gravity agree.
+The postures are level, front raised and left side raised. In each, the sensor measures the upward
+direction in its own axes. A tilt is the angle between this direction in the level and in another
+posture. From the tilts, the upward directions in the body's axes are computed. The mounting is the
+rotation that fits the measured to the computed directions best (Wahba's problem, solved by a
+singular value decomposition). Finally, a turn to the left shows whether gyro and gravity agree.
+
+This module knows IMU readings; it does not know who holds the robot.
 """
 
 import math
@@ -24,18 +26,17 @@ from omnibot_driver.tools.calibrate.seen import Contradiction
 Array = NDArray[np.float64]
 
 STILL_RADPS: Final = 0.1
-"""Largest accepted standard deviation of the rotation rate, in rad/s, while a hand holds the robot
-still."""
+"""Standard deviation of the rotation rate, in rad/s, up to which the robot is held still enough."""
 GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)
 SQUARE_RAD: Final = math.radians(35)
-"""Largest accepted deviation, in rad, of the angle between the two tilts from a right angle."""
+"""Largest accepted deviation from a right angle of the angle between the two tilts, in rad."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest angle, in rad, by which the tool turns a mounting to make it right-angled.
+"""Largest angle, in rad, by which the tool rotates a mounting to make it right-angled.
 
-In a right-angled mounting each axis of the IMU is parallel to an axis of the body.
+In a right-angled mounting, each axis of the IMU is parallel to an axis of the body.
 """
 HAND_RAD: Final = math.radians(2)
 """Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
@@ -45,10 +46,14 @@ LEVEL_WEIGHT: Final = 20.0
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """The IMU's mounting: ``rotation`` is the matrix from the sensor's axes to the body's.
+    """The mounting of the IMU on the robot.
 
-    ``yaw_sigma_rad``: standard deviation of the yaw, which depends on tilts made by hand;
-    ``tilts_rad``: the two angles by which the robot was tilted.
+    ``rotation``: the matrix that converts from the sensor's axes to the body's axes.
+
+    ``yaw_sigma_rad``: standard deviation of the yaw. It is large because the user tilts the robot
+    by hand.
+
+    ``tilts_rad``: the two angles by which the user tilted the robot.
     """
 
     rotation: Array
@@ -57,7 +62,7 @@ class Mounting:
 
     @property
     def rpy_rad(self) -> tuple[float, float, float]:
-        """Fixed-axis roll, pitch and yaw of the sensor in the body, in rad, as in a URDF."""
+        """Roll, pitch and yaw of the sensor in the body, in rad, about fixed axes as in a URDF."""
         return rpy(self.rotation)
 
     def snapped(self) -> "Mounting | None":
@@ -70,7 +75,7 @@ class Mounting:
 
 
 def up(imu: Imu) -> Array:
-    """Return the direction of up in the sensor's axes, as a unit vector.
+    """Return the upward direction in the sensor's axes, as a unit vector.
 
     Raises Contradiction if the sensor moved, or did not measure gravity.
     """
@@ -97,7 +102,7 @@ def bias(imu: Imu) -> Array:
 
 
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
-    """Return the mounting from the directions of up in three postures.
+    """Return the mounting from the upward directions in the three postures.
 
     The directions are unit vectors in the sensor's axes. Raises Contradiction if a tilt is too
     small or too large, or if the two tilts are not at a right angle.
@@ -125,9 +130,13 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
 
 
 def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
-    """Return the angle of a turn to the left about the vertical, in rad.
+    """Return the angle by which the user has turned the robot to the left, in rad.
 
-    Raises Contradiction if the turn is too small or to the right.
+    ``bias_radps``: the gyro's bias.
+
+    ``level``: the upward direction in the sensor's axes.
+
+    Raises Contradiction if the turn is too small, or to the right.
     """
     rate = (imu.rate_radps - bias_radps) @ level
     turn_rad = float(np.sum((rate[1:] + rate[:-1]) / 2 * np.diff(imu.stamp_s)))
@@ -142,7 +151,7 @@ def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
 
 
 def rpy(rotation: Array) -> tuple[float, float, float]:
-    """Return fixed-axis roll, pitch and yaw, in rad; at a pitch of 90° roll is set to 0."""
+    """Return roll, pitch and yaw about fixed axes, in rad. At a pitch of 90° the roll is 0."""
     sine = max(-1.0, min(1.0, -float(rotation[2, 0])))
     if abs(sine) > 1.0 - 1e-9:
         yaw = math.atan2(-float(rotation[0, 1]), float(rotation[1, 1]))
@@ -165,7 +174,7 @@ def _tilt(level: Array, tilted: Array, what: str) -> float:
 
 
 def _level_part(level: Array, tilted: Array) -> Array:
-    """Return the part of ``tilted`` perpendicular to ``level``, as a unit vector."""
+    """Return the part of ``tilted`` that is perpendicular to ``level``, as a unit vector."""
     part = tilted - (tilted @ level) * level
     return np.asarray(part / np.linalg.norm(part))
 

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry`` and ``scale`` for a base that only drives straight and turns.
+"""``calibrate geometry`` and ``calibrate scale`` for a base that only drives straight and turns.
 
-The user measures each drive with a tape. The result is the scales of the odometry or, if the driver
-has the parameter ``metres_per_count``, the distance for each encoder count. Must not know the
-base's wheels.
+The user measures each drive with a tape. The result is the scales of the odometry. If the driver
+has the parameter ``metres_per_count``, the result is the distance per encoder count instead. This
+module knows drives and readings; it does not know the wheels of the base.
 """
 
 import argparse
@@ -29,21 +29,27 @@ if TYPE_CHECKING:
 LINES: Final = 2
 """Number of straight drives.
 
-If the user misreads the tape once, the results of the two drives differ, and the tool says so.
+With two drives the tool notices a single wrong reading, because the results of the drives differ.
 """
 UNLIKE: Final = 4.0
-"""Two ratios disagree if they differ by more than this number of standard deviations."""
+"""Number of standard deviations by which two ratios must differ before the tool reports it."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Names of parameters: COUNT, distance per encoder count; UNITS, the motors' units per m/s.
+"""Names of two parameters of the driver.
 
-If a calibration increases the distance per count, it reduces the units per m/s in proportion.
+``COUNT``: distance per encoder count.
+
+``UNITS``: number of the motors' units per m/s. If a calibration increases the distance per count,
+it reduces this number in proportion.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.
 
-BALANCE: name of the parameter. BALANCE_SHOWN: its name in /diagnostics. BALANCE_SIGMA: standard
-deviation of its value.
+``BALANCE``: name of the parameter.
+
+``BALANCE_SHOWN``: name of the value in /diagnostics.
+
+``BALANCE_SIGMA``: standard deviation of the value.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive mark where"
@@ -55,7 +61,12 @@ INTRODUCTION: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A drive of ``wanted`` m straight ahead or, if ``turns`` is true, a turn of ``wanted`` rad."""
+    """A drive straight ahead, or a turn on the spot.
+
+    ``turns``: whether the drive is a turn.
+
+    ``wanted``: angle of the turn in rad, or else the distance in m.
+    """
 
     name: str
     wanted: float
@@ -64,9 +75,13 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The motion of one drive by the odometry (``told``) and by the tape (``true``), in m or rad.
+    """The motion in one drive by the tape, compared with the motion by the odometry.
 
-    ``sigma``: standard deviation of ``true``. ``value``: the ratio of ``true`` to ``told``.
+    ``told``: the motion by the odometry, in m or rad.
+
+    ``true``: the motion by the tape, in m or rad.
+
+    ``sigma``: standard deviation of ``true``.
     """
 
     drive: Drive
@@ -76,10 +91,12 @@ class Ratio:
 
     @property
     def value(self) -> float:
+        """The ratio of ``true`` to ``told``."""
         return self.true / self.told
 
     @property
     def value_sigma(self) -> float:
+        """The standard deviation of ``value``."""
         return self.sigma / abs(self.told)
 
 
@@ -146,10 +163,13 @@ def _number(text: str) -> float | None:
 def result(
     ratios: Sequence[Ratio], now: Mapping[str, Any], *, balance: float | None = None
 ) -> Result:
-    """Return the result, to show and to save, from the ratios of all drives.
+    """Return the result, to show and to save.
 
-    ``now``: the driver's parameters; ``balance``: the motor balance that the driver measured, or
-    None.
+    ``ratios``: the ratios of all drives.
+
+    ``now``: the driver's parameters before the calibration.
+
+    ``balance``: the balance of the motors that the driver has measured, or None.
     """
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))

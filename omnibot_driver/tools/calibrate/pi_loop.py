@@ -1,12 +1,15 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulate a wheel with a sampled band-limited PI controller after a step of its set-point.
+"""The simulation of a wheel with a PI controller, after a step of the set-point.
 
-The controller is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to the duty in
-percent, discretised by the trapezoidal rule. Its coefficients are computed for the control period
-``NOMINAL_S``, even if the real control period differs. The controller computes the measured speed,
-in whole RPM, from the time between the encoder's last two ticks. The calculation is vectorised over
-gains. Must not know how plant and gains were found.
+The controller is band-limited: G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to
+the duty in percent. It is sampled, by the trapezoidal rule. The board computes its coefficients for
+the control period ``NOMINAL_S``, even if the real control period differs. The board computes the
+measured speed, in whole RPM, from the time between the last two encoder ticks. All candidates for
+the gains are simulated at the same time, as arrays.
+
+This module knows the plant, the controller and the encoder; it does not know how plant and gains
+were found.
 """
 
 from dataclasses import dataclass
@@ -21,7 +24,7 @@ Array = NDArray[np.float64]
 
 STEP_S: Final = 0.001
 NOMINAL_S: Final = 0.2
-"""Control period of the manual, in s; the board calculates its coefficients for this period."""
+"""Control period of the manual, in s. The board computes its coefficients for this period."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
 """Time, in s, that the public firmware needs to send its ticks and its odometry.
@@ -34,7 +37,7 @@ PHASE_POINTS: Final = 600
 
 @dataclass(frozen=True, slots=True)
 class PiGains:
-    """Gains as they are written to the board: scalars, or arrays of the same shape."""
+    """The gains that are written to the board: numbers, or arrays of the same shape."""
 
     kp: Array | float
     tn_s: Array | float
@@ -43,11 +46,22 @@ class PiGains:
 
 @dataclass(frozen=True, slots=True)
 class Loop:
-    """The control loop of a wheel.
+    """The control loop of a wheel. Times are in s.
 
-    ``dead_s``: dead time from a duty to its effect on the speed. ``feed_forward``: duty in percent
-    for each RPM. ``low_pass``: coefficient of the set-point's low-pass filter, from 0 to 1 (no
-    filter). ``sends_each_s``: period with which the board sends its ticks. Times are in s.
+    ``period_s``: the real control period.
+
+    ``dead_s``: dead time from a duty to its effect on the speed.
+
+    ``whole_rpm``: whether the controller rounds the measured speed down to whole RPM.
+
+    ``nominal_s``: the control period for which the board computes its coefficients.
+
+    ``feed_forward``: duty in percent for each RPM of the set-point.
+
+    ``low_pass``: coefficient of the set-point's low-pass filter, from 0 to 1. With 1 there is no
+    filter.
+
+    ``sends_each_s``: period with which the board sends its ticks.
     """
 
     period_s: float
@@ -61,9 +75,9 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Ratio of the written to the effective time constant of the board's controller.
+        """Ratio of a time constant as written to the board to the time constant that results.
 
-        The ratio differs from 1 because the board's control period is not the nominal one.
+        The ratio differs from 1 because the board's control period is not the nominal period.
         """
         return self.nominal_s / self.period_s
 
@@ -82,11 +96,17 @@ def answer(
     """Return the speed in RPM after a step of the set-point from standstill.
 
     The first dimension of the result is time, in steps of ``STEP_S``. The other dimensions are the
-    common shape of the gains, ``dead_s``, ``begun`` and ``sent_s``. ``dead_s``: dead times to use
-    instead of the loop's; ``begun``: starting position between two marks, as a fraction of their
-    distance; ``sent_s``: time at which the board first sends ticks (None: it sends nothing). If a
-    tick comes while the board sends, the board notices this tick only afterwards. The speed of this
-    tick is then too low, and the speed of the next tick too high.
+    common shape of the gains, ``dead_s``, ``begun`` and ``sent_s``.
+
+    ``dead_s``: dead times to use instead of that of the loop.
+
+    ``begun``: starting position of the wheel between two marks of the encoder, as a fraction of
+    their distance.
+
+    ``sent_s``: time at which the board first sends ticks, or None if it does not send.
+
+    If a tick comes while the board sends, the board notices this tick only afterwards. The measured
+    speed is then too low at this tick, and too high at the next tick.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -143,11 +163,13 @@ def answer(
 
 @dataclass(frozen=True, slots=True)
 class Traits:
-    """Characteristics of a step response; scalars or arrays.
+    """Characteristics of a step response, as numbers or arrays.
 
-    ``overshoot``: as a fraction of the final speed, or of the target if the target is higher.
-    ``settled_s``: time after which the speed stays in the band around its final value; infinite if
-    the speed does not stay there, or if the final value is not the target.
+    ``overshoot``: fraction of the final speed, or of the target if the target is higher.
+
+    ``settled_s``: time after which the speed stays in the band around its final value. It is
+    infinite if the speed does not stay there, or if the final value is not the target.
+
     ``error_s``: integral of the absolute error divided by the target, in s.
     """
 
@@ -159,8 +181,8 @@ class Traits:
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
     """Return the characteristics of a response.
 
-    ``band``: the allowed deviation, as a fraction of the final speed; the final speed is the mean
-    of the last quarter of the response.
+    ``band``: allowed deviation from the final speed, as a fraction of the final speed. The final
+    speed is the mean of the last quarter of the response.
     """
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
@@ -176,8 +198,12 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:
     """Return the phase margin, in degrees: 180 plus the open loop's phase where its gain is 1.
 
-    The loop's delays are its dead time, half a control period until a duty acts, and the time of
-    one tick for the measured speed, which is a mean over one tick and on average half a tick old.
+    The delay of the loop has three parts:
+
+    - the dead time
+    - half a control period, until a duty acts
+    - the time of one tick, because the measured speed is a mean over one tick, and half a tick old
+      on average
     """
     kp, tn_s, td_s = np.broadcast_arrays(
         *(

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""The tool regards new gains as worse if they increase the error of a step by this factor."""
+"""Factor of a step's error. New gains that increase the error by more are regarded as worse."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Measured:
 
     @property
     def overshoot(self) -> float:
-        """Overshoot of the mean of all steps, as a fraction.
+        """Overshoot of the mean of all steps, as a fraction of the final speed.
 
         The mean is smoothed over 0.2 s, because the peak of noisy samples would be too high.
         """
@@ -47,7 +47,7 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Integral of the absolute error divided by the final speed, in s; mean of all steps.
+        """Integral of the absolute error divided by the final speed, in s; the mean of all steps.
 
         The integral begins at the first tick.
         """
@@ -62,8 +62,17 @@ class Measured:
 class WheelTuned:
     """The result for one wheel.
 
-    ``loop``: the wheel's control loop, with the fitted dead time; ``before``, ``after``: steps
-    recorded with the previous and with the new gains.
+    ``levels``: corrections of the encoder's two levels.
+
+    ``fit``: the plant as fitted to the starts at full duty.
+
+    ``plant``: the plant with its gain and dead zone, for which the gains were tuned.
+
+    ``loop``: the wheel's control loop, with the fitted dead time.
+
+    ``tuned``: the new gains, and their predicted effect.
+
+    ``before``, ``after``: steps that were recorded with the previous and with the new gains.
     """
 
     name: str
@@ -86,7 +95,7 @@ def result_of(
 ) -> Result:
     """Return the result, to show and to save.
 
-    ``parameters``: the values that the tool has set in the driver, to save in the file.
+    ``parameters``: the values that the tool has set in the driver, and saves in the file.
     """
     return Result(
         findings=[row for wheel in wheels for row in _rows(wheel, goals)],
@@ -170,7 +179,7 @@ def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
 
 
 def draw(figure: "Figure", wheels: Sequence[WheelTuned]) -> None:
-    """Draw the measured and the predicted steps of each wheel, side by side."""
+    """Draw the measured and the predicted steps, the wheels side by side."""
     axes: Any = figure.subplots(1, len(wheels), sharey=True, squeeze=False)
     for one, wheel in zip(axes[0], wheels, strict=True):
         _draw_wheel(one, wheel)
