@@ -5,8 +5,8 @@
 1. Record steps of the set-point with the present gains, for comparison.
 2. Record the wheels at a constant duty, and find the corrections of their encoders.
 3. Record starts at full duty, and fit the plant of each wheel.
-4. Compute gains, record steps with these gains, and fit the dead time; do this ``ROUNDS`` times.
-   Each round computes its gains with the dead time of the round before.
+4. Compute gains, record steps with these gains, and fit the dead time. Do this ``ROUNDS`` times.
+   Each round computes its gains with the dead time from the previous round.
 5. Compare the steps of the last round with those of step 1.
 """
 
@@ -41,19 +41,19 @@ ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
 """Longest time until settings have reached the board, in s.
 
-The driver sends each setting several times, because the board does not acknowledge them.
+The board does not acknowledge settings, so the driver sends each of them several times.
 """
 
 QUIET_S: Final = 0.5
 """Period, in s, with which the board sends ticks during a record.
 
-The board does not measure ticks while it sends, so it should send as rarely as possible.
+The period is long, because the board does not measure ticks while it sends.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
-"""Parameters that the tool restores after it has recorded the wheels."""
+"""Parameters whose values the tool restores after it has recorded the wheels."""
 
 Records = dict[str, list[Column]]
-"""For each side (left or right), the times between ticks of each record, in s."""
+"""For each side (left or right) a list with one entry per record: the times between ticks, in s."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -89,9 +89,9 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 class _Bench:
-    """Sets parameters of the robot and records its wheels.
+    """The robot on a box: it sets parameters and records the wheels.
 
-    ``show`` is called after each record, with the number of records made so far.
+    ``show``: a function that is called after each record, with the number of records made so far.
     """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
@@ -173,8 +173,8 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 def _encoders(bench: _Bench) -> dict[str, Levels]:
     """Find the corrections for the two levels of each encoder's signal, and set them.
 
-    With its corrections, an encoder's two levels have the same mean duration. During the
-    measurement all corrections are 1, because the board records corrected times.
+    With the corrections, both levels have the same mean duration. During the measurement all
+    corrections are 1, because the board records corrected times.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
@@ -185,10 +185,11 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant: its time constants from the fit, its gain and dead zone from two speeds.
+    """Return the plant of a wheel. Its gain and dead zone come from the speeds at two duties.
 
-    ``found``: the fit to starts at full duty, with the final speed; ``free``: the measurement at
-    half duty, with the other speed.
+    ``found``: the fit to starts at full duty, with the time constants and the speed at full duty.
+
+    ``free``: the measurement at half duty, with the speed at half duty.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
@@ -223,6 +224,6 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
     """Restore the parameters ``names`` to their values in ``before``.
 
-    A parameter whose value in ``before`` is None keeps its new value until a restart.
+    If such a value is None, the parameter keeps its new value until a restart.
     """
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

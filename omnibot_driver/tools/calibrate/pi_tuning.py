@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tune a band-limited PI controller for a plant.
+"""Find gains of a band-limited PI controller that suit a plant.
 
-Tn compensates the plant's slow time constant. The Tn written to the board is longer, because the
-board computes its coefficients for a longer control period than it has. Kp, and Td if a phase
-margin is required, are those with the smallest sum of settling time and integrated error, among
-the gains whose overshoot is within the goal. The dead time of a plant is fitted afterwards, to
-steps recorded with the tuned gains.
+Tn compensates the plant's slow time constant. The Tn that is written to the board is longer,
+because the board computes its coefficients for a longer control period than the real one. Kp is
+searched, and Td too if a phase margin is required. Only gains whose overshoot is within the goal
+are allowed. Among these gains, the smallest sum of settling time and integrated error wins.
+
+Afterwards the dead time of a plant is fitted to steps that were recorded with the tuned gains.
 """
 
 from collections.abc import Sequence
@@ -35,23 +36,23 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Starting positions of a simulated wheel between two marks, as fractions of the marks' distance.
+"""Starting positions of a simulated wheel between two marks, as fractions of their distance.
 
-The position decides when ticks come relative to the control periods, which changes the response.
+The position decides when ticks come within a control period, so it changes the response.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Times at which the board first sends ticks, as fractions of the period with which it sends them.
+"""Times at which the board first sends ticks, as fractions of its sending period.
 
-The time decides which ticks are noticed late, which changes the response too.
+This time decides which ticks the board notices late, so it changes the response.
 """
 DISTURBED: Final = 0.02
-"""Overshoot that is allowed in addition to the goal if the board sends ticks during a step."""
+"""Overshoot that is allowed beyond the goal if the board sends ticks during a step."""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
 """Candidates for Td, as fractions of the nominal control period.
 
-With Td = 0 an oscillation from one control period to the next never decays.
+With Td = 0, an oscillation from one control period to the next does not decay.
 """
 
 
@@ -59,10 +60,16 @@ With Td = 0 an oscillation from one control period to the next never decays.
 class Goals:
     """The goals of a tuning.
 
-    ``overshoot``, ``band``: as fractions of the speed. ``destination``: set-point of the step, as a
-    fraction of the speed at full duty. ``settled_s``: the user is warned if the settling time, in
-    s, is longer. If ``phase_margin_deg`` is None, Td is 0, and only the overshoot limits the gain
-    (gain optimum).
+    ``overshoot``: largest allowed overshoot, as a fraction of the speed.
+
+    ``band``: allowed deviation from the final speed after settling, as a fraction of the speed.
+
+    ``destination``: set-point of the step, as a fraction of the speed at full duty.
+
+    ``settled_s``: settling time in s. The tool warns the user if the settling time is longer.
+
+    ``phase_margin_deg``: smallest allowed phase margin. If it is None, Td is 0, and only the
+    overshoot limits the gain (gain optimum).
     """
 
     overshoot: float = 0.05
@@ -125,7 +132,7 @@ def target_of(plant: Plant, goals: Goals) -> float:
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Return these gains with their predicted effect on a step."""
+    """Return these gains with their predicted effect on the step that the goals describe."""
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(
@@ -139,9 +146,9 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 
 
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
-    """Return the predicted traits of a step: largest overshoot, longest settling, mean error.
+    """Return the predicted traits of a step, over all starting positions in ``BEGUN``.
 
-    The largest, the longest and the mean are taken over all starting positions in ``BEGUN``.
+    The traits are the largest overshoot, the longest settling time and the mean error.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -162,21 +169,22 @@ def _apart(gains: PiGains) -> PiGains:
 
 
 Steps = tuple[PiGains, float, Sequence[Column]]
-"""Gains, a set-point in RPM, and the records of the steps with these gains and set-point."""
+"""Gains, a set-point in RPM, and the records of steps with these gains to this set-point."""
 
 
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
-    """Return the dead time, in s, that explains the recorded steps of these wheels best.
+    """Return the dead time, in s, with which the model explains the recorded steps best.
 
-    The result is at least ``LEAST_DEAD_S``, because gains that are tuned for too short a dead time
-    make the speed overshoot.
+    ``wheels``: for each wheel its plant, its loop and its recorded steps. The wheels get the same
+    dead time. It is at least ``LEAST_DEAD_S``, because gains for too short a dead time make the
+    speed overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
 
 
 def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
-    """Return, for each candidate dead time, the model's misfit to the recorded responses."""
+    """Return, for each candidate in ``DEAD_S``, how badly the model fits the recorded steps."""
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
@@ -190,7 +198,7 @@ def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
 
 
 def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
-    """Return the response that would be recorded from a wheel's positions.
+    """Return the response that a board would record from these positions of a wheel.
 
     ``ticks``: positions in ticks, one for each ``STEP_S``.
     """
@@ -200,7 +208,7 @@ def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
 
 
 def _unlike(shown: Response, model: Response) -> float:
-    """Return the mean square of the relative difference of two responses, until time ``OVER_S``."""
+    """Return the mean square of the relative difference of two responses, up to time ``OVER_S``."""
     times_s = shown.times_s[shown.times_s < OVER_S]
     told_rpm = np.interp(times_s, model.times_s, model.rpm)
     return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

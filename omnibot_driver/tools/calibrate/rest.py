@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Evaluate an IMU at rest: its biases, its noise, and the direction of up. Pure calculation.
+"""The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A measurement in one posture cannot separate an accelerometer's bias from a tilt, nor a tilt of the
-sensor from a tilt of the floor. The measurement shows only the bias along gravity, because the
-magnitude of gravity is known.
+A measurement in one posture cannot distinguish an accelerometer's bias from a tilt of the sensor.
+Nor can it distinguish a tilt of the sensor from a slope of the floor. Only the bias along gravity
+can be found, because the magnitude of gravity is known. This module knows readings; it does not
+know how they are recorded.
 """
 
 from collections.abc import Callable
@@ -21,8 +22,8 @@ from omnibot_driver.tools.needs import ToolError
 BLOCK_S: Final = 1.0
 """Length of a block of readings, in s.
 
-The scatter of readings within a block shows the noise; the scatter of the means of blocks shows the
-drift.
+The scatter of the readings within a block shows the noise. The scatter of the blocks' means shows
+the drift.
 """
 FEWEST: Final = 100
 LOST_PART: Final = 0.02
@@ -30,11 +31,22 @@ LOST_PART: Final = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The evaluation of an IMU at rest; arrays have the values of the sensor's x, y and z axes.
+    """The evaluation of an IMU at rest. Arrays have the values of the sensor's axes x, y and z.
 
-    ``bias_radps``: mean rate; ``force_mps2``: mean specific force; ``…_sigma``: standard deviations
-    of these means (that of the bias includes its random walk until the end of the measurement);
-    ``…_noise``: standard deviation of one reading.
+    ``bias_radps``: mean rate of rotation.
+
+    ``bias_sigma``: standard deviation of ``bias_radps``. It includes the random walk of the bias
+    until the end of the measurement.
+
+    ``force_mps2``: mean specific force.
+
+    ``force_sigma``: standard deviation of ``force_mps2``.
+
+    ``rate_noise``, ``force_noise``: standard deviation of a single reading.
+
+    ``readings``, ``period_s``: number and period of the readings.
+
+    ``curves``, ``noises``: Allan deviation of the gyro, and the fitted noise, for each axis.
     """
 
     bias_radps: Column
@@ -50,7 +62,7 @@ class Rest:
 
     @property
     def up(self) -> Column:
-        """Direction of up, as a unit vector in the sensor's axes."""
+        """The upward direction, as a unit vector in the sensor's axes."""
         return np.asarray(self.force_mps2 / np.linalg.norm(self.force_mps2))
 
     @property
@@ -60,20 +72,20 @@ class Rest:
 
     @property
     def level_rad(self) -> tuple[float, float]:
-        """Roll and pitch of the sensor on a level floor (fixed-axis angles), in rad."""
+        """Roll and pitch of the sensor in rad, about fixed axes, if the floor is level."""
         x, y, z = self.force_mps2
         return float(np.arctan2(y, z)), float(np.arctan2(-x, np.hypot(y, z)))
 
     @property
     def level_sigma_rad(self) -> float:
-        """Standard deviation of roll and pitch that noise alone causes, in rad."""
+        """Standard deviation of roll and pitch, in rad, that comes from the noise alone."""
         return float(self.force_sigma.max() / self.gravity_mps2)
 
 
 def rest(imu: Imu) -> Rest:
     """Evaluate the readings of an IMU at rest.
 
-    Raises ToolError if the readings are too few, stuck or not finite, or have gaps.
+    Raises ToolError if readings are too few, lost or not finite, or if an axis is stuck.
     """
     rates, forces = imu.rate_radps, imu.force_mps2
     if len(rates) < FEWEST:
@@ -116,8 +128,9 @@ def rest(imu: Imu) -> Rest:
 def still(bias_radps: Column) -> Callable[[Log], None]:
     """Return a function that checks a growing log, and raises ToolError if the robot moves.
 
-    Call the function repeatedly. ``bias_radps``: the bias that the driver has already subtracted
-    from the gyro's readings.
+    Call this function repeatedly.
+
+    ``bias_radps``: the bias that the driver has already subtracted from the gyro's readings.
     """
     seen = [0, 0]
     look = Look()
@@ -151,8 +164,8 @@ def _within(readings: Column, size: int) -> Column:
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
     """Return the standard deviation of the mean of ``readings``.
 
-    The result is the larger of two estimates: one is computed from the noise of single readings,
-    the other from the means of blocks.
+    The result is the larger of two estimates. One comes from the noise of single readings, the
+    other from the means of blocks.
     """
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The result of a calibration: values with uncertainties. Must not use a terminal, files or ROS."""
+"""The result of a calibration: values with uncertainties.
+
+This module knows values; it does not know a terminal, files or ROS.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -14,9 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One row of the table. ``sigma``: standard deviation, None if not known.
+    """One row of the table of results.
 
-    ``before``: the driver's present value, None if the driver does not have this value.
+    ``sigma``: standard deviation of ``value``, or None if it is not known.
+
+    ``before``: the driver's present value, or None if the driver does not have this value.
     """
 
     name: str
@@ -30,9 +35,13 @@ class Finding:
 class Result:
     """The result of a calibration.
 
-    ``parameters``: values for the driver to load, by name; ``record``: further content of the file,
-    which the driver ignores; ``notes``: sentences for the user; ``draw``: a function that draws the
-    result into a figure of 9 by 6 inches.
+    ``parameters``: values for the driver to load, by name.
+
+    ``record``: further content of the file, which the driver ignores.
+
+    ``notes``: sentences for the user.
+
+    ``draw``: a function that draws the result into a figure of 9 by 6 inches.
     """
 
     findings: list[Finding]

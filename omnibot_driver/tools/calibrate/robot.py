@@ -2,9 +2,9 @@
 
 """The robot as a calibration uses it: receive its data, and move it.
 
-Must not know what is calibrated. Every motion goes through `drive` or `record`. Both end with stop
-commands, even after an error. If this process ends unexpectedly, the driver stops the robot after
-``cmd_vel_timeout``.
+Every motion goes through ``drive`` or ``record``. Both end with stop commands, even after an error.
+If this process ends unexpectedly, the driver stops the robot after ``cmd_vel_timeout``. This module
+knows data and commands; it does not know what is calibrated.
 """
 
 import math
@@ -32,18 +32,18 @@ from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Obedience, 
 from omnibot_driver.tools.needs import ToolError
 
 PERIOD_S: Final = 0.02
-"""Period of the commands, in s."""
+"""Period, in s, with which the tool sends commands."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""Time, in s, that the tool waits after it has requested a record, before it moves the robot.
+"""Time, in s, from the request for a record to the start of the motion.
 
-During this time the driver repeats the request to the board, because lines can be lost.
+In this time the driver repeats the request to the board, because a request can be lost.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
-"""Time at rest, in s, after which the robot is regarded as stopped."""
+"""Time at rest, in s, after which the tool regards the robot as stopped."""
 STANDING: Final = 0.01
-"""Speed below which the robot is regarded as at rest, in m/s and rad/s."""
+"""Speed in m/s, and yaw rate in rad/s, up to which the tool regards the robot as at rest."""
 UNRULY: Final = (
     "Stop was sent, but the robot still moves or sends no odometry; cut its power, then see"
     " docs/safety.md"
@@ -81,7 +81,10 @@ class Robot(Listener):
     ) -> Log:
         """Record data for ``seconds`` without commands; return the log.
 
-        ``show`` is called with the completed fraction, from 0 to 1.
+        ``show``: a function that is called with the completed fraction, from 0 to 1.
+
+        ``states``: the states of the driver in which the robot may be; another state raises
+        ToolError.
         """
         self._begin(states)
         began_s = now_s = time.monotonic()
@@ -102,13 +105,17 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the law, within the bounds, then stop it; return the motion's log.
+        """Move the robot by the law, within the bounds, then stop it; return the log of the motion.
 
-        ``show`` is called with the seconds since the start. On any fault (e-stop, lost data, a
-        command of another node, no motion), stop the robot and raise ToolError. If ``obeys`` is
-        false, a robot that does not move is accepted. If ``monitored`` is false, the driver's
-        motion monitor is off; a calibration needs this if it does not know yet how fast or in which
-        direction the robot moves.
+        ``obeys``: whether a robot that does not move is a fault.
+
+        ``monitored``: whether the driver's motion monitor stays on. It must be off if the
+        calibration does not know yet how fast or in which direction the robot moves.
+
+        ``show``: a function that is called with the seconds since the start.
+
+        On any fault, the robot is stopped and ToolError is raised. Faults are the e-stop, lost
+        data, a command of another node, and no motion.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
@@ -137,9 +144,9 @@ class Robot(Listener):
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
         """Let the driver record the response to ``command``, then stop the robot.
 
-        Return the path of the record. The record is requested while the robot is at rest, so that
-        it begins before the motion. Raises ToolError on any fault, as `drive` does, and with the
-        driver's reason if nothing was recorded.
+        Return the path of the record. The tool requests the record while the robot is at rest, so
+        that the record begins before the motion. Raises ToolError on any fault, as ``drive`` does.
+        If nothing was recorded, the message gives the driver's reason.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)
@@ -217,7 +224,7 @@ class Robot(Listener):
             wanted = law(now_s - began_s, pose) if wanted is not None else None
 
     def _halt(self, topic: Topic) -> bool:
-        """Stop the robot, even after Ctrl-C; return whether the robot is at rest."""
+        """Stop the robot, even after Ctrl-C; return whether it is at rest."""
         began_s = now_s = time.monotonic()
         standing_since_s = math.inf
         while now_s < (
@@ -266,9 +273,10 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if the time ``silence_s`` without a command is too long for the driver.
+        """Raise ToolError if this program has sent no command for too long.
 
-        The driver stops the robot after its ``cmd_vel_timeout``.
+        ``silence_s``: time since the last command. After ``cmd_vel_timeout`` the driver stops the
+        robot.
         """
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(

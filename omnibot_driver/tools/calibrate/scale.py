@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 REST_S: Final = 2.0
 ACCELERATION: Final = 1.0
-"""Rate at which linear commands change, in m/s²; the rate for turning is twice this, in rad/s²."""
+"""Change of linear commands per s, in m/s². Commands for turns change twice as fast, in rad/s²."""
 GYRO_TOLERANCE: Final = 0.03
 """Relative tolerance of the gyro's scale: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0
-"""Two scales disagree if they differ by more than this number of standard deviations."""
+"""Number of standard deviations by which two scales must differ before the tool reports it."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
@@ -71,9 +71,13 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
-    """Return the result, to show and to save, from the measured speeds.
+    """Return the result, to show and to save.
+
+    ``found``: the measured speeds.
 
     ``now``: the driver's parameters before the calibration.
+
+    Raises ToolError if there is an axis without a measured speed.
     """
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):
@@ -121,7 +125,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
 def draw(
     figure: "Figure", found: Sequence[Speed], linear: Scale, angular: Scale, gyro: Scale
 ) -> None:
-    """Draw measured speeds over commanded counts with the fitted line, and the residuals."""
+    """Draw the measured speeds over the commanded counts, the fitted lines and the residuals."""
     axes = figure.subplots(2, 2, sharex="col", height_ratios=(2, 1))
     series = [
         (0, 0, linear, "odometry", "o", "tab:red", "x"),

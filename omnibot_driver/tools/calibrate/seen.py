@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Interpret in which directions a person saw the wheels turn. Pure calculation.
+"""The meaning of the user's answers about the directions in which the wheels turn.
 
-A pattern has the directions of wheels A, B and C, seen from outside: 1 counter-clockwise (positive
-in the manual's equations), -1 clockwise, 0 still.
+A pattern has one number for each of the wheels A, B and C, as seen from outside. It is 1 for
+counter-clockwise (positive in the manual's equations), -1 for clockwise, and 0 for still.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ STILL: Final[Pattern] = (0, 0, 0)
 
 
 class Contradiction(Exception):
-    """An answer that contradicts the command or the other answers; its message says why."""
+    """An answer contradicts the command or another answer. The message says why."""
 
 
 def understand(answer: str) -> Pattern | None:
-    """Return the pattern of an answer such as ``+0-``, or None if it is not a pattern.
+    """Return the pattern of an answer such as ``+0-``, or None if the answer is not a pattern.
 
     Spaces and commas are ignored.
     """
@@ -38,12 +38,15 @@ def understand(answer: str) -> Pattern | None:
 
 
 def in_words(pattern: Sequence[int]) -> str:
-    """Return a description of the pattern for the user."""
+    """Return a text for the user that describes the pattern."""
     return ", ".join(f"{wheel} {WORDS[sign]}" for wheel, sign in zip(WHEELS, pattern, strict=True))
 
 
 def wanted(axis: int) -> Pattern:
-    """Return the pattern that the manual's equations give for +x, +y or +yaw."""
+    """Return the pattern of a motion along +x, +y or +yaw by the manual's equations.
+
+    ``axis``: 0 for x, 1 for y, 2 for yaw.
+    """
     x, y, yaw = (float(axis == n) for n in range(3))
     rates = OmniKinematics(1.0, 1.0).wheel_rates(BodyTwist(x, y, yaw))
     a, b, c = ((rate > 1e-6) - (rate < -1e-6) for rate in rates)
@@ -78,9 +81,9 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return 1 for the pattern of a motion along +axis, -1 for that of a motion along -axis.
+    """Return the direction of a motion along the axis that the wheels show: 1 or -1.
 
-    Raises Contradiction for any other pattern.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction for any other pattern.
     """
     expected = wanted(axis)
     if seen == expected:
@@ -96,8 +99,8 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    That is so if x · y is not the sign of yaw. If the user only regards another side of the robot
-    as its front, the signs describe no mirror image.
+    That is so if x times y is not the sign of yaw. If the user only regards another side of the
+    robot as its front, the signs describe no mirror image.
     """
     x, y, yaw = signs
     return x * y != yaw

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Plan commands, measure the speeds that result, and fit the scale. Pure calculation.
+"""Plan commands, measure the speeds that result, and fit the scale.
 
-A *count* is the unit of the board's commands. The board accepts only whole counts, so the tool
-commands only whole counts, and a command has no rounding error. A speed is measured as the slope of
-the odometry's pose, in which rounding errors do not accumulate. The odometry's twist is not used:
-it comes from a single displacement, whose rounding error does not average out.
+A *count* is the unit of the board's commands. The board accepts only whole counts. The tool
+commands only whole counts, so that a command has no rounding error. A speed is measured as the
+slope of the odometry's pose, in which rounding errors do not accumulate. The odometry's twist is
+not used, because it comes from a single displacement, whose rounding error does not average out.
+This module knows logs; it does not know the robot.
 """
 
 from collections.abc import Sequence
@@ -21,25 +22,31 @@ from omnibot_driver.tools.needs import ToolError
 SETTLE_S: Final = 1.2
 """Time from a command to a steady speed, in s.
 
-The board's integrator leaves an error of 0.1 % after a second.
+After 1 s, the board's integrator still leaves an error of 0.1 %.
 """
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
-"""Least assumed standard deviation of a pose (m, rad), and of a speed over 1 s (m/s, rad/s)."""
+"""Least assumed standard deviation of a pose in m and rad, and of a speed over 1 s."""
 CORRECTED_WITH: Final = 5
-"""Number of odometry steps over which a correction of the pose is spread.
+"""Number of successive odometry steps that are regarded as one independent measurement.
 
-This number of successive steps is regarded as one independent measurement.
+The driver spreads a correction of the pose over this number of steps.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Speed:
-    """One steady speed along an axis (0, 1, 2: x, y, yaw), in m/s or rad/s.
+    """One steady speed along an axis, in m/s or rad/s.
 
-    ``counts``: the commanded counts; ``measured``: the speed by the odometry; ``gyro``: the yaw
-    rate by the gyro, NaN for x and y.
+    ``axis``: 0 for x, 1 for y, 2 for yaw.
+
+    ``counts``: the commanded counts.
+
+    ``measured``, ``sigma``: the speed by the odometry, and its standard deviation.
+
+    ``gyro``, ``gyro_sigma``: the yaw rate by the gyro, and its standard deviation. For x and y,
+    ``gyro`` is NaN.
     """
 
     axis: int
@@ -52,9 +59,12 @@ class Speed:
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """A scale in counts per m/s or rad/s, with its standard deviation ``sigma``.
+    """A scale in counts per m/s, or in counts per rad/s.
 
-    ``excess``: ratio of the scatter of the speeds to their uncertainties (1: as expected).
+    ``sigma``: standard deviation of ``value``.
+
+    ``excess``: ratio of the scatter of the speeds to their uncertainties. It is 1 if the scatter is
+    as expected.
     """
 
     value: float
@@ -63,9 +73,14 @@ class Scale:
 
 
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
-    """Return commands in both directions along each axis, each with its time in s.
+    """Return commands in both directions along each axis, each with its duration in s.
 
-    Commands are whole counts, at ``levels`` speeds up to ``top``.
+    ``top``: the largest speed along each axis.
+
+    ``scales``: counts per m/s or rad/s of each axis.
+
+    ``levels``: number of speeds along each axis, up to ``top``. Each speed is a whole number of
+    counts.
     """
     stairs = []
     for level in range(1, levels + 1):
@@ -79,10 +94,15 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 
 
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
-    """Return the speed for every command in the log that was held long enough.
+    """Return a speed for every command in the log that was sent for long enough.
 
-    ``up``: direction of up in the sensor's axes; ``bias``: the gyro's bias. Raises ToolError if
-    there is no such command.
+    ``scales``: counts per m/s or rad/s of each axis.
+
+    ``up``: the upward direction in the sensor's axes.
+
+    ``bias``: the gyro's bias.
+
+    Raises ToolError if the log contains no such command.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -112,7 +132,7 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
     """Return the scale that fits the speeds best, weighted by their uncertainties.
 
-    The fitted line goes through the origin. Raises ToolError if the robot moves in the opposite
+    The fitted line goes through the origin. Raises ToolError if the robot moved in the opposite
     direction to its commands.
     """
     counts = np.array([one.counts for one in found], dtype=float)
@@ -133,10 +153,10 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """Return the time spans with a settled speed: begin, end, and the command, which is not zero.
+    """Return the time spans with a steady command, each with its begin, its end and the command.
 
-    After a pause between commands a new span begins, because the driver may have dropped the
-    command.
+    A span begins when the speed has settled. Commands of zero have no span. After a pause between
+    commands a new span begins, because the driver may have dropped the command.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -159,8 +179,8 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 def _way(pose: Column, axis: int) -> Column:
     """Return the coordinate of each pose along one of the robot's axes.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. For x and y, the direction of the axis is computed from
-    the mean heading of all poses. For yaw, the coordinate is the yaw itself.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. For x and y, the direction of the axis follows from the
+    mean heading of all poses.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -23,9 +23,9 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 RUN_UP_S: Final = 2.0
-"""Time to reach the first speed from rest, in s.
+"""Time, in s, that a wheel gets to reach the first speed from rest.
 
-This part of a record is not evaluated, because friction affects a start from rest.
+The tool does not evaluate this part of a record, because friction affects a start from rest.
 """
 
 
@@ -80,8 +80,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    Each step begins at a different time within the period of the odometry deltas. So the steps
-    together also show the response between the ends of two deltas.
+    Each step begins at a different time within an odometry delta. So all steps together show the
+    response at more times than the ends of the deltas.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -102,7 +102,7 @@ def _wheels(names: str) -> str:
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
     """Return the slow and the fast speed in rad/s, rounded to whole units of the board's command.
 
-    Raises ToolError if the speeds are not allowed or round to the same command.
+    Raises ToolError if the speeds are not allowed, or if both give the same command.
     """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:

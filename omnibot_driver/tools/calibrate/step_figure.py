@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Draw the picture of ``calibrate step``.
+"""The picture of ``calibrate step``.
 
-It shows measured responses, and the responses predicted with the present and the better gains.
+It shows the measured responses, and the responses that are predicted with present and better gains.
 """
 
 from collections.abc import Sequence
@@ -72,10 +72,12 @@ def _draw_predictions(
     command: float,
     load: float,
 ) -> None:
-    """Draw each motor's response with present and better gains.
+    """Draw each motor's predicted response with the present and with the better gains.
 
-    ``command``: size of the step of the command; ``load``: size of the step of the load, as a
-    multiple of the effort that a speed of one count per tick needs.
+    ``command``: size of the step of the commanded speed.
+
+    ``load``: size of the step of the load, as a multiple of the effort for a speed of one count per
+    tick.
     """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fit models with uncertainties to recorded steps of one wheel. Pure calculation.
+"""Fit models with uncertainties to recorded steps of one wheel.
 
-Time 0 of a step is its *onset*: the board's first control tick that could use the command. The
-times of the ticks are known from the timestamps. If a command arrives close to a tick, or a busy
-computer delays the command, it may take effect at a tick other than the calculated one. The
-recorded step then shows at which tick.
+Time 0 of a step is its *onset*: the first control tick at which the board could use the command.
+The times of the ticks are known from the timestamps. But a command may take effect at another tick
+than the calculated one. This happens if the command arrives close to a tick, or if a busy computer
+delays it. The recorded step then shows the tick at which the command took effect. This module knows
+commands and wheel rates; it does not know how they were recorded.
 """
 
 import math
@@ -27,18 +28,18 @@ from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Gains, Motor
 from omnibot_driver.tools.needs import ToolError
 
 ON_THE_WAY_S: Final = 0.0015
-"""Time from publishing a command to its last bit on the line, in s.
+"""Time, in s, from the publication of a command to its last bit on the line.
 
-The time is the sum of the latency of DDS and the transmission of 9 bytes at 115200 baud.
+It is the latency of DDS, plus the transmission of 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
-"""Number of odometry deltas before the onset that belong to a recorded step."""
+"""Number of odometry deltas before the onset that belong to the record of a step."""
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
-"""Range of corrections of an onset, in ticks: positive is earlier, negative later."""
+"""Tested shifts of an onset, in ticks. A positive shift moves the onset to an earlier time."""
 UNLIKE: Final = 3.0
-"""The tool rejects a step if its misfit is more than this many times the median misfit."""
+"""A step is rejected if its misfit is larger than the median misfit, multiplied by this number."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
@@ -48,12 +49,18 @@ DRAWS: Final = 100
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step from one commanded rate to another, in rad/s.
+    """One step from one commanded rate to another.
 
-    ``end_ticks``: whole control ticks from the onset to the end of each delta; ``rate_radps``: mean
-    rate of each odometry delta, that is, of the four ticks before its end. ``last_radps``: the rate
-    commanded before ``before_radps``. The change between these two was ``last_ticks`` ticks before
-    the onset; the response to this change may not have ended.
+    ``before_radps``, ``after_radps``: the commanded rates before and after the step.
+
+    ``end_ticks``: for each odometry delta, the number of control ticks from the onset to its end.
+
+    ``rate_radps``: for each odometry delta, the mean rate in the four ticks before its end.
+
+    ``last_radps``: the rate that was commanded before ``before_radps``.
+
+    ``last_ticks``: number of ticks from the change between these two rates to the onset. The
+    response to that change may not have ended.
     """
 
     before_radps: float
@@ -64,14 +71,14 @@ class Step:
     last_ticks: int
 
     def sooner(self, ticks: int) -> "Step":
-        """Return this step with the onset moved earlier by ``ticks`` control ticks."""
+        """Return this step with its onset moved to an earlier time, by ``ticks`` control ticks."""
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the predicted rates of this step's odometry deltas, in rad/s.
 
-        ``mean``: a function of the ticks at which deltas end; it returns the mean response of each
-        delta to a unit step.
+        ``mean``: a function that returns the mean response of deltas to a unit step. Its argument
+        has the ticks at which the deltas end.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -86,7 +93,13 @@ class Step:
 class Fit:
     """A model with the parameter values that explain the steps best.
 
-    ``covariance`` is scaled by the residuals; ``rms_radps`` is the rms of the residuals.
+    ``values``: these parameter values.
+
+    ``covariance``: covariance of ``values``, scaled by the residuals.
+
+    ``rms_radps``: root mean square of the residuals.
+
+    ``samples``: number of odometry deltas that were used.
     """
 
     model: Model
@@ -104,7 +117,7 @@ class Fit:
     def aic(self) -> float:
         """Akaike's information criterion.
 
-        Of two fits to the same steps, the fit with the smaller value is better.
+        The better of two fits to the same steps has the smaller value.
         """
         return 2 * self.samples * math.log(self.rms_radps) + 2 * len(self.values)
 
@@ -114,8 +127,11 @@ class Fit:
         return np.asarray(self.values[0] * told)
 
     def traits(self) -> dict[str, tuple[float, float]]:
-        """Return rise time (10 % to 90 %, in s) and overshoot (relative), with standard
-        deviations."""
+        """Return two characteristics of the step response, each with its standard deviation.
+
+        "rise time" is the time in s from 10 % to 90 % of the step. "overshoot" is a fraction of the
+        step.
+        """
         random = np.random.default_rng(0)
         draws = random.multivariate_normal(self.values, self.covariance, DRAWS)
         draws = np.clip(draws, self.model.low, self.model.high)
@@ -191,10 +207,15 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 
 @dataclass(frozen=True, slots=True)
 class WheelFound:
-    """The results of one wheel: the steps used, the number of rejected steps, and three fits.
+    """The results of one wheel.
 
-    ``first``, ``second``: fits of models of first and of second order; ``motor_fit``: fit of a
-    motor in the manual's control loop.
+    ``steps``: the steps that were used.
+
+    ``left_out``: number of rejected steps.
+
+    ``first``, ``second``: fits of a model of first order, and of a model of second order.
+
+    ``motor_fit``: fit of a motor in the manual's control loop.
     """
 
     name: str
@@ -206,21 +227,25 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The better, by AIC, of the two fits that assume nothing about the control loop."""
+        """The better of ``first`` and ``second``, by AIC.
+
+        These two fits assume nothing about the control loop.
+        """
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
     @property
     def motor(self) -> Motor:
-        """The fitted motor, with its times in control ticks."""
+        """The fitted motor. Its times are in control ticks."""
         _gain, pwm_per_count, time_constant_s, delay_s = self.motor_fit.values
         return Motor(pwm_per_count, time_constant_s / TICK_S, delay_s / TICK_S)
 
 
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
-    """Fit the three models to a wheel's steps.
+    """Fit three models to a wheel's steps: first order, second order, and a motor.
 
-    The models are those of first order, of second order, and of a motor in the manual's control
-    loop. ``now``: the gains in the firmware.
+    The motor is simulated in the manual's control loop.
+
+    ``now``: the gains in the firmware.
     """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
@@ -232,8 +257,8 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with corrected onsets, because a command may have taken effect late.
 
-    Each onset is moved to the tick at which the step fits the model best. The median onset stays,
-    because a common shift of all steps would be a delay of the wheel.
+    Each onset is moved to the tick at which the step fits the model best. The median of the shifts
+    is subtracted, because a common shift of all steps would be a delay of the wheel.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):
@@ -251,7 +276,10 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 
 
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps whose misfit to a common model is not far above the median misfit."""
+    """Return the steps that fit a common model well; the others are rejected.
+
+    A step fits well if its misfit is at most ``UNLIKE`` times the median misfit.
+    """
     guess = fit(model, steps)
     misfits = [_misfit(guess, step) for step in steps]
     most = UNLIKE * sorted(misfits)[len(misfits) // 2]
