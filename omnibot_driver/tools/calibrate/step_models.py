@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Models of step responses as the odometry measures them: averaged over an odometry delta of 40 ms.
+"""Models of a wheel's step response, as the odometry measures it.
 
-Every model gives the angle that a wheel has turned by a given time, after a unit step of its rate
-at time 0. The mean rate of a delta is not a sample: it is the difference of two such angles,
-divided by the length of the delta. Must not know measured data or ROS.
+The odometry reports means over odometry deltas of 40 ms. Every model gives the angle that a wheel
+has turned by a given time, after a unit step of its rate at time 0. The mean rate of a delta is the
+difference of two such angles, divided by the length of the delta. This module knows models and
+times; it does not know measured data.
 """
 
 from collections.abc import Callable
@@ -17,21 +18,27 @@ from omnibot_driver.tools.calibrate.wheel_loop import TICK_S, Array, Gains, Moto
 
 DELTA_TICKS: Final = 4
 SPAN_S: Final = DELTA_TICKS * TICK_S
-"""Span of an odometry delta, in s: manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md.
+"""Length of an odometry delta, in s.
+
+Source: manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md.
 """
 
 Turned = Callable[[Array, Array], Array]
 """A function of a model's parameters without the gain, and of times in s.
 
-It returns the angle turned after a unit step of the rate (1 rad/s), in rad.
+The function returns the angle turned after a unit step of the rate (1 rad/s), in rad.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """A model of a step response, with names, units, starting values and bounds of its parameters.
+    """A model of a step response.
 
-    The first parameter is always the gain.
+    ``names``, ``units``: names and units of the parameters. The first parameter is always the gain.
+
+    ``start``, ``low``, ``high``: starting values and bounds of the parameters.
+
+    ``turned``: the function that gives the angle turned after a unit step.
     """
 
     title: str
@@ -43,7 +50,10 @@ class Model:
     turned: Turned
 
     def mean(self, parameters: Array, end_s: Array) -> Array:
-        """Return the mean rate of each delta after a unit step; ``end_s``: times of their ends."""
+        """Return the mean rate of each odometry delta after a unit step.
+
+        ``end_s``: times at which the deltas end, in s.
+        """
         turned = self.turned(parameters, np.concatenate((end_s, end_s - SPAN_S)))
         return np.asarray((turned[: len(end_s)] - turned[len(end_s) :]) / SPAN_S)
 
@@ -56,10 +66,10 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 
 
 def second_order(parameters: Array, time_s: Array) -> Array:
-    """Return the angle turned by the model of second order after a unit step, with any damping.
+    """Return the angle turned by a model of second order after a unit step, with any damping.
 
-    The model is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). The zero Z is needed, because a
-    PI loop with feed-forward around a motor of first order has a zero.
+    The model is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). It has a zero (Z), because a PI loop
+    with feed-forward around a motor of first order has a zero.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
@@ -76,7 +86,7 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 def motor_in_loop(gains: Gains) -> Turned:
     """Return the model of a motor in the manual's control loop with these gains.
 
-    The model's parameters are PWM per count, time constant and delay.
+    The parameters of the model are PWM per count, time constant and delay.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

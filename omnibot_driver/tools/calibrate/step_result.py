@@ -11,29 +11,30 @@ from omnibot_driver.tools.calibrate.tuning import Behaviour, behaviour, better_g
 from omnibot_driver.tools.calibrate.wheel_loop import Gains
 
 UNLIKE_ONE: Final = 0.02
-"""The tool recommends `calibrate scale` if a wheel's gain differs from 1 by more than this."""
+"""Difference of a wheel's gain from 1 above which the tool recommends ``calibrate scale``."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
+"""Standard deviation, in rad/s, of the rate of an odometry delta that comes from quantisation.
 
-Both the encoder and the protocol, with its unit of 0.1 mm, quantise a delta.
+The encoder quantises a delta, and so does the protocol, with its unit of 0.1 mm.
 """
 MANY: Final = 1.5
-"""The tool warns the user if the residuals exceed this multiple of ``QUANTUM_RADPS``.
+"""Multiple of ``QUANTUM_RADPS`` above which the tool warns the user about the residuals.
 
-On a computer that delayed commands the residuals were twice ``QUANTUM_RADPS``, and the fitted delay
-was 4 ms too long.
+On a computer that delayed commands, the residuals were twice ``QUANTUM_RADPS``, and the fitted
+delay was 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
-"""Largest ratio of the motor model's residuals to the second-order model's.
+"""Largest accepted ratio of the motor model's residuals to those of the second-order model.
 
-Above this ratio the motor model is regarded as wrong.
+Above this ratio, the tool regards the motor model as wrong.
 """
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Choose better gains and return the result.
+    """Find better gains, and return the result.
 
-    One set of gains is chosen, because the firmware has the same gains for all wheels.
+    ``now``: the gains in the firmware. The better gains are the same for all wheels, because the
+    firmware has only one set of gains.
     """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)
@@ -100,7 +101,7 @@ def _traits(fit: Fit) -> Any:
 
 
 def _recorded(wheel: WheelFound) -> dict[str, Any]:
-    """Return all values of a wheel with their standard deviations, for the file."""
+    """Return all fitted values of a wheel with their standard deviations, for the file."""
     return {
         fit.model.title: {
             "residual_radps": round(fit.rms_radps, 4),
@@ -146,7 +147,7 @@ def _remarks(wheel: WheelFound) -> list[str]:
 
 
 def _told(wheels: list[Behaviour]) -> str:
-    """Return a text with the largest value of each characteristic over all wheels."""
+    """Return a text for the user with the largest value of each characteristic over all wheels."""
     rise_ms, command_ms, load_ms = (
         1000 * max(float(value) for value in values)
         for values in (

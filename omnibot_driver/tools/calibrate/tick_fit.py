@@ -1,11 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fit a plant to the times between ticks of wheels that start at full duty. Pure calculation.
+"""Fit a plant to the times between encoder ticks of a wheel that starts at full duty.
 
-A record begins with the first tick after its request, so the time at which the duty was applied is
-not known. The record shows how the times between ticks become shorter, but not the dead time. The
-positions of the encoder's marks are fitted as well (``tick_marks``). The plant, from duty to speed,
-is of first or second order, whichever fits the records better.
+The plant, from duty to speed, is of first or second order, whichever fits the records better. A
+record begins with the first tick after its request, so it does not show when the duty was applied.
+It shows how the times between ticks become shorter, but not the dead time. The positions of the
+encoder's marks are fitted as well (``tick_marks``).
+
+This module knows times between ticks; it does not know how they were recorded.
 """
 
 import math
@@ -27,10 +29,14 @@ FEWEST_TICKS: Final = 30
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """A plant: a wheel with the duty in percent as input, and the speed in RPM as output.
+    """A wheel, as a plant with the duty in percent as input and the speed in RPM as output.
 
-    The final speed is the gain times the duty above ``dead_zone_percent``. The speed follows with
-    the time constants ``slow_s`` and ``fast_s``; ``fast_s`` is 0 for a plant of first order.
+    ``rpm_per_percent``: gain.
+
+    ``slow_s``, ``fast_s``: time constants. ``fast_s`` is 0 for a plant of first order.
+
+    ``dead_zone_percent``: duty up to which the wheel does not turn. The final speed is the gain
+    times the duty above it.
     """
 
     rpm_per_percent: float
@@ -45,10 +51,18 @@ class Plant:
 
 @dataclass(frozen=True, slots=True)
 class PlantFit:
-    """The fit of a plant. ``final_rpm``: final speed at the duty of the records.
+    """The fit of a plant to records of starts.
+
+    ``final_rpm``: final speed at the duty of the records.
+
+    ``slow_s``, ``fast_s``: time constants.
 
     ``sigmas``: standard deviations of ``final_rpm``, ``slow_s`` and ``fast_s``, scaled by the
     residuals.
+
+    ``rms``: root mean square of the relative residuals.
+
+    ``samples``, ``order``: number of residuals, and order of the plant.
     """
 
     final_rpm: float
@@ -63,12 +77,12 @@ class PlantFit:
 
     @property
     def aic(self) -> float:
-        """Akaike's information criterion: the fit with the smaller value is preferred."""
+        """Akaike's information criterion. The fit with the smaller value is better."""
         return 2 * self.samples * math.log(self.rms) + 2 * self.order
 
 
 def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the speed after a step at time 0, as a fraction of the final speed."""
+    """Return the speed after a step of the duty at time 0, as a fraction of the final speed."""
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(1 - slow)
@@ -79,10 +93,12 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 
 
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
-    """Fit a plant to ``records`` of starts from standstill, all at the same duty.
+    """Fit a plant to records of starts from standstill, all at the same duty.
 
-    A record has the times between ticks, in s. The first time of a record is not used, because it
-    includes the standstill. Raises ToolError if a record is too short.
+    ``records``: for each record, the times between ticks in s. The first time of a record is not
+    used, because it includes the standstill.
+
+    Raises ToolError if a record is too short.
     """
     intervals = [record[1:] for record in records]
     if not intervals or min(map(len, intervals)) < FEWEST_TICKS:

@@ -1,11 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find the positions of an encoder's marks from several records of a wheel. Pure calculation.
+"""Find the positions of an encoder's marks from several records of a wheel.
 
-The marks on the encoder's disc are not exactly evenly spaced. Their effect on the times between
-ticks repeats with each turn. Each record begins at an unknown mark. The input is the relative
-difference of each time between two ticks from the time that evenly spaced marks would give. Must
-not know how the wheel moved.
+The marks on the encoder's disc are not exactly evenly spaced. So the times between ticks have
+errors that repeat with each turn of the wheel. Each record begins at an unknown mark. The input of
+this module is the relative error of each time between ticks: its difference from the time that
+evenly spaced marks would give.
+
+This module knows these errors; it does not know how the wheel moved.
 """
 
 from collections.abc import Sequence
@@ -21,18 +23,15 @@ ROUNDS: Final = 4
 LARGEST: Final = 0.5
 """Largest plausible relative error of a time between ticks.
 
-A larger error shows that the board missed an edge.
+A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""Largest relative error of a time between ticks, in standard deviations of all errors.
-
-Times with a larger error are not used.
-"""
+"""Largest relative error of a time that is used, in standard deviations of all errors."""
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
-If the marks are evenly spaced, a fit to three records of two turns each explains by chance less
-than a fifth of the variance.
+If the marks are evenly spaced, a fit explains less than a fifth of the variance, by chance. This
+holds for three records of two turns each.
 """
 
 
@@ -40,7 +39,8 @@ than a fifth of the variance.
 class Marks:
     """The marks of an encoder.
 
-    ``steps``: relative difference of each distance between successive marks from the mean distance.
+    ``steps``: for each distance between successive marks, its relative difference from the mean
+    distance.
     """
 
     steps: Column
@@ -52,9 +52,9 @@ class Marks:
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the index in ``steps`` of the distance that belongs to a record's first time.
+        """Return the index in ``steps`` of the distance at which a record begins.
 
-        ``off``: relative errors of the record's times between ticks.
+        ``off``: relative errors of the times between ticks in the record.
         """
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
@@ -67,10 +67,12 @@ class Marks:
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
-    """Return the marks that explain the times of these records, or None if no pattern repeats.
+    """Return the marks that explain the errors of these records, or None if no pattern repeats.
 
-    ``rows``: for each record, the relative difference of each time between two ticks from the time
-    that evenly spaced marks would give, or NaN if unknown; ``marks``: number of marks.
+    ``rows``: for each record, the relative errors of the times between ticks. An unknown error is
+    NaN.
+
+    ``marks``: number of marks on the disc.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)
@@ -92,9 +94,9 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the index in ``steps`` of the distance that belongs to the first time of ``row``.
+    """Return the index in ``steps`` from which on ``row`` and ``steps`` agree best.
 
-    It is the index from which on ``row`` and ``steps`` agree best.
+    ``row``: relative errors of one record.
     """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
@@ -103,9 +105,13 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return the median error of each step over all rows, shifted to a mean of zero.
+    """Return, for each distance between marks, the median of its errors over all rows.
 
-    ``rows``: relative errors, by record; ``firsts``: the step with which each row begins.
+    The result is shifted to a mean of zero.
+
+    ``rows``: relative errors, by record.
+
+    ``firsts``: for each row, the index of the distance with which it begins.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

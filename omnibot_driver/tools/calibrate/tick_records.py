@@ -2,7 +2,8 @@
 
 """Read records of the times between a wheel's ticks, and measure the levels of its encoder.
 
-A record is a CSV file that the driver has written.
+A record is a CSV file that the driver has written. This module knows files and times; it does not
+know the plant.
 """
 
 import csv
@@ -18,22 +19,23 @@ from omnibot_driver.tools.needs import ToolError
 
 SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
-"""Largest fraction of a record's times that may be missing."""
+"""Largest fraction of the times in a record that may be missing."""
 UNLIKE: Final = 1.5
-"""Largest accepted ratio of a time between ticks to the median, or of the median to such a time.
+"""Largest accepted ratio between a time between ticks and the median of these times.
 
-A larger ratio shows that the board missed an edge, or noticed it late.
+The time may be the larger or the smaller one. A larger ratio shows that the board missed an edge of
+the encoder's signal, or noticed it late.
 """
 SMOOTHED: Final = 4
-"""Number of times between ticks from which one speed is computed.
+"""Number of successive times between ticks from which one speed is computed.
 
-A displaced mark changes the sum of these times by no more than it changes a single time. The
-relative error of the sum is therefore smaller.
+A displaced mark changes the sum of these times by no more than it changes a single time. So the
+relative error of the sum is smaller.
 """
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Return the times between ticks in s, by side; NaN where the record has no time.
+    """Return the times between ticks in s, by side. A time that is missing in the record is NaN.
 
     Raises ToolError if the file cannot be read, or if too many times are missing.
     """
@@ -58,10 +60,14 @@ def read(path: Path) -> dict[str, Column]:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """Corrections of the two levels of an encoder's signal, and the speed at the measurement.
+    """Corrections of the two levels of an encoder's signal, for one wheel.
 
-    ``short``, ``long``: factors that make the duration of each level equal to the mean of both.
-    ``sigma``: standard deviation of the factors. ``rpm``: the wheel's speed.
+    ``short``, ``long``: factors by which the duration of the short and of the long level become
+    equal.
+
+    ``sigma``: standard deviation of the factors.
+
+    ``rpm``: speed of the wheel during the measurement.
     """
 
     short: float
@@ -73,9 +79,9 @@ class Levels:
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of an encoder's two levels, for a wheel that turns at constant duty.
 
-    The board must make the record while both corrections are 1. The two levels alternate; the level
-    with the shorter mean time is the short level. After a missed edge the function decides anew
-    which level is the short one. Raises ToolError if the ticks are not regular.
+    While the board makes the record, both corrections must be 1. The two levels alternate. The
+    level with the shorter mean time is the short level. After a missed edge, this is decided anew.
+    Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)
@@ -98,7 +104,7 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
 
 
 def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -> Iterable[Column]:
-    """Yield each sequence of ten or more regular ticks."""
+    """Yield each sequence of ten or more regular times between ticks."""
     begin = 0
     for place in range(len(ticks_s) + 1):
         if place == len(ticks_s) or not good[place]:
@@ -109,14 +115,22 @@ def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """A measured step response: ``times_s`` from the first tick on, and the smoothed ``rpm``."""
+    """A measured step response.
+
+    ``times_s``: times from the first tick on.
+
+    ``rpm``: smoothed speeds at these times.
+    """
 
     times_s: Column
     rpm: Column
 
 
 def response(ticks_s: Column, ticks_per_revolution: int) -> Response:
-    """Return the response without the record's first time, which includes the standstill."""
+    """Return the step response in a record.
+
+    The first time of the record is not used, because it includes the standstill.
+    """
     times_s = ticks_s[1:].copy()
     times_s[~np.isfinite(times_s)] = np.nanmedian(times_s)
     ends_s = np.concatenate(([0.0], np.cumsum(times_s)))

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fit a plant by least squares to the times between ticks of several starts. Pure calculation.
+"""A least-squares fit of a plant to the times between encoder ticks of several starts.
 
-Knows the motion of a plant, the marks and the noise. Must not know files, nor choose between a
-plant of first and of second order.
+This module knows the motion of a plant, the marks and the noise; it does not know files, and does
+not choose between a plant of first and of second order.
 """
 
 import math
@@ -21,42 +21,45 @@ from omnibot_driver.tools.calibrate.whitening import correlation, whitener
 Column = NDArray[np.float64]
 
 SIGMA: Final = 0.1
-"""Assumed relative noise of one time between ticks while the positions of the marks are unknown."""
+"""Assumed relative noise of a time between ticks, until the positions of the marks are known."""
 SHARPEST: Final = 0.002
-"""Least relative noise of one time between ticks; the board reports times in steps of 0.1 ms."""
+"""Least relative noise of a time between ticks. The board reports times in steps of 0.1 ms."""
 SHORTEST_S: Final = 0.005
 LONGEST_S: Final = 5.0
 """Longest allowed sum of both time constants, in s."""
 GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
-"""Starting values for the sum of both time constants, in s."""
+"""Starting values for the sum of both time constants, in s. A search begins at each of them."""
 RATIOS: Final = (0.15, 0.4, 0.8)
 """Starting values for the ratio of the fast to the slow time constant.
 
-A search that starts at 1 would stop there.
+A search that started at 1 would not move away from 1.
 """
 LATEST_S: Final = 2.0
-"""Longest allowed time from the start to the first mark, in s."""
+"""Longest allowed time from the start of the wheel to the first mark, in s."""
 MOST_OFF: Final = 0.4
-"""Largest allowed error of a mark's position, in ticks."""
+"""Largest allowed displacement of a mark from its evenly spaced position, in ticks."""
 LAGS: Final = 60
-"""Largest number of ticks between two residuals whose correlation is considered.
+"""Largest distance between two residuals, in ticks, at which their correlation is considered.
 
 Even such distant residuals are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
-"""Sum of the relative errors of two successive times between ticks above which a mark was missed.
+"""Sum of the relative errors of two successive times above which the board has missed a mark.
 
-If the board only noticed a mark late, the sum is near 0: one time is too long, and the next is too
-short by the same amount. (The board's clock loses up to 6 ms at a missed mark, so the time is not
-twice as long as usual.)
+If the board only noticed a mark late, the sum is near 0: the first time is too long, and the second
+is too short by the same amount. A time with a missed mark is not twice as long as usual, because
+the board's clock loses up to 6 ms at a missed mark.
 """
 SURE_TICKS: Final = 4
-"""Number of ticks at the start that cannot contain a missed mark, because the wheel is slow."""
+"""Number of ticks at the start of a record among which the board cannot miss a mark.
+
+The wheel is still slow then.
+"""
 OUTLIER: Final = 5.0
 """Error of a time between ticks, in standard deviations, above which the time is not used."""
 FEWEST_RECORDS: Final = 6
-"""Least number of records that are needed to estimate errors from the scatter between records."""
+"""Least number of records for which the scatter between records is used to estimate errors."""
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
@@ -74,7 +77,7 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    The search uses the sum and the ratio of both instead, so that it has only one optimum.
+    ``values`` has their sum and their ratio instead, so that the search has only one optimum.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -82,13 +85,22 @@ def constants(values: Column, order: int) -> tuple[float, float]:
 
 
 class Search:
-    """A search for a plant's values. ``intervals``: times between ticks in s, by record.
+    """A search for the values of a plant.
 
-    The values are, in this order: the logarithm of the final rate in ticks per second; the
-    logarithm of the sum of both time constants in s; for a second order, the ratio of the time
-    constants; the time in s of each record's first mark; and, while marks are fitted, the positions
-    of the marks in ticks. (The first mark of a record is given by its time, because the distance
-    just after the start is small: it grows with the cube of the time.)
+    ``intervals``: for each record, the times between ticks in s.
+
+    ``order``: order of the plant, 1 or 2.
+
+    The array of values has, in this order:
+
+    - the logarithm of the final rate in ticks per second
+    - the logarithm of the sum of both time constants in s
+    - the ratio of the time constants, if the order is 2
+    - for each record, the time of its first mark in s
+    - the positions of the marks in ticks, while the marks are fitted
+
+    The first mark is given by its time, because just after the start the distance is small: it
+    grows with the cube of the time.
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -107,7 +119,7 @@ class Search:
     def roughly(self) -> Column:
         """Return first estimates of all values.
 
-        They assume a plant of second order, evenly spaced marks, and independent noise.
+        They are for a plant of second order with evenly spaced marks and independent noise.
         """
         records = len(self._lengths)
         starts = []
@@ -117,11 +129,11 @@ class Search:
         return self._best(starts)
 
     def closely(self, values: Column) -> Column:
-        """Continue the search from several ratios of the time constants, to avoid local optima."""
+        """Search again from several ratios of the time constants, to avoid a local optimum."""
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
-        """Continue the search with a plant of first order, from values of second order.
+        """Search again for a plant of first order, starting from the values of second order.
 
         This call sets ``order`` to 1.
         """
@@ -131,8 +143,8 @@ class Search:
     def off(self, values: Column) -> list[Column]:
         """Return, for each record, the relative errors of its times between ticks.
 
-        An error is the difference from the time that evenly spaced marks would give. If the board
-        missed a mark, the errors of the distances before and after this mark are NaN.
+        An error is the difference from the time that evenly spaced marks would give. Around a mark
+        that the board missed, the errors are NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -143,7 +155,7 @@ class Search:
         return found
 
     def find_missed(self, values: Column) -> bool:
-        """Find missed marks; return whether the board missed any.
+        """Find the marks that the board missed; return whether it missed any.
 
         From then on, the search counts a time with a missed mark as the time for two distances.
         """
@@ -174,8 +186,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals at these values, and remove it from now on.
 
-        If the positions of the marks are not known, the marks cause the correlation; otherwise the
-        changing load causes it.
+        While the positions of the marks are not known, the marks cause the correlation. Afterwards
+        the changing load causes it.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -186,7 +198,7 @@ class Search:
         self._whitener = whitener(correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
-        """Return the relative residuals of these values, whitened and without outliers."""
+        """Return the relative residuals at these values, whitened and without outliers."""
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
@@ -194,8 +206,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        The covariance comes from all residuals or, if larger, from the scatter between records,
-        because a slowly changing load affects a whole record.
+        The covariance follows from all residuals. If the scatter between records is larger, it
+        follows from this scatter, because a slowly changing load affects a whole record.
         """
         own = 1 + self.order
         found = self._search(values)
@@ -244,7 +256,7 @@ class Search:
         )
 
     def _sparsity(self) -> csr_matrix:
-        """Return the sparsity pattern of the Jacobian: which times depend on which values."""
+        """Return which times depend on which values, as the sparsity pattern of the Jacobian."""
         own, records, times = 1 + self.order, len(self._lengths), len(self._measured)
         pattern = np.zeros((times, own + records + self._marks))
         pattern[:, :own] = 1.0
@@ -274,7 +286,7 @@ class Search:
     def _told(self, values: Column, off: Column | None = None) -> Column:
         """Return the predicted times between marks in s, record after record.
 
-        ``off``: displacements of the marks, if they are not among the values.
+        ``off``: displacements of the marks, if ``values`` does not contain them.
         """
         order, records = self.order, len(self._lengths)
         rate, (slow_s, fast_s) = math.exp(values[0]), constants(values, order)

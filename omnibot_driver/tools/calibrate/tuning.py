@@ -2,15 +2,16 @@
 
 """Find gains of the manual's control law that suit a motor, and predict their effect.
 
-The criterion is the integral of absolute error after a step of the command, and after a step of
-the load (a floor, a sagging battery, dry friction). Each of the two integrals is divided by its
-value with the present gains, and both have the same weight. The limits are:
+The gains are compared by the integral of the absolute error: after a step of the command, and after
+a step of the load. Examples of a load are a floor, a sagging battery and dry friction. Each
+integral is divided by its value with the present gains, and both have the same weight. The limits
+are:
 
-- Ms, the peak of the sensitivity, is at most 1.6. This limit tolerates an error of a factor 2.6 in
-  gain, or of 36° in phase.
+- Ms, the peak of the sensitivity, is at most 1.6. With this limit, the loop tolerates an error of a
+  factor 2.6 in gain, or of 36° in phase.
 - The overshoot after a step of the command is at most 5 %.
-- K_VP and K_VI are each at most the effort that a speed of one count per tick needs, so that an
-  error of one encoder count has little effect.
+- K_VP and K_VI are each at most the effort for a speed of one count per tick. So an error of one
+  encoder count has little effect.
 """
 
 from collections.abc import Sequence
@@ -34,7 +35,7 @@ LARGEST_MS: Final = 1.6
 LARGEST_OVERSHOOT: Final = 0.05
 HORIZON_TICKS: Final = 400
 SETTLED: Final = 1e-3
-"""A loop is regarded as stable if its relative error after ``HORIZON_TICKS`` is below this."""
+"""Relative error after ``HORIZON_TICKS`` below which a loop is regarded as stable."""
 CANDIDATES: Final = 24
 """Number of values of each gain in one round of the search."""
 ROUNDS: Final = 3
@@ -42,12 +43,20 @@ ROUNDS: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """The behaviour of a motor with some gains; scalars or arrays.
+    """The behaviour of a motor with some gains, as numbers or arrays.
 
-    ``rise_s``: from 10 % to 90 % of a step; ``overshoot``: as a fraction of the step;
-    ``command_error_s``: integral of the absolute error after a step of 1; ``load_error_s``: the
-    same integral after a step of load that equals the effort for one count per tick; ``ms``: peak
-    of the sensitivity (1: most robust); ``stable``: whether the response settles.
+    ``rise_s``: time from 10 % to 90 % of a step.
+
+    ``overshoot``: fraction of the step.
+
+    ``command_error_s``: integral of the absolute error after a step of 1.
+
+    ``load_error_s``: the same integral after a step of the load. The load equals the effort for a
+    speed of one count per tick.
+
+    ``ms``: peak of the sensitivity; 1 is the most robust value.
+
+    ``stable``: whether the response settles.
     """
 
     rise_s: Array
@@ -79,8 +88,9 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the gains within the limits that are best for all these motors together.
 
-    The gains are found by a grid search that narrows in each round. ``now``: the present gains,
-    with whose behaviour each candidate is compared.
+    The function searches a grid that becomes narrower in each round.
+
+    ``now``: the present gains. Each candidate's behaviour is compared with theirs.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

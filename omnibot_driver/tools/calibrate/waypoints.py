@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Control laws that drive the robot by its odometry from pose to pose. Pure calculation."""
+"""Control laws that drive the robot, by its odometry, from pose to pose.
+
+This module knows poses and speeds; it does not know how commands are sent.
+"""
 
 import math
 from collections.abc import Sequence
@@ -13,15 +16,21 @@ from omnibot_driver.tools.calibrate.motion import Law
 NEAR_M: Final = 0.005
 NEAR_RAD: Final = 0.01
 BRAKING: Final = 0.15
-"""Deceleration before a waypoint, in m/s²: half of the rate at which commands may change."""
+"""Deceleration before a waypoint, in m/s².
+
+It is half of the rate at which a command may change.
+"""
 ANGULAR_BRAKING: Final = 0.4
 
 
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
-    """Return a law that drives through these poses and stops at each.
+    """Return a law that drives the robot through these poses, and stops it at each pose.
 
-    The poses are relative to the start of the motion, with the yaw unwrapped. ``speed`` is in m/s,
-    ``turning`` in rad/s.
+    ``places``: poses relative to the start of the motion, with unwrapped yaw.
+
+    ``speed``: largest speed in m/s.
+
+    ``turning``: largest yaw rate in rad/s.
     """
     number = 0
 
@@ -35,7 +44,7 @@ def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
 
 
 def straight(way_m: float, speed: float) -> Law:
-    """Return a law that drives straight ahead, for a base with two wheels; ``speed`` in m/s."""
+    """Return a law that drives a base with two wheels straight ahead, at up to ``speed`` m/s."""
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:
         left_m = way_m - pose.x_m
@@ -47,7 +56,10 @@ def straight(way_m: float, speed: float) -> Law:
 
 
 def turn(angle_rad: float, turning: float) -> Law:
-    """Return a law that turns on the spot, to the left if positive; ``turning`` in rad/s."""
+    """Return a law that turns the robot on the spot, at up to ``turning`` rad/s.
+
+    The turn is to the left if ``angle_rad`` is positive.
+    """
     sign = math.copysign(1.0, angle_rad)
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:
@@ -60,8 +72,10 @@ def turn(angle_rad: float, turning: float) -> Law:
 
 
 def square(side_m: float, sign: int) -> list[Pose]:
-    """Return the poses of a square: forward, then a quarter turn (1: left, -1: right), four
-    times."""
+    """Return the poses of a square: four times forward, each followed by a quarter turn.
+
+    ``sign``: 1 for turns to the left, -1 for turns to the right.
+    """
     places = []
     place = Pose()
     for _ in range(4):

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulate one wheel in the manual's control loop, for small signals.
+"""The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-Speeds are in encoder counts per control tick of 10 ms, efforts in PWM steps, times in ticks. The
-loop is linear: it describes changes between two speeds in the same direction, where dry friction is
-constant and has no effect. Must not know measurements, radians or ROS.
+Speeds are in encoder counts per control tick of 10 ms, efforts in PWM steps, and times in ticks.
+The loop is linear. It is valid for changes between two speeds in the same direction, because dry
+friction is then constant and has no effect. This module knows the motor and the control law; it
+does not know measurements or radians.
 """
 
 from dataclasses import dataclass
@@ -16,12 +17,17 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 TICK_S: Final = 0.01
-"""Control period of a wheel, in s: manual, "Wheel control: 100Hz loop"."""
+"""Control period of a wheel, in s. Source: manual, "Wheel control: 100Hz loop"."""
 
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """A motor of first order: PWM steps per count, time constant and dead time in ticks."""
+    """A motor of first order.
+
+    ``pwm_per_count``: effort in PWM steps for a speed of one count per tick.
+
+    ``time_constant_ticks``, ``delay_ticks``: time constant and dead time, in ticks.
+    """
 
     pwm_per_count: float
     time_constant_ticks: float
@@ -30,7 +36,7 @@ class Motor:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """The gains K_ff, K_VP and K_VI: numbers, or arrays of the same shape for many candidates."""
+    """The gains K_ff, K_VP and K_VI: numbers, or arrays of the same shape with many candidates."""
 
     feed_forward: Any
     proportional: Any
@@ -43,9 +49,13 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A wheel's response: for each tick, its speed during the tick, and the effort computed in it.
+    """The response of a wheel, with one value for each tick.
 
-    The first tick is the first one whose control law uses the new command.
+    ``speed``: speed of the wheel during the tick.
+
+    ``effort``: effort that the control law computes in the tick.
+
+    The first tick is the first one in which the control law uses the new command.
     """
 
     speed: Array
@@ -55,11 +65,18 @@ class Answer:
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
 ) -> Answer:
-    """Return the response to simultaneous steps of commanded speed and of load (in PWM steps).
+    """Return the response to a step of the commanded speed and a simultaneous step of the load.
 
-    The law is the manual's ("Wheel control") with the feed-forward outside the accumulator: u(k) =
-    K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort acts from the next
-    tick on, delayed by the motor's ``delay_ticks``, which may be a fraction.
+    ``load``: size of the step of the load, in PWM steps.
+
+    The control law is that of the manual ("Wheel control"). The feed-forward is outside the
+    accumulator:
+
+    - u(k) = K_ff v + w(k)
+    - w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k)
+
+    An effort acts from the next tick on, delayed by the motor's ``delay_ticks``. The delay may be a
+    fraction of a tick.
     """
     shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
     whole, part = divmod(motor.delay_ticks, 1.0)
@@ -85,7 +102,7 @@ def answer(
 
 
 def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
-    """Return Ms: the inverse of the smallest distance between the loop's Nyquist curve and -1.
+    """Return Ms, the inverse of the smallest distance between the loop's Nyquist curve and -1.
 
     For a stable loop, Ms is the largest amplification of a disturbance; 1 is best.
     """

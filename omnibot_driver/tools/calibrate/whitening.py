@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The correlation of successive residuals, and the matrix that removes it. Pure calculation."""
+"""The correlation of successive residuals, and the matrix that removes this correlation.
+
+This module knows residuals; it does not know the model that they come from.
+"""
 
 from collections.abc import Sequence
 
@@ -14,9 +17,9 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the autocorrelation of residuals, for lags from 0 to ``lags``.
 
-    If ``lags`` is 1, the value at lag 1 is nearly -0.5 for displaced marks, and 0 for independent
-    errors of successive times. If ``lags`` is larger, the estimate is tapered linearly to the last
-    lag.
+    If ``lags`` is larger than 1, the estimate decreases linearly to the last lag (taper). If
+    ``lags`` is 1, the value at lag 1 shows the cause of the residuals. It is nearly -0.5 for
+    displaced marks, and 0 for independent errors of successive times.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -36,10 +39,10 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
 
 def whitener(of_lags: Column, length: int) -> Column:
-    """Return the matrix that makes residuals with this autocorrelation independent.
+    """Return the matrix that removes this autocorrelation from a row of residuals.
 
-    The matrix is the inverse of the Cholesky factor. For a shorter row, use the upper left part of
-    the matrix.
+    The matrix is the inverse of the Cholesky factor of the covariance. The upper left part of the
+    matrix is the matrix for a shorter row.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]
