@@ -50,10 +50,9 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""Longest time in s in which replies without a reading are ignored.
+"""Longest time in s without a reading. A reply after this time gives at least NOTHING_MEASURED.
 
-If a reply without a reading comes later, the board returns NOTHING_MEASURED. Measurements of a
-moving robot come at shorter intervals.
+Measurements of a moving robot come at shorter intervals.
 """
 EXPECTED_EVERY_S: Final = 0.2
 

@@ -59,9 +59,10 @@ PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
-"""Failure texts that may come sooner than ``least_s`` after a check of the IMU.
+"""Failure texts with which the server may answer a check of the IMU at once.
 
-The server then refuses the check, or finds no IMU.
+The server then refuses the check, or finds no IMU. All other replies to a check take at least
+``least_s``.
 """
 
 

@@ -2,8 +2,8 @@
 
 """Reasons not to drive: faults of the motor board, a dead IMU, an obstacle, or a wrong server.
 
-This module knows the slower measurements and their limits; it does not know how to stop the robot.
-The caller passes the time.
+This module knows the less frequent measurements and their limits; it does not know how to stop the
+robot. The caller passes the time.
 """
 
 import math
@@ -100,7 +100,7 @@ class Health:
     def measured(
         self, word: Word, reply: Ok, now: float, *, uncertain: bool = False
     ) -> list[Reading]:
-        """Return the readings from a reply to one of the slower queries.
+        """Return the readings from a reply to one of the less frequent queries.
 
         ``uncertain``: whether the reply may belong to another query. The reading is then returned
         only after several equal readings in a row.

@@ -76,9 +76,11 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return False if the check failed for another reason.
+        """Evaluate the reply to a check.
 
         ``took_s``: time from the check to the reply, in s.
+
+        Return False if the check failed, but not because of the IMU.
         """
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The speed of a motor as a straight line over its command units, which the driver learns.
+"""A straight line, learned by the driver, that gives the speed of a motor for its command units.
 
 A motor without a regulator needs some units before it turns, so its speed is not proportional to
 its units. With a single factor, learned at a high speed, slow wheels would turn too slowly. A speed

@@ -56,11 +56,14 @@ SILENT_S, GREET_AGAIN_S = 0.15, 0.1
 ``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
-"""Time in s after a move: if ENC is not answered by then, a copy of the move may be running."""
+"""Time in s after a move within which the server must answer ENC, the encoder query.
+
+If it does not, a duplicate of the move may be running.
+"""
 
 
 class Pilot(Hearing):
-    """The pilot of one server: decides which request is sent, and evaluates the replies."""
+    """The pilot of one server. It decides which request is sent, and evaluates the replies."""
 
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``.

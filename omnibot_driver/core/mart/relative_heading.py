@@ -17,9 +17,10 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""Difference in rad below which the first heading in RM may be a heading from before RM.
+"""Difference in rad up to which the first heading after an RM command may still be the old one.
 
-It is compared with the last heading before RM, because the server may not have reset it yet.
+The old heading is the last one before the command. The server resets the heading only when RM
+begins.
 """
 MOST_RAD: Final = 1e7
 """Size in rad from which a heading is rejected, because such a number cannot show small turns.
@@ -43,7 +44,8 @@ class RelativeHeading:
 
     ``told_s``: time of the last accepted heading.
 
-    ``from_s``: earliest possible time of the last heading that certainly answers RMRA.
+    ``from_s``: earliest possible time of the last heading that is certainly the reply to its query
+    (RMRA).
 
     ``changed_s``: time of the last change of heading.
 

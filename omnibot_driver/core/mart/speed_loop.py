@@ -4,8 +4,8 @@
 
 The server applies changes of the units without controlling the speed, so the effect of a unit
 depends on voltage, motor and floor. For each side the driver learns a ``MotorLine``, from windows
-of steady driving and from turns on the spot. The integral of the turn rate's error holds the
-heading. This module knows units, m/s and rad; it does not know commands. The caller passes the
+of steady driving and from turns on the spot. It holds the heading by the integral of the turn
+rate's error. This module knows units, m/s and rad; it does not know commands. The caller passes the
 time.
 """
 
@@ -33,7 +33,7 @@ SETTLE_S, LEARN_S = 0.45, 0.35
 
 ``SETTLE_S``: pause in learning after a large change of units.
 
-``LEARN_S``: shortest time in which the driver averages a speed, the window of learning.
+``LEARN_S``: shortest window of learning. A window is the time over which a speed is averaged.
 """
 LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
@@ -176,10 +176,9 @@ class SpeedLoop(Motors):
 
     @property
     def balance(self) -> float:
-        """Ratio of left to right motor speed, if both sides had equal units.
+        """Ratio of left to right motor speed if both motors have the same units, ``units``.
 
-        The units are those of the present motion. The ratio differs from ``motor_balance`` by
-        MOST_UNEQUAL at most.
+        The ratio differs from ``motor_balance`` by MOST_UNEQUAL at most.
         """
         return self._balance(self.units)
 

@@ -38,7 +38,7 @@ TIMED_OUT_S: Final = 0.5
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Longest duration of a controlled move, beyond 3 s.
+"""Longest duration of a controlled move: 3 s, plus a time for each inch or degree.
 
 ``STRAIGHT_S_PER_IN``: time in s for each inch of a straight move.
 

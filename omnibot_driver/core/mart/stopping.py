@@ -32,7 +32,7 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""For each motion, the forms of the ``ok`` with which the server reports that it has stopped it."""
+"""For each motion, the forms of the ``ok`` with which the server reports its end."""
 ASK_NAME_S: Final = 0.9
 """Time in s from the first stop of a controlled move until the driver asks for the server's name.
 

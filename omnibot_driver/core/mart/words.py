@@ -2,9 +2,17 @@
 
 """The table of all commands of the MART controller: port, replies and times of each.
 
-A command is one ASCII datagram without a terminator, and it is case-sensitive. This module knows
-the commands; it does not know in which state a command is allowed (see ``states``) or when it is
-sent (see ``conversation``).
+A command is one ASCII datagram without a terminator, and it is case-sensitive. The most important
+commands are:
+
+- motions: RM drives forward, B drives backward, R and L turn on the spot
+- controlled moves of a given length: TF and TB drive, MCR and MCL turn
+- changes of a motion: RMCS for RM, CS for B
+- stops: SRM stops RM, SM stops B, R and L, SL and SS use the stop port
+- queries: ENC for the encoder, RMRA for the relative heading
+
+This module knows the commands; it does not know in which state a command is allowed (see
+``states``) or when it is sent (see ``conversation``).
 """
 
 from dataclasses import dataclass, field

@@ -67,7 +67,7 @@ class Noise:
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Return the Allan deviations of readings at a constant period, of shape (n,).
+    """Return the Allan deviations of readings, (n,), that are ``period_s`` apart.
 
     The averaging times grow by a quarter of an octave from one to the next.
     """

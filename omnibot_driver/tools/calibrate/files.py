@@ -76,7 +76,7 @@ def save(result: Result, output: Path, table: Table) -> None:
 
 
 def draw(result: Result, output: Path, picture: Path) -> None:
-    """Draw the picture. The message of a ToolError also says whether the result is saved."""
+    """Draw the picture. On failure, a ToolError says whether at least the result is saved."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

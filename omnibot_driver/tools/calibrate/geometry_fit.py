@@ -60,8 +60,7 @@ class Geometry:
 
     ``unlike``: relative difference of each wheel's radius from the mean, (3,).
 
-    ``covariance``: covariance of ``wheels``, ``base`` and the first two elements of ``unlike``, (4,
-    4).
+    ``covariance``: (4, 4), for ``wheels``, ``base`` and the first two elements of ``unlike``.
 
     ``excess``: ratio of the residuals to the expected residuals, at least 1.
     """

@@ -4,8 +4,8 @@
 
 When such a signal arrives, the program notes it. The next call of ``check`` raises Interrupted. The
 signal itself does not raise an exception, because an exception inside ROS could leave the executor
-in an undefined state. Only while the program waits for the user's answer, a signal raises
-Interrupted at once.
+in an undefined state. In one case a signal raises Interrupted at once: while the program waits for
+the user's answer.
 """
 
 import signal

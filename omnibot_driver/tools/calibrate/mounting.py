@@ -50,8 +50,8 @@ class Mounting:
 
     ``rotation``: the matrix that converts from the sensor's axes to the body's axes.
 
-    ``yaw_sigma_rad``: standard deviation of the yaw. It is large because the user tilts the robot
-    by hand.
+    ``yaw_sigma_rad``: standard deviation of the yaw. The yaw depends on the tilts, which the user
+    makes by hand.
 
     ``tilts_rad``: the two angles by which the user tilted the robot.
     """

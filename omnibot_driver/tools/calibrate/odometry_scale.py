@@ -63,9 +63,9 @@ INTRODUCTION: Final = (
 class Drive:
     """A drive straight ahead, or a turn on the spot.
 
-    ``turns``: whether the drive is a turn.
+    ``wanted``: distance of a straight drive in m, or angle of a turn in rad.
 
-    ``wanted``: angle of the turn in rad, or else the distance in m.
+    ``turns``: whether the drive is a turn.
     """
 
     name: str

@@ -3,10 +3,10 @@
 """The simulation of a wheel with a PI controller, after a step of the set-point.
 
 The controller is band-limited: G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to
-the duty in percent. It is sampled, by the trapezoidal rule. The board computes its coefficients for
-the control period ``NOMINAL_S``, even if the real control period differs. The board computes the
-measured speed, in whole RPM, from the time between the last two encoder ticks. All candidates for
-the gains are simulated at the same time, as arrays.
+the duty in percent. It is discretised by the trapezoidal rule. The board computes its coefficients
+for the control period ``NOMINAL_S``, even if the real control period differs. The board computes
+the measured speed, in whole RPM, from the time between the last two encoder ticks. All candidates
+for the gains are simulated at the same time, as arrays.
 
 This module knows the plant, the controller and the encoder; it does not know how plant and gains
 were found.

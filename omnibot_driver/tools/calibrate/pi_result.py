@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""Factor of a step's error. New gains that increase the error by more are regarded as worse."""
+"""Increase of a step's error, as a factor, above which the tool regards new gains as worse."""
 
 
 @dataclass(frozen=True, slots=True)

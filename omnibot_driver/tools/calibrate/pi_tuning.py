@@ -5,7 +5,8 @@
 Tn compensates the plant's slow time constant. The Tn that is written to the board is longer,
 because the board computes its coefficients for a longer control period than the real one. Kp is
 searched, and Td too if a phase margin is required. Only gains whose overshoot is within the goal
-are allowed. Among these gains, the smallest sum of settling time and integrated error wins.
+are allowed. Of these gains, the tool takes those with the smallest sum of settling time and
+integrated error.
 
 Afterwards the dead time of a plant is fitted to steps that were recorded with the tuned gains.
 """

@@ -21,7 +21,7 @@ STILL: Final[Pattern] = (0, 0, 0)
 
 
 class Contradiction(Exception):
-    """An answer contradicts the command or another answer. The message says why."""
+    """An answer or a measurement cannot be right. The message says why."""
 
 
 def understand(answer: str) -> Pattern | None:
@@ -81,9 +81,11 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return the direction of a motion along the axis that the wheels show: 1 or -1.
+    """Return 1 if the wheels show a motion along +axis, -1 if they show one along -axis.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction for any other pattern.
+    ``axis``: 0 for x, 1 for y, 2 for yaw.
+
+    Raises Contradiction for any other pattern.
     """
     expected = wanted(axis)
     if seen == expected:

@@ -23,8 +23,8 @@ UNTOLD: Final = 0.2
 UNLIKE: Final = 1.5
 """Largest accepted ratio between a time between ticks and the median of these times.
 
-The time may be the larger or the smaller one. A larger ratio shows that the board missed an edge of
-the encoder's signal, or noticed it late.
+The ratio is that of the longer to the shorter of both. A larger ratio shows that the board missed
+an edge of the encoder's signal, or noticed it late.
 """
 SMOOTHED: Final = 4
 """Number of successive times between ticks from which one speed is computed.
@@ -62,8 +62,8 @@ def read(path: Path) -> dict[str, Column]:
 class Levels:
     """Corrections of the two levels of an encoder's signal, for one wheel.
 
-    ``short``, ``long``: factors by which the duration of the short and of the long level become
-    equal.
+    ``short``, ``long``: factors that make the durations of the short and the long level equal to
+    their mean.
 
     ``sigma``: standard deviation of the factors.
 
@@ -80,8 +80,8 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of an encoder's two levels, for a wheel that turns at constant duty.
 
     While the board makes the record, both corrections must be 1. The two levels alternate. The
-    level with the shorter mean time is the short level. After a missed edge, this is decided anew.
-    Raises ToolError if the ticks are not regular.
+    level with the shorter mean time is the short level. After a missed edge, the function decides
+    this anew. Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

@@ -186,8 +186,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals at these values, and remove it from now on.
 
-        While the positions of the marks are not known, the marks cause the correlation. Afterwards
-        the changing load causes it.
+        The correlation comes from the marks while their positions are not known. Once they are
+        known, it comes from the changing load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -206,8 +206,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        The covariance follows from all residuals. If the scatter between records is larger, it
-        follows from this scatter, because a slowly changing load affects a whole record.
+        The covariance follows from all residuals. It is increased if the scatter between records is
+        larger, because a slowly changing load affects a whole record.
         """
         own = 1 + self.order
         found = self._search(values)
