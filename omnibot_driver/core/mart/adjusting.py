@@ -66,7 +66,6 @@ class Adjusting(Moves):
         return self._ask(words.CS.request(-right, -left), now)
 
     def _learn(self, moved: DisplacementReading, now: float) -> None:
-        """Learn from the last measurement how fast the motors turn with their present units."""
         self.loop.trip_s = self.conversation.trip_s
         if moved.duration_s is not None:
             blind = self.odometry.left_over_right is not None

@@ -38,7 +38,6 @@ class Asking(Stops):
     """The part of the pilot that finds out which motion is in progress."""
 
     def _ask_what_moves(self, now: float) -> None:
-        """Begin to find out which motion is in progress."""
         self._stopping = None
         self.conversation.give_up(now)
         self.state, self.motion = State.ASKING, Motion.UNKNOWN

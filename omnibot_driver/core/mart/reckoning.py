@@ -231,7 +231,6 @@ class Reckoning:
         return self.motion in (Motion.SPIN, Motion.TURN)
 
     def _turn_rad(self, wheel_m: float, at_s: float, seconds: float) -> float:
-        """Return the turn since the last count, in rad."""
         turned_rad = self.heading.turned_rad(at_s, stands=self.stands)
         told_rad = turned_rad - self._motion_rad
         if self.motion is Motion.NONE and not wheel_m:

@@ -231,7 +231,6 @@ class SpeedLoop(Motors):
             self._clear(now)
 
     def _learn(self, side: _Side) -> None:
-        """Learn the line of one side from the finished window."""
         units = side.window_units_s / self._window_s
         speed = side.window_m / self._window_s / self.per_unit_mps
         slowest = SLOWEST_MPS / self.per_unit_mps

@@ -293,7 +293,6 @@ class Stops(Ground, ABC):
         )
 
     def _failed(self, motion: Motion, reply: Fail, now: float) -> None:
-        """Report the failure with which the server has ended a motion."""
         if motion is Motion.STRAIGHT and reply.reason in words.OBSTACLES:
             self._notice(f"an obstacle has ended the move ({reply.reason})", halt=False)
         elif reply.reason in words.OBSTACLES:

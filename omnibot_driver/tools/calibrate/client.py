@@ -88,7 +88,6 @@ class Client:
         return self._node.get_namespace().rstrip("/")
 
     def _table(self) -> Table:
-        """Return the parameter table of the driver's board."""
         board = self._get_parameters(["board"])["board"]
         if board not in boards.PROFILES:
             raise ToolError(

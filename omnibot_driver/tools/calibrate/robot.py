@@ -286,7 +286,6 @@ class Robot(Listener):
 
 
 def _values(message: Any) -> tuple[float, ...]:
-    """Return the numbers of a command message."""
     if isinstance(message, Float32MultiArray):
         return tuple(message.data)
     twist = message.twist if isinstance(message, TwistStamped) else message

@@ -101,7 +101,6 @@ def _traits(fit: Fit) -> Any:
 
 
 def _recorded(wheel: WheelFound) -> dict[str, Any]:
-    """Return all fitted values of a wheel with their standard deviations, for the file."""
     return {
         fit.model.title: {
             "residual_radps": round(fit.rms_radps, 4),
