@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test bench in simulated time: a session with the simulated robot of any board.
+"""Test bench in simulated time that connects a session to the simulated robot of any board.
 
 The tests of the motion rules use this bench.
 """
@@ -29,7 +29,10 @@ TICK_S = 0.01
 
 
 class Robot(Protocol):
-    """Interface of the simulated robots. ``way_m``: true distance driven forward, in m."""
+    """Interface of the simulated robots.
+
+    ``way_m``: distance that the robot has really driven forward, in m.
+    """
 
     @property
     def stands(self) -> bool: ...
@@ -76,10 +79,11 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: part of a command's duration, in s, that is lost at the start. The controller
-    integrates for 0.5 s before a wheel turns, and the wheel then takes another 0.5 s to reach its
-    speed. For a command of 0.3 m/s for 4 s (1.2 m) the robot drives 0.97 m ("firmware") or 0.96 m
-    ("documented").
+    ``late_s``: time at the start of a command, in s, in which the robot does not drive.
+
+    The controller integrates for 0.5 s before a wheel turns. The wheel then takes another 0.5 s to
+    reach its speed. At 0.3 m/s for 4 s, 1.2 m are commanded. The robot drives 0.97 m with the
+    "firmware" quirks and 0.96 m with the "documented" ones.
     """
 
     late_s = 0.75
@@ -187,13 +191,15 @@ CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
-"""Names of the boards to test; a board whose folder has been removed is not among them."""
+"""Names of the boards to test, without the boards whose folder has been removed."""
 
 
 class AnyBench:
     """A session connected to a robot.
 
-    ``hears``: whether the robot receives data. ``speaks``: whether the robot sends data.
+    ``hears``: whether the robot receives data.
+
+    ``speaks``: whether the robot sends data.
     """
 
     def __init__(self, board: Board, robot: Robot) -> None:
@@ -235,7 +241,7 @@ class AnyBench:
             self.settle()
 
     def stall(self, seconds: float) -> None:
-        """Stall the process for ``seconds``, then read all data from the stall at once."""
+        """Simulate a stall of the process: data waits for ``seconds`` and is then read at once."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

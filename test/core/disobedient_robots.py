@@ -17,7 +17,7 @@ SLOWLY: Triple = (0.05, 0.0, 0.0)
 
 
 def started(board: BoardSettings, **options: object) -> Bench:
-    """Return a bench whose robot is at rest, with an empty list of notices."""
+    """Return a bench whose robot is at rest and whose list of events is empty."""
     bench = Bench(board, **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -42,9 +42,9 @@ def by_wheels(bench: Bench, command: Triple) -> None:
 
 
 def goes_astray(bench: Bench, command: Triple) -> bool:
-    """Return whether the robot's twist is clearly outside the range from rest to the command.
+    """Return whether the robot's twist is far from every twist between rest and the command.
 
-    The limits are a distance of 0.05 m/s and of 0.15 rad/s from the range.
+    Far means at least 0.05 m/s or 0.15 rad/s away.
     """
     truth, (x, y, yaw) = bench.board.truth, command
     square = x * x + y * y
@@ -58,7 +58,10 @@ def goes_astray(bench: Bench, command: Triple) -> bool:
 def stopped_after_s(
     bench: Bench, command: Triple, by: Callable[[Bench, Triple], None] = by_velocity
 ) -> float:
-    """Command the robot; return the board time from its first deviation to Stop, in s."""
+    """Command the robot until the driver sends Stop.
+
+    Return the time from the robot's first deviation from the command to Stop, in s.
+    """
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick
     while bench.now < begun + 3.0:
@@ -73,7 +76,7 @@ def stopped_after_s(
 
 
 def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
-    """Return a bench with the board's switch on position and the driver set to velocity.
+    """Return a bench whose board is on position control while the driver is set to velocity.
 
     The board's pose is 3 m from its origin.
     """

@@ -14,7 +14,8 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""Largest sum of the rounding errors of the deltas since the last pose, in m and in rad."""
+"""Largest error of odom, in m and in rad, that the rounding of deltas since the last pose causes.
+"""
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated robot, a line that loses frames, and odometry from the remaining frames."""
+"""A simulated robot on a line that loses frames, and odometry from the frames that arrive."""
 
 import math
 from collections.abc import Callable
@@ -24,9 +24,9 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 
 
 class Line:
-    """A simulated board and odometry.
+    """A simulated board and the odometry from its frames.
 
-    ``loses`` decides by a frame's bytes and time whether the frame is lost.
+    ``loses``: function that decides, from a frame's bytes and time, whether the frame is lost.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Line:
             assert isinstance(reading, PausedReading)
 
     def _command(self) -> None:
-        """Command smooth curves of up to 0.45 m/s along each axis and 0.45 rad/s, or Stop."""
+        """Command a smooth curve of up to 0.45 m/s along each axis and 0.45 rad/s."""
         sizes = (30, 30, 225)
         words = [
             round(self._commanding * size * math.sin(self.now * speed + phase)) & 0xFFFF
@@ -95,7 +95,7 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to send commands; a paused board could take a byte of a command for a letter."""
+        """Whether to send commands. A paused board could take a byte of a command for a letter."""
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property

@@ -17,7 +17,8 @@ def standing() -> Bench:
 
 
 def paused() -> Bench:
-    """Return a bench whose board is paused and reports this; the driver does not start it."""
+    """Return a bench whose board is paused and reports this. The driver does not start the board.
+    """
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state("paused")
@@ -53,6 +54,6 @@ def reconnect(bench: Bench) -> None:
 
 
 def push(bench: Bench, x_m: float, y_m: float, yaw_rad: float) -> None:
-    """Push the robot by hand within one tick: the wheels roll, and the board notices."""
+    """Push the robot by hand within one tick. Its wheels roll, so the board measures the motion."""
     odometry = bench.board._odometry
     odometry.pose = odometry.pose.moved(x_m, y_m, yaw_rad)

@@ -25,8 +25,9 @@ Chunker = Callable[[list[Byte], random.Random], Iterator[Read]]
 class Board:
     """A simulated stream of frames.
 
-    ``skew``: relative error of the board's clock against the host's. ``loss``: fraction of frames
-    that never arrive.
+    ``skew``: relative error of the board's clock against the host's clock.
+
+    ``loss``: fraction of the frames that never arrive.
     """
 
     seconds: float
@@ -55,7 +56,7 @@ class Board:
         return line
 
     def _frames(self, tick: int, rng: random.Random) -> list[bytes]:
-        """Return the frames of a tick; the accelerometer's x and y contain the tick's number."""
+        """Return the frames of a tick. The accelerometer's x and y contain the tick's number."""
         gyro = [rng.randrange(-3, 40) for _ in range(3)]
         frames = [struct.pack(">2B6h", 0xFF, 0xFA, tick % 8192, tick // 8192, 16384, *gyro)]
         if not self.imu_only and tick % 4 == 0:
@@ -66,7 +67,7 @@ class Board:
 
 
 def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Yield what arrives on an ideal line: one read of all bytes between two idle gaps."""
+    """Split the stream as an ideal line does: one read for all bytes between two idle gaps."""
     held = bytearray()
     last = line[0][0]
     for at, byte in line:
@@ -103,7 +104,7 @@ def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 def ftdi(
     *, latency_s: float = 0.016, restarted_by_data: bool = False, skew: float = 0.0
 ) -> Chunker:
-    """Return a chunker like a USB adapter.
+    """Return a function that splits the stream as a USB adapter does.
 
     The adapter delivers packets of 62 bytes when they are full, and a shorter packet when its timer
     expires. The timer runs freely on the adapter's crystal, or begins with a packet's first byte.
@@ -139,9 +140,10 @@ def late(
     jitter_s: float = 0.0,
     stalls: list[tuple[float, float]] | None = None,
 ) -> Iterator[Read]:
-    """Delay reads like a host that wakes up late: a little each time, and until a stall ends.
+    """Delay the reads, as a host does that wakes up late.
 
-    Data that arrives before the host wakes up is read at once.
+    Each read is late by a random time, and a read during a stall waits until the stall ends. Data
+    that arrives before the host wakes up is read at once.
     """
     pending = bytearray()
     wakes = -math.inf

@@ -32,9 +32,11 @@ def bare(data: bytes) -> bytes:
 
 
 class Bench:
-    """A session and a simulated board.
+    """A session connected to a simulated OmniBot.
 
-    ``hears``: whether the board receives data. ``speaks``: whether the board sends data.
+    ``hears``: whether the board receives data.
+
+    ``speaks``: whether the board sends data.
     """
 
     def __init__(
@@ -75,7 +77,8 @@ class Bench:
         self.settle()
 
     def settle(self) -> None:
-        """Do what the shell does after every input: write the output and collect the events."""
+        """Write the session's output and collect its events, as the shell does after every input.
+        """
         data = joined(self.session.take_output(self.now))
         if data:
             self.written.append((self.now, data))
@@ -123,12 +126,12 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Change fields of SessionSettings; fields that are not given keep their first values."""
+        """Change fields of SessionSettings. Fields that are not given keep their first values."""
         self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Change fields of OmniBotSettings; fields that are not given have their defaults."""
+        """Change fields of OmniBotSettings. Fields that are not given have their defaults."""
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed
@@ -137,11 +140,11 @@ class Bench:
         self.settle()
 
     def read_deltas_as(self, frame: Literal["earth", "body"]) -> None:
-        """Let the driver interpret deltas in ``frame``."""
+        """Let the driver interpret deltas as displacements in ``frame``."""
         self.session.configure(self.settings, self.now, board=OmniBotSettings(delta_frame=frame))
 
     def last_words(self, on_exit: OnExit) -> bytes:
-        """Return the bytes that a shutdown writes before the port is closed."""
+        """Return the bytes that the driver writes at shutdown before it closes the port."""
         return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:

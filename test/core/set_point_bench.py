@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test bench for a stream of set points whose frames are arbitrary bytes."""
+"""Test bench for a stream of set-points whose frames are arbitrary bytes."""
 
 from typing import Any
 
@@ -44,7 +44,7 @@ class Words:
 
 
 class Stream(CommandPolicy):
-    """A command policy whose stream of set points consists of bytes."""
+    """A command policy whose set-points are bytes."""
 
     def __init__(self, settings: CommandSettings) -> None:
         proof = StopProof()
@@ -66,7 +66,7 @@ def make_stream() -> Stream:
 
 
 def run(stream: Stream, start: float, end: float) -> list[tuple[float, bytes]]:
-    """Serve the stream each time it is due, as the pacer does; return times and bytes written."""
+    """Serve the stream each time it is due, as the pacer does. Return times and bytes written."""
     written = []
     now = start
     while now <= end:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Byte streams of the simulated board, split into frames by the manual's tables, and decoded."""
+"""Byte streams of the simulated board, their division into frames by the manual, and decoding."""
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -21,7 +21,7 @@ LEAD_IN = encode(REST) * 2
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:
-    """Encode a body velocity command, typed from the manual."""
+    """Return the frame of a body velocity command, written from the manual."""
     return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
 
 
@@ -31,7 +31,7 @@ def record(board: SimulatedBoard, seconds: float) -> list[bytes]:
 
 
 def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
-    """Drive with a new random velocity every 0.5 s; return what the board sends in each tick."""
+    """Drive with a new random velocity every 0.5 s. Return what the board sends in each tick."""
     random, ticks = Random(7), []
     for _ in range(round(seconds * 2)):
         board.receive(velocity(*(random.randint(-24, 24) for _ in range(2)), random.randint(-9, 9)))
@@ -40,7 +40,10 @@ def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
 
 
 def life(board: SimulatedBoard) -> list[bytes]:
-    """Boot, start, drive, pause, resume and reset: go through all modes and all changes of mode."""
+    """Boot, start, drive, pause, resume and reset the board. Return what it sends in each tick.
+
+    The board goes through all its modes and all changes of mode.
+    """
     ticks = record(board, 2.6)
     board.receive(bytes(8) + b"S")
     ticks += drive(board, 2.0)
@@ -76,7 +79,8 @@ def ticks_of(name: str) -> tuple[bytes, ...]:
 
 
 def lengths_of(stream: bytes) -> list[int]:
-    """Return the lengths of the frames of an undamaged stream, from the manual's tables."""
+    """Return the lengths of the frames of an undamaged stream, found by the tables of the manual.
+    """
     lengths, at = [], 0
     while at < len(stream):
         kind = stream[at + 1]

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A synthetic board for odometry tests: body twists in, readings of the manual's firmware out.
+"""A synthetic board for odometry tests: it moves with body twists and returns readings.
 
-The board uses rotation matrices and shares no code with the code under test.
+The readings are those of the firmware in the manual. The board uses rotation matrices and shares no
+code with the code under test.
 """
 
 import math
@@ -35,7 +36,7 @@ def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
 
 
 class Trip:
-    """A board with a given initial heading, whose axes may be reversed."""
+    """A board with a given initial heading. Its axes may be reversed."""
 
     def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
         self.board = (12.0, -34.0, heading)
@@ -43,7 +44,10 @@ class Trip:
         self._signs = signs
 
     def move(self, dx: float, dy: float, turn: float, frame: str = "earth") -> DisplacementReading:
-        """Move for one period of constant twist in true body axes; return the board's reading."""
+        """Move with a constant twist for one period, and return the board's reading.
+
+        The arguments are displacements along the true body axes.
+        """
         self.truth = self._moved(self.truth, dx, dy, turn)
         x, y, yaw = self._signs
         before = self.board
@@ -80,7 +84,7 @@ def heading(yaw: float) -> PoseReading:
 
 
 def attach(odometry: Odometry, pose: PoseReading) -> list[OdometryEstimate]:
-    """Deliver the board's pose twice, so that it is confirmed; return the estimates."""
+    """Deliver the board's pose twice, so that the odometry accepts it, and return the estimates."""
     assert odometry.settle(pose) == []
     return odometry.settle(pose)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry that finds its heading, attaches to a board's frame again, and is reset."""
+"""Tests of odometry that finds its heading, follows a board's restart, and is reset."""
 
 import math
 from dataclasses import replace
@@ -31,7 +31,10 @@ from omnibot_driver.core.readings import PoseReading
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
 def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
-    """Deltas are held until the heading is known, then published as if the pose had come first."""
+    """Deltas arrive before the board's first pose, and the odometry holds them.
+
+    When the heading is known, they are published as if the pose had come first.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
         assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
@@ -42,7 +45,7 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 
 
 def test_the_first_pose_must_be_confirmed_too() -> None:
-    """A single damaged pose must not turn the odometry, so two poses must agree."""
+    """A single damaged pose must not rotate the odometry, so two poses must agree."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.0, 0.1), 0.0) == []
     assert odometry.settle(heading(-1.0)) == []
@@ -56,14 +59,20 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
-    """The first displacement has an unknown duration, but adds no uncertainty to the start."""
+    """The first displacement after a pause has an unknown duration.
+
+    The first estimate is still certain.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
     assert attach(odometry, trip.pose)[-1].covariance == Covariance()
 
 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
-    """If the next pose is lost, the first pose is accepted after a second."""
+    """The board sends one pose, and the next pose is lost.
+
+    After a second, the first pose is accepted.
+    """
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
     for _ in range(25):
@@ -73,7 +82,10 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 
 
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
-    """After a second, the 25 deltas so far are published together, later deltas one by one."""
+    """The board sends deltas but no pose. After a second, the odometry assumes heading 0.
+
+    It publishes the 25 deltas so far together, and each later delta at once.
+    """
     odometry = Odometry(SETTINGS)
     for _ in range(24):
         assert odometry.displace(earth(0.01, 0.0), 0.0) == []
@@ -86,7 +98,10 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """Estimates with the assumed heading stay; later motion has the confirmed heading."""
+    """The odometry has assumed heading 0, then poses with another heading arrive.
+
+    Odom does not jump, and later motion has the heading of the poses.
+    """
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         odometry.displace(earth(0.0, 0.0), 0.0)
@@ -97,7 +112,10 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """One damaged pose does not turn the odometry; two that agree mean a new earth frame."""
+    """A single pose with a wrong heading does not rotate the odometry.
+
+    If two such poses agree, the board has a new earth frame.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     x, y, yaw = trip.board
@@ -112,7 +130,7 @@ def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) ->
 
 
 def test_two_surprising_poses_that_disagree_confirm_nothing() -> None:
-    """Three poses, each damaged in another way, do not confirm each other."""
+    """Three damaged poses with three different headings do not confirm each other."""
     odometry = Odometry(SETTINGS)
     attach(odometry, heading(0.0))
     for yaw in (1.0, 2.0, -1.0):
@@ -131,7 +149,10 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """Each pose corrects the sum of rounded displacements, in five steps."""
+    """A pose differs a little from the sum of the displacements, as these are rounded.
+
+    The odometry corrects the difference in five steps, one with each displacement.
+    """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.01, -0.005, 0.02))
@@ -164,7 +185,7 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
 def test_a_board_that_restarts_goes_on_from_here(
     before: list[Pose], after: list[Pose], initial: float, signs: tuple[int, int, int]
 ) -> None:
-    """The board counts from zero again, while odom continues without a jump."""
+    """The board restarts and counts from zero again, while odom continues without a jump."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
     attach(odometry, trip.pose)
     for move in before:
@@ -195,7 +216,10 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """After a reset, motion that waited for the board's first pose does not move odom."""
+    """The robot moves before the board's first pose, and then the odometry is reset.
+
+    When the pose arrives, odom contains only the motion after the reset.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)
@@ -206,7 +230,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """Each change of the board's frame is counted, as it makes goals in the old frame invalid."""
+    """The odometry counts each change of the board's frame, because old goals are then invalid."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]
@@ -225,7 +249,10 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """The heading is unknown before two poses agree, after a long gap, and while it is assumed."""
+    """The heading is unknown before two poses agree, and after a long gap.
+
+    It is also unknown while heading 0 is only assumed.
+    """
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known
     attach(odometry, heading(1.0))

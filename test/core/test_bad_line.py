@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Minutes of driving on a bad line, in simulated time: bytes are lost alone and in bursts."""
+"""Minutes of driving on a bad line, in simulated time. Bytes are lost alone and in bursts."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, FaultyLin
 
 
 class Drive:
-    """A drive in curves at up to 0.3 m/s along each axis; the board's first pose is not zero."""
+    """A drive in curves at up to 0.3 m/s along each axis. The board's first pose is not zero."""
 
     def __init__(self, frame: str, faults: LineFaults) -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
@@ -28,7 +28,7 @@ class Drive:
         self.bench.board.step = lambda: self.line.carry(step())  # type: ignore[method-assign]
         self.attached = self.told()
         self.errors: list[Pose] = []
-        """Differences of odom from the board's own pose at the same tick."""
+        """Differences between odom and the board's own pose at the same tick."""
         self.bench.open()
         self.bench.run(1.0)
         self.line = FaultyLine(faults, seed=3)
@@ -50,7 +50,8 @@ class Drive:
                 self.errors.append(Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau)))
 
     def wrong_imu(self) -> int:
-        """Count IMU readings that differ from those sent, or are out of order."""
+        """Return how many IMU readings are out of order or differ from those that the board sent.
+        """
         scale, number, sent = ImuScale(), 0, list[object]()
         for frame in self.bench.board.sent:
             if frame.data[:2] == b"\xff\xfa":
@@ -70,7 +71,10 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 3), ("body", 1)])
 def test_after_minutes_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: int) -> None:
-    """Bytes are lost alone (1 in 1000) and in bursts; the line is good for the last 1.5 s."""
+    """The robot drives for minutes while bytes are lost, alone (1 in 1000) and in bursts.
+
+    Odom stays within 2 cm of the board's own pose. After 1.5 s without losses, it is within 1.5 mm.
+    """
     drive = Drive(frame, LineFaults(lose=0.001, burst=0.0005))
     drive.run(60.0 * minutes)
     assert drive.line.lost > 4000 * minutes

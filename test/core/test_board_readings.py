@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings besides displacements: a board's own odometry, its e-stop button, and its reset."""
+"""Tests of a board's own odometry, of its e-stop button, and of its reset."""
 
 import math
 from dataclasses import replace
@@ -31,7 +31,10 @@ STANDS = DisplacementReading(0.0, 0.0, 0.0, "body", 0.2, 0)
 
 
 class Teller(line_board.LineBoard):
-    """A board with odometry at 10 Hz; its next bytes also give the readings in ``next``."""
+    """A board with its own odometry at 10 Hz.
+
+    ``next``: readings that the board returns with the next bytes.
+    """
 
     traits = replace(
         line_board.LineBoard.traits, own_odometry=True, requests=frozenset({Request.RESET})
@@ -84,7 +87,10 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """The board's own odometry is published with its own rate and variances of the twist."""
+    """A board has odometry of its own.
+
+    It is published at the board's rate, with its twist variances.
+    """
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)
     told = bench.odometry[before:]
@@ -94,7 +100,7 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 
 
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
-    """If the board sends nothing, the driver refuses commands, although it predicts odometry."""
+    """The board sends nothing, and its odometry is only predicted. The driver refuses commands."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from the board|connecting"):
@@ -103,7 +109,8 @@ def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> 
 
 
 def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
-    """After a reset, the board's own odometry begins at zero where the robot stands."""
+    """The user resets the odometry. The board's own odometry begins at zero where the robot stands.
+    """
     bench.drive_on()
     bench.run(1.5)
     assert bench.odometry[-1].pose.x_m > 0.1
@@ -113,7 +120,10 @@ def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
 
 
 def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
-    """Press and release of the button are both published, but only the press has an effect."""
+    """The button on the robot is pressed and released, and the driver publishes both.
+
+    The press latches the e-stop, and the release of the button does not end it.
+    """
     bench.drive_on()
     tell(bench, EStopButtonReading(True))
     assert bench.session.estop_active
@@ -127,7 +137,10 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """The driver ignores a report of a reset that the board sent before the request."""
+    """The board reports a reset that happened before the driver's request. The driver ignores this.
+
+    The next report shows that the requested reset is done.
+    """
     bench.session.request(Request.RESET, "token", bench.now)
     bench.settle()
     tell(bench, ResetReading())
@@ -150,7 +163,7 @@ def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
 
 
 def test_a_proof_takes_as_long_as_the_board_needs() -> None:
-    """A proof of rest that needs 0.6 s needs three displacements of 0.2 s."""
+    """The board needs 0.6 s for a proof of rest. Three displacements of 0.2 s prove it."""
     proof = StopProof(0.6)
     proof.stopped(0.0)
     proved = []
@@ -161,9 +174,10 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
 
 
 def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
-    """The e-stop is not released while the button is held, even after a reconnection.
+    """The button on the robot is held, so the driver refuses to release the e-stop.
 
-    The refusal says what to do.
+    After a reconnection the driver still refuses, until the button is released. Each refusal says
+    what to do.
     """
     tell(bench, EStopButtonReading(True))
     with pytest.raises(RequestRefused, match="release the button, then call again"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The compiled core and the interpreted one have equal output, bit for bit, for equal input."""
+"""For the same input, the compiled core has exactly the same output as the interpreted core."""
 
 import hashlib
 import os
@@ -23,9 +23,10 @@ LOST = (0.0, 0.001, 0.01)
 
 
 def told(piece: int, lost: float) -> str:
-    """Return a digest of a session's events and bytes, while a board goes through all modes.
+    """Return a digest of all events and bytes of a session whose board goes through all modes.
 
-    Received bytes come in pieces of length ``piece``, and are lost with chance ``lost``.
+    The board's bytes arrive in pieces of ``piece`` bytes. Each byte is lost with probability
+    ``lost``.
     """
     random, bench = Random(piece), Bench()
     session, now = bench.session, 1000.0
@@ -49,7 +50,7 @@ def told(piece: int, lost: float) -> str:
 @pytest.mark.parametrize("lost", LOST)
 @pytest.mark.parametrize("piece", PIECES)
 def test_both_cores_say_the_same(piece: int, lost: float) -> None:
-    """The compiled core gives the same digest as the interpreted core in another process."""
+    """The compiled core here and the interpreted core in another process give the same digest."""
     path = os.pathsep.join(str(ROOT / part) for part in (".", "test", "test/core"))
     script = f"import test_compiled as t; print(t.core_kind(), t.told({piece}, {lost}))"
     done = subprocess.run(

@@ -14,7 +14,7 @@ from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 ENDS_S = 1.0
-"""Longest time in which a robot comes to rest after it has received a stop, in s."""
+"""Longest time that a robot needs to come to rest after it has received a stop, in s."""
 
 
 @pytest.fixture(params=BOARDS)
@@ -23,7 +23,7 @@ def bench(request: pytest.FixtureRequest) -> AnyBench:
 
 
 def test_every_board_of_the_driver_is_among_them() -> None:
-    """Every board of the driver must be in the list, because only listed boards are tested."""
+    """Every board of the driver must be in ``MAKERS``, because only those boards are tested."""
     missing = set(PROFILES) - {name.split()[0] for name in MAKERS}
     assert not missing, "add a robot and an entry of MAKERS to test/core/any_board.py"
 
@@ -37,7 +37,10 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The distance is that of 4 s at 0.3 m/s, minus the part that is lost at the start."""
+    """The robot is commanded 0.3 m/s for 4 s. It drives this distance, minus the loss at the start.
+
+    The odometry gives the same distance as the robot's true motion.
+    """
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
@@ -47,7 +50,10 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """All of a hundred commands are accepted, however rarely odometry arrives."""
+    """The user sends a hundred commands at 20 Hz.
+
+    All are accepted, even if odometry arrives rarely.
+    """
     for _ in range(100):
         bench.drive(0.2)
         bench.run(0.05)
@@ -55,7 +61,10 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
 
 
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
-    """After the timeout, the robot stands and does not start again by itself."""
+    """The user stops sending commands.
+
+    After the timeout, the robot stands and does not start again.
+    """
     bench.drive_on()
     assert not bench.robot.stands
     bench.run(0.6)
@@ -64,7 +73,8 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
 
 
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
-    """The driver accepts a zero command like any other, and stops the robot at once."""
+    """The user commands zero while the robot drives. The driver accepts this, and the robot stops.
+    """
     bench.drive_on()
     for _ in range(10):
         bench.drive(0.0)
@@ -77,7 +87,10 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench, seconds: float
 ) -> None:
-    """After a stall of up to 9 s with unread data, the robot stands and obeys a new command."""
+    """The driver stalls for up to 9 s while the robot drives, and the board's data waits unread.
+
+    Afterwards the robot stands, and it obeys a new command.
+    """
     for _ in range(2):
         bench.drive_on()
         bench.stall(seconds)
@@ -90,7 +103,7 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
-    """While the e-stop is latched, commands are refused; its release does not move the robot."""
+    """While the e-stop is latched, commands are refused. Its release does not move the robot."""
     bench.drive_on()
     bench.estop(True)
     with pytest.raises(CommandRefused, match="e-stop"):
@@ -119,7 +132,10 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """A command from before the event, of any kind, has no effect after it."""
+    """The robot drives when the connection or the driver is interrupted, or the e-stop is used.
+
+    The command from before has no effect afterwards. A new command moves the robot.
+    """
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -129,7 +145,10 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None:
-    """The silent board still receives, so it is stopped; new commands are refused."""
+    """A driving robot sends nothing more, but still receives.
+
+    It is stopped, and commands are refused.
+    """
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from|no angle of|no pose from|connecting"):
@@ -145,7 +164,10 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """A robot that was cut off may have driven on; it is stopped when its data arrives again."""
+    """A driving robot is cut off in both directions for 5 s, and may have driven on.
+
+    The driver stops it when its data arrives again.
+    """
     bench.drive_on()
     bench.speaks = bench.hears = False
     bench.run(5.0)
@@ -155,7 +177,7 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
 
 
 def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
-    """A command that is not a number is refused, and the command before it stays active."""
+    """A command with NaN is refused, and the command before it stays active."""
     bench.drive_on()
     with pytest.raises(CommandRefused, match="NaN or infinity"):
         bench.session.command_twist(BodyTwist(math.nan, 0.0, 0.0), bench.now)
@@ -164,7 +186,8 @@ def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> N
 
 
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
-    """At a command of 100 m/s the robot drives at most 0.5 m/s, plus 5 % for the measurement."""
+    """The user commands 100 m/s. The robot drives at 0.5 m/s, or 5 % more with measurement errors.
+    """
     bench.drive_on(100.0, 2.0)
     before = bench.robot.way_m
     bench.drive_on(100.0, 2.0)
@@ -172,7 +195,10 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """At shutdown, Stop is sent until the robot is seen at rest; then the last bytes follow."""
+    """At shutdown, the driver sends Stop until the robot is seen at rest, and then its last bytes.
+
+    Afterwards the robot stands for good, and commands are refused.
+    """
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)
     bench.settle()
@@ -187,7 +213,10 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench, seed: int) -> None:
-    """The line is cut at random moments while the robot drives, reverses and stands."""
+    """The line is cut at random moments while the robot drives, reverses and stands.
+
+    The odometry stays finite and plausible.
+    """
     random = Random(seed)
     for _ in range(6):
         bench.drive_on(random.choice([0.3, -0.2, 0.0]), random.uniform(0.1, 2.0))

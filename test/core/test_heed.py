@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reads with nothing but IMU readings, after which the session has no output."""
+"""Reads that contain only IMU readings, after which the session has no output."""
 
 from contextlib import suppress
 
@@ -36,7 +36,7 @@ REQUESTS = {500: Request.START, 1000: Request.PAUSE, 1500: Request.START, 2000: 
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
     drives: bool, run: bool
 ) -> None:
-    """After a read with nothing but IMU readings, the session writes and reports nothing."""
+    """After a read that contains only IMU readings, the session writes and reports nothing."""
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
     for tick in range(3000):
@@ -62,7 +62,10 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """Data received before a request does not answer it, even if the data is processed later."""
+    """The driver receives data, then a request, and processes the data afterwards.
+
+    This data does not answer the request, but the next data does.
+    """
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):
         session.inbound.receive(board.step(), tick * TICK_S)

@@ -27,7 +27,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """Odom is right after a pause in which the robot rolled out, even if frames were lost."""
+    """The board is paused while the robot drives, so the robot rolls out during the pause.
+
+    Odom is right afterwards, even if all frames around the pause are lost.
+    """
     on = line(seed)
     if hidden:
         on.loses = lambda _data, _now: True
@@ -43,9 +46,9 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """After a restart, the board's text, SEQ and pose begin at zero, and odom continues.
+    """The board restarts, so its SEQ and its pose begin at zero, and odom continues.
 
-    The result is the same if the text or the first frames are lost.
+    The result is the same if the board's text or its first frames are lost.
     """
     on = line(seed)
     on.drives = False
@@ -67,7 +70,10 @@ def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes,
 
 
 def test_a_restart_leaves_its_doubt_in_the_covariance_for_good() -> None:
-    """After a restart, the covariance stays larger: how far the robot rolled is unknown."""
+    """The board restarts while the robot drives, so it is unknown how far the robot rolled.
+
+    The covariance stays larger from then on.
+    """
     on = line(1)
     before = on.estimates[-1].covariance
     on.board.receive(b"R")
@@ -90,7 +96,10 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """After a reset in a gap, odom begins at zero; the error of the gap is not corrected later."""
+    """Frames are lost, and the odometry is reset before the next pose arrives.
+
+    Odom begins at zero, and the pose does not correct the motion in the gap any more.
+    """
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)
@@ -103,7 +112,7 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """The robot drives for three seconds while no data arrives; odom then includes this motion."""
+    """No data arrives for three seconds while the robot drives. Odom then includes this motion."""
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
@@ -121,7 +130,10 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """Each delta is rounded to 0.1 mm and 0.1 mrad; a pose follows every fifth delta."""
+    """The robot drives for an hour. Each delta is rounded to 0.1 mm and 0.1 mrad.
+
+    A pose follows every fifth delta, and odom stays within 2 mm and 2 mrad of the truth.
+    """
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
     for number in range(1, count + 1):
@@ -150,9 +162,9 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """A turn of each wheel by -1/8 rotates the robot by 2πr/8L.
+    """All three wheels turn by −1/8, and the robot rotates by 2πr/8L.
 
-    A forward turn of B with an equal backward turn of A drives the robot forward.
+    Then wheel B turns forward and wheel A equally far backward, and the robot drives forward.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Liveness of a board: a silence is reported once, and a stall of this process is not a silence."""
+"""Tests of the detection of a silent board. A stall of this process is not a silence."""
 
 import math
 
@@ -29,7 +29,10 @@ def liveness() -> Liveness:
 
 
 def test_a_silence_is_found_once(liveness: Liveness) -> None:
-    """A silence is reported once, as soon as the limit of 2 s has passed."""
+    """The board sends nothing.
+
+    The silence is reported once, as soon as the limit of 2 s has passed.
+    """
     assert [liveness.fell_silent(now) for now in (11.9, 12.0, 12.1, 99.0)] == [
         False,
         True,
@@ -39,7 +42,10 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """A silence after a new reading is reported again, 2 s after that reading."""
+    """After a reported silence a reading arrives.
+
+    If 2 s pass again, the new silence is reported too.
+    """
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
     assert not liveness.fell_silent(21.9)
@@ -47,14 +53,18 @@ def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
 
 
 def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
-    """On a new line, the board has its full time again, however long the silence was."""
+    """The line is opened again after a silence.
+
+    The board has 2 s to send data, as at the beginning.
+    """
     assert liveness.fell_silent(12.0)
     liveness.begin(12.0)
     assert liveness.wake_at(driven=False) == 14.0
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """After a stall, the board has its full time again, since its data may wait to be read."""
+    """After a stall of the driver, the board has 2 s again, because its data may wait to be read.
+    """
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
     assert not liveness.fell_silent(51.9)
@@ -70,7 +80,10 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """A command ends after 0.5 s without data, long before the board is called silent after 2 s."""
+    """While the robot is driven, the driver wakes after 0.5 s without data to end the command.
+
+    Otherwise it wakes after 2 s, when the board counts as silent.
+    """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5
     assert liveness.unheard(10.5)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Long tasks of a board: only one at a time, and what ends a task."""
+"""Tests of a board's long tasks: only one runs at a time, and several events end it."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ NAME = next(name for name in BOARDS if name == "two lines")
 
 
 def test_it_is_answered_once() -> None:
-    """A task has one result: once it has ended, a second end is not reported to the client."""
+    """A task has one result. After its end, a second end is not reported to the client."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.is_current("token")
@@ -51,7 +51,10 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task ends when a driven robot is stopped, but not while a robot stands all along."""
+    """A task goes on while the robot stands from the beginning, and while the robot is driven.
+
+    It ends when the driven robot is stopped.
+    """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)
     for driven in (False, False, True, True):
@@ -73,7 +76,7 @@ ENDS: dict[str, Callable[[AnyBench], object]] = {
 
 @pytest.mark.parametrize("words", ENDS)
 def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
-    """A stop, an e-stop or a lost board ends the task, with the reason in the message."""
+    """A stop, an e-stop, a lost board or a stall ends the task, and the message says which."""
     bench = nominal(NAME)
     if "stopped" in words:
         bench.drive_on()
@@ -89,7 +92,7 @@ def test_a_stop_an_estop_and_a_lost_board_end_it(words: str) -> None:
 
 
 def test_none_is_begun_under_the_estop_or_without_a_board() -> None:
-    """No task begins under the e-stop or without a board, as it could not be carried out."""
+    """The driver refuses to begin a task while the e-stop is latched or the port is closed."""
     bench = nominal(NAME)
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop is latched"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Opening a line and finding the board on it: zeros, Stop, S, and the names of the states."""
+"""Tests of the opening of a line, of the search for the board on it, and of the states' names."""
 
 import pytest
 from robots import standing
@@ -17,7 +17,10 @@ def bench() -> Bench:
 
 
 def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
-    """The opening is zeros, Stop and S; S is repeated, because a booting board ignores bytes."""
+    """When the port opens, the driver writes zeros, Stop and S.
+
+    It repeats S until data arrives, because a booting board ignores bytes.
+    """
     bench = Bench(BoardSettings(boot_time_s=2.0))
     bench.open()
     bench.run(1.25)
@@ -40,7 +43,7 @@ def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
 
 
 def test_without_auto_start_a_paused_board_stays_paused() -> None:
-    """If the board is not to be started, the opening does not contain S."""
+    """The driver is set not to start the board. It writes no S when the port opens."""
     bench = Bench(run=False)
     bench.open()
     bench.run(3.0)
@@ -49,7 +52,8 @@ def test_without_auto_start_a_paused_board_stays_paused() -> None:
 
 
 def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
-    """The board does not report IMU-only mode; IMU frames without any deltas show it."""
+    """The board does not report IMU-only mode. The driver infers it from IMU frames without deltas.
+    """
     bench = Bench(BoardSettings(imu_only=True))
     bench.open()
     bench.run_until_state("imu_only")
@@ -58,7 +62,7 @@ def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
 
 
 def test_garbage_is_not_an_understood_board() -> None:
-    """Bytes that form no frame leave the state ``connecting`` and cause one notice."""
+    """Bytes arrive that form no frame. The state stays ``connecting``, and one notice appears."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -71,7 +75,10 @@ def test_garbage_is_not_an_understood_board() -> None:
 
 
 def test_a_silent_board_is_told_once() -> None:
-    """A silence is reported once, and again only after data has arrived in between."""
+    """The driver reports a silence of the board once.
+
+    It reports the next one if data came in between.
+    """
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -85,7 +92,10 @@ def test_a_silent_board_is_told_once() -> None:
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """After a brown-out while driving, the command from before the restart is not sent again."""
+    """A brown-out restarts the board while the robot drives, and the driver starts the board again.
+
+    It does not send the command from before the restart again.
+    """
     bench.drive(0.5)
     bench.run(0.2)
     bench.board.reboot()

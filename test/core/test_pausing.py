@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pausing with P, a toggle: the board never resumes by mistake, and a pause needs proof."""
+"""Pausing with P, which toggles: the board never resumes by mistake, and a pause needs proof."""
 
 import pytest
 from robots import drive_on, paused, standing
@@ -17,7 +17,10 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """After a request to pause, Stop is sent at once, and P when data shows that the board runs."""
+    """The user requests a pause, and the driver sends Stop at once.
+
+    It sends P as soon as new data shows that the board runs. The board's notice confirms the pause.
+    """
     bench.drive(0.5)
     bench.run(0.3)
     start = len(bench.written)
@@ -29,7 +32,10 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """A second request to pause sends no P, and its answer waits for a new notice."""
+    """The user requests a pause of a paused board. The driver sends no P.
+
+    It answers when a new notice of the board arrives.
+    """
     bench.ask(Request.PAUSE, 5.0)
     start, asked_at = len(bench.written), bench.now
     answer = bench.ask(Request.PAUSE, 5.0)
@@ -42,7 +48,11 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """P is sent only if data received after the request to pause shows that the board runs."""
+    """Another program pauses the board just before the request to pause.
+
+    The driver sends P only after data that is newer than the request, so it does not resume the
+    board.
+    """
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -51,7 +61,10 @@ def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
 
 
 def test_a_lost_p_is_said_again(bench: Bench) -> None:
-    """A paused board only sends notices; if other data continues for long, P is sent again."""
+    """P is lost, so the board keeps sending data, although a paused board sends only notices.
+
+    The driver sends P again.
+    """
     bench.hears = False
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.settle()
@@ -65,7 +78,10 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """The driver sends P because of old data, which resumes a paused board; it sends P again."""
+    """Another program pauses the board, but old data makes the driver send P, which resumes it.
+
+    The driver does not take the old notice as proof. It sends P again and then reports the pause.
+    """
     data = bench.board.step()
     bench.board.receive(b"P")
     notice = bench.board.step()
@@ -86,7 +102,10 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """A notice from before S was obeyed does not confirm a pause that is requested after S."""
+    """The board is started, and then a pause is requested.
+
+    A notice from before the start arrives late. It does not confirm the pause.
+    """
     bench = paused()
     notice = b""
     while not notice:
@@ -106,7 +125,10 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """Data from before P, read after the host slept for 3 s, does not mean that P was lost."""
+    """The host sleeps for 3 s after P, then reads data that the board sent before P.
+
+    This data does not mean that P was lost, so the driver does not repeat P.
+    """
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.session.inbound.receive(on_its_way[:80], bench.now)
@@ -123,7 +145,10 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """After a failed pause, the answer says so, motion is refused, and P is repeated."""
+    """The board does not receive P. The answer says that the pause failed, and motion is refused.
+
+    The driver repeats P, so the board is paused as soon as it receives again.
+    """
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -138,7 +163,10 @@ def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None
 
 
 def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
-    """After ~/start, a failed pause is not repeated, and a fresh command moves the robot."""
+    """A pause has failed, and the user calls ~/start. The driver does not repeat the pause.
+
+    A fresh command moves the robot.
+    """
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     bench.hears = True
@@ -152,7 +180,8 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
-    """A paused board that another program starts is paused again, and motion stays refused."""
+    """Another program starts a paused board. The driver pauses it again and still refuses motion.
+    """
     assert bench.ask(Request.PAUSE, 5.0).success
     bench.board.receive(b"S")
     bench.run(0.2)

@@ -30,7 +30,7 @@ class Asked:
 
 
 class Walk(Bench):
-    """A bench whose line is slow and may lose bytes, and which checks every write."""
+    """A bench that checks every write. Its line is slow and may lose bytes."""
 
     def __init__(self, seed: int, latency_s: float, board: BoardSettings, *, run: bool) -> None:
         super().__init__(board, run=run)
@@ -72,7 +72,7 @@ class Walk(Bench):
             self.judge_time()
 
     def stall(self, seconds: float) -> None:
-        """Let the line carry data for ``seconds`` without serving the session."""
+        """Let the line carry data for ``seconds`` while the session is not served."""
         for _ in range(round(seconds / TICK_S)):
             self.step_board()
         if self.session.estop_active:
@@ -157,7 +157,7 @@ class Walk(Bench):
         self.board.reboot()
 
     def act_letter(self) -> None:
-        """Send the board a letter that is not from the driver."""
+        """Send the board a letter, as another program would."""
         self.meddled_at = self.now
         self.board.receive(self.random.choice([b"P", b"S", b"R"]))
 
@@ -244,11 +244,12 @@ STEPS = st.lists(
 def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wanted_mode(
     steps: list[tuple[str, float]], seed: int, latency_s: float, run: bool, boot_time_s: float
 ) -> None:
-    """Check every write and answer during random actions.
+    """Random actions happen, and every write and answer of the driver is checked.
 
     The driver never sends a command that is too old, was discarded or does not fit the board's
-    mode. It answers every request in time, and sends P only to a board that is known to run. After
-    the faults are over, the board reaches the wanted mode and the robot stands still.
+    mode. It answers every request in time, and sends P only to a board that is known to run.
+
+    At the end the faults are over. The board reaches the wanted mode, and the robot stands still.
     """
     walk = Walk(seed, latency_s, BoardSettings(boot_time_s=boot_time_s, seed=seed), run=run)
     walk.open()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Start, reset, and rules for all requests: one at a time, proved or refused in time."""
+"""Tests of start and reset, and of rules for all requests: one at a time, each answered in time."""
 
 import itertools
 
@@ -25,7 +25,7 @@ def bench() -> Bench:
 def test_on_a_silent_board_every_request_is_answered_in_time(
     request_: Request, limit_s: float
 ) -> None:
-    """On a silent board each request fails in time, and the answer says what to check."""
+    """The board is silent. Each request fails in time, and the answer says what to check."""
     bench = Bench()
     bench.speaks = False
     bench.open()
@@ -36,7 +36,7 @@ def test_on_a_silent_board_every_request_is_answered_in_time(
 
 
 def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> None:
-    """If the line to the board is cut, a pause and a reset both fail in time."""
+    """The board sends data but receives none. A pause and a reset both fail in time."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success
@@ -46,14 +46,14 @@ def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> 
 
 
 def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
-    """A second request is refused at once, with the reason."""
+    """A second request is refused at once while the first is under way."""
     bench.session.request(Request.RESET, object(), bench.now)
     with pytest.raises(RequestRefused, match="a reset is under way"):
         bench.session.request(Request.PAUSE, object(), bench.now)
 
 
 def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
-    """A request that is cut short by the shutdown gets the answer that the driver shuts down."""
+    """The driver shuts down during a request. The answer to the request says so."""
     bench.speaks = False
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.shutdown.begin(bench.now)
@@ -78,7 +78,8 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """Stop and R that were not written to a lost port are not written to the next port."""
+    """The port is lost before Stop and R of a reset are written. The next port does not get them.
+    """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.closed(bench.now)
@@ -89,7 +90,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """During requests and in silence, the session's next wake-up is always in the future."""
+    """During requests and silences, the session's next wake-up is always in the future."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -101,7 +102,10 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """S has no effect on a running board, but undoes a P on its way; the command continues."""
+    """The user requests a start while the board runs and the robot drives.
+
+    The driver still writes S, because a P may be on its way to the board. The robot drives on.
+    """
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"
@@ -111,7 +115,10 @@ def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench)
 
 
 def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Bench) -> None:
-    """A reset sends Stop and R; the board counts from zero, and odom continues from its pose."""
+    """The driver resets a running board with Stop and R.
+
+    The board counts from zero again, and odom continues from its pose.
+    """
     for _ in range(20):
         bench.drive(0.5)
         bench.run(0.1)
@@ -143,7 +150,10 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """If the numbers in a paused board's notices continue, the board has not restarted."""
+    """A paused board does not receive R, so the numbers in its notices continue.
+
+    The driver concludes that the board has not restarted, and the reset fails.
+    """
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -154,9 +164,9 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
-    """The board ran before the failed pause, so a reset starts it again.
+    """A pause of a running board fails, and then a reset succeeds.
 
-    The robot stands until a fresh command arrives.
+    The driver starts the board again, but the robot stands until a fresh command arrives.
     """
     bench = driving()
     bench.hears = False
@@ -171,7 +181,10 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
 
 
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
-    """After a failed pause and a failed reset, the driver still pauses the board."""
+    """A pause and then a reset fail, because the board receives nothing.
+
+    When the board receives again, the driver still pauses it.
+    """
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
     assert not bench.ask(Request.RESET, 10.0).success
@@ -183,7 +196,10 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """The state is ``connecting`` until it is certain that the board has not restarted."""
+    """The board does not receive R. The state becomes ``connecting`` only once.
+
+    It returns to ``nominal`` when it is certain that the board has not restarted.
+    """
     bench.hears = False
     bench.events.clear()
     shown = [bench.session.state]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion commands through a session to a simulated board: authority, ramps, stamps, limits."""
+"""Motion commands through a session to a simulated board: authority, ramps, stamps and limits."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
 
 
 def running(**options: object) -> Bench:
-    """Return a bench with a running board at rest, to which the driver no longer sends Stop."""
+    """Return a bench with a running board at rest, after the driver's last Stop."""
     bench = Bench(BoardSettings(running=True), **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -39,7 +39,8 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return time and words of each Stop and mode 1 frame (base velocity) since ``mark``."""
+    """Return time and words of each frame since ``mark`` that is Stop or a base velocity (mode 1).
+    """
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -49,7 +50,8 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """If a base command follows wheel commands, the driver sends Stop, then the newest command."""
+    """The user commands the base, then the wheels, then the base. The driver sends Stop in between.
+    """
     bench.drive(0.3)
     bench.run(0.1)
     start = len(bench.written)
@@ -70,7 +72,10 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """The driver omits a sideways speed and keeps the forward speed; it refuses NaN."""
+    """The user commands forward and sideways speed on a base that cannot move sideways.
+
+    The driver sends the forward speed only, and says so once. It refuses NaN in either speed.
+    """
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -88,7 +93,10 @@ def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> N
 
 
 def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
-    """linear.z, angular.x and angular.y are set to zero, and the rest of the command is obeyed."""
+    """A command has values other than zero in linear.z, angular.x or angular.y.
+
+    The driver says once that they are set to zero, and obeys the rest of the command.
+    """
     for _ in range(2):
         bench.session.command_twist(BodyTwist(0.4, 0.0, 0.0), bench.now, planar=False)
         bench.settle()
@@ -99,7 +107,10 @@ def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
 
 
 def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
-    """After a refused wheel command, the base command continues without a Stop."""
+    """The driver refuses a wheel command while the base is driven.
+
+    The base drives on without a Stop.
+    """
     bench.drive(0.3)
     start = len(bench.written)
     with pytest.raises(CommandRefused):
@@ -109,7 +120,10 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """At 1 m/s² a step to (0.3, 0.4) m/s takes 0.5 s; 1 m/s is 70 LSB on the wire."""
+    """The user commands (0.3, 0.4) m/s from rest. At a limit of 1 m/s², the ramp takes 0.5 s.
+
+    The direction stays the same during the ramp. A speed of 1 m/s is sent as 70 LSB.
+    """
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -127,7 +141,10 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """A new command continues the ramp of the last one; the driver sends set points every 18 ms."""
+    """A ramp is as steep at commands every 1 ms as at commands every 18 ms.
+
+    Each new command continues the ramp of the last one. The driver sends set-points every 18 ms.
+    """
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)
@@ -143,7 +160,7 @@ def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None
 
 
 def test_a_reversal_is_ramped_through_zero() -> None:
-    """The ramp runs from forward to backward, and no step exceeds the acceleration limit."""
+    """A robot that drives forward is commanded backward. No step exceeds the acceleration limit."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)
@@ -159,7 +176,7 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """At 2 rad/s², a step of the yaw rate to 0.5 rad/s takes 0.25 s."""
+    """The user commands 0.5 rad/s from rest. At a limit of 2 rad/s², the ramp takes 0.25 s."""
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)
@@ -170,7 +187,8 @@ def test_turning_is_ramped_by_its_own_limit() -> None:
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
-    """Stop is written at once, because a person may be in front of the robot."""
+    """A zero command is sent as Stop without a ramp, because a person may be in front of the robot.
+    """
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)
@@ -182,7 +200,7 @@ def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
 
 @pytest.mark.slow
 def test_what_comes_after_a_stop_begins_at_rest() -> None:
-    """The ramp after a timeout, an e-stop or a zero command begins at zero speed."""
+    """After a timeout, an e-stop or a zero command, the ramp of the next command begins at zero."""
     bench = running(limits=GENTLE)
     for stop in (
         lambda: bench.run(1.0),
@@ -209,7 +227,10 @@ def test_wheels_are_not_ramped() -> None:
 
 
 def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
-    """A command whose stamp is 0.3 s old expires 0.2 s after its arrival (timeout 0.5 s)."""
+    """The stamp of a command is 0.3 s old on arrival.
+
+    At a timeout of 0.5 s, it expires 0.2 s later.
+    """
     bench.drive(0.3, age_s=0.3)
     bench.run(0.19)
     assert bench.written[-1][1] != STOP
@@ -218,7 +239,7 @@ def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
 
 
 def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
-    """If the sender's clock is slightly ahead, a command still expires 0.5 s after its arrival."""
+    """The sender's clock is slightly ahead. Its command still expires 0.5 s after the arrival."""
     bench.drive(0.3, age_s=-0.3)
     bench.run(0.49)
     assert bench.written[-1][1] != STOP
@@ -230,7 +251,7 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """After a refused command, the previous command expires at the same time as without it."""
+    """A command is refused because of its stamp. The command before it expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

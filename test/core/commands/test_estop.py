@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The e-stop: latched at once, repeated without end, ended only by a release."""
+"""Tests of the e-stop: sent at once, repeated without end, and ended only by a release."""
 
 from unittest.mock import ANY
 
@@ -21,7 +21,12 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The robot stops. The driver refuses commands, and sends only e-stops, each with a Stop."""
+    """The user latches the e-stop while the robot drives.
+
+    The robot stops, and commands are refused.
+
+    The driver then sends only ES and Stop, always together.
+    """
     bench.drive(0.5)
     bench.run(0.1)
     start = len(bench.written)
@@ -38,7 +43,7 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
 
 
 def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:
-    """Only a release ends the e-stop; after the release the robot waits for a newer command."""
+    """Only a release ends the e-stop. After the release, the robot waits for a newer command."""
     bench.session.estop(True, bench.now)
     bench.settle()
     bench.close()
@@ -63,7 +68,10 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """An e-stop on a closed port is answered with a warning, and is sent when the port opens."""
+    """The user latches the e-stop while the port is closed, and the answer warns of this.
+
+    The driver sends the e-stop as soon as the port opens.
+    """
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -90,7 +98,10 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """A robot that ignores commands after a release causes one notice, which advises ~/reset."""
+    """The board ignores all commands after the release of the e-stop, until it is reset.
+
+    The driver advises ~/reset in one notice.
+    """
     bench = driving(estop_latches=True)
     estop(bench, True)
     bench.run(1.0)
@@ -108,7 +119,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """A robot needs time to speed up, so a short rest after a command is not reported."""
+    """After the release of the e-stop, the robot needs some time to speed up. No notice appears."""
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)
@@ -119,7 +130,7 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """Only the first of several requests to latch the e-stop, or to release it, is reported."""
+    """Two users latch the e-stop, and two release it. Only the first of each is reported."""
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()
@@ -127,7 +138,7 @@ def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) ->
 
 
 def test_an_estop_that_nobody_may_have_heard_says_so(bench: Bench) -> None:
-    """The answer to an e-stop warns if no data came for 2 s, or if the port is not open."""
+    """The answer to an e-stop warns if the board was silent for 2 s, or if the port is closed."""
     assert estop(bench, True) == "e-stop latched"
     bench.speaks = False
     bench.run(2.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits keep the direction, and rounding and saturation never exceed the limits."""
+"""Tests of the speed limits: a limited command keeps its direction and is within every limit."""
 
 import math
 
@@ -25,7 +25,8 @@ ULPS = 1 + 1e-11
 
 
 def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
-    """Return whether two vectors point the same way, to nine digits; zero fits any direction."""
+    """Return whether two vectors have the same direction, to nine digits. Zero has any direction.
+    """
     largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
     if largest_a < 1e-290 or largest_b < 1e-290:
         return True
@@ -43,7 +44,7 @@ def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
 def test_a_shortened_vector_keeps_its_direction_and_the_limit(
     vector: list[float], limit: float
 ) -> None:
-    """A vector longer than the limit is shortened to the limit, and keeps its direction."""
+    """A vector that is longer than the limit is shortened to the limit, and keeps its direction."""
     short = shorten(vector, limit)
     assert math.hypot(*short) <= limit * ULPS
     assert limit == 0 or same_direction(short, vector)
@@ -53,7 +54,7 @@ def test_a_shortened_vector_keeps_its_direction_and_the_limit(
 
 @given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=3), limits)
 def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: float) -> None:
-    """A vector within the limit is returned bit for bit; a longer one is shortened to the limit."""
+    """A vector within the limit is not changed at all. A longer one is shortened to the limit."""
     length = math.hypot(*vector)
     if length <= limit / ULPS:
         assert shorten(vector, limit) == tuple(vector)
@@ -64,7 +65,8 @@ def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: 
 @given(vectors, limits)
 @example([1e308, -1e308], 17.0)
 def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
-    """All wheels are slowed by one factor, set by the wheel that exceeds the limit most."""
+    """If a wheel is too fast, all wheels are slowed by one factor, so the fastest is at the limit.
+    """
     slowed = slow(values, limit)
     assert max(map(abs, slowed)) <= limit * ULPS
     assert limit == 0 or same_direction(slowed, values)
@@ -74,7 +76,7 @@ def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit
 
 @given(any_twists)
 def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: BodyTwist) -> None:
-    """The linear velocity is limited as a vector; the yaw rate keeps its sign."""
+    """A limited linear velocity keeps its direction, and a limited yaw rate keeps its sign."""
     limited = SpeedLimits(linear_mps=0.5, angular_radps=0.7).twist(twist)
     assert math.hypot(limited.vx_mps, limited.vy_mps) <= 0.5 * ULPS
     assert abs(limited.yaw_rate_radps) <= 0.7
@@ -84,7 +86,7 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
 
 @given(any_twists)
 def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
-    """A twist that ``allow`` accepts is returned unchanged; any other twist exceeds a limit."""
+    """A twist that ``allow`` accepts is returned unchanged. Any other twist exceeds a limit."""
     limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
     if limits.allow(twist):
         limited = limits.twist(twist)
@@ -106,14 +108,17 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """At a limit of 0.5 m/s, (3, -4) m/s becomes (0.3, -0.4); yaw is limited separately."""
+    """The user commands (3, −4) m/s at a limit of 0.5 m/s. The result is (0.3, −0.4) m/s.
+
+    The yaw rate has a limit of its own and stays as commanded.
+    """
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     found = (limited.vx_mps, limited.vy_mps, limited.yaw_rate_radps)
     assert found == pytest.approx((0.3, -0.4, 0.1))
 
 
 def test_wheels_are_limited_by_the_fastest() -> None:
-    """At a limit of 17 rad/s, a command of 34 rad/s for one wheel halves the rates of all three."""
+    """One wheel is commanded at twice its limit. The rates of all three wheels are halved."""
     limited = SpeedLimits(wheel_radps=17.0).wheels((34.0, -17.0, 1.0))
     assert limited == pytest.approx((17.0, -8.5, 0.5))
 
@@ -128,7 +133,7 @@ def test_a_limit_of_zero_lets_nothing_through() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_refused_by_name(bad: float, place: int) -> None:
-    """Infinity and NaN are refused in any position, with a message that names ``cmd_vel``."""
+    """Infinity and NaN are refused in every position, and the message names ``cmd_vel``."""
     values = [0.0, 1e308, -1.0]
     values[place] = bad
     with pytest.raises(CommandRefused, match=r"cmd_vel.*NaN or infinity"):
@@ -145,7 +150,10 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity changes in a straight line to the wanted one, within the acceleration."""
+    """The linear velocity approaches the wanted one in a straight line, within the acceleration.
+
+    The yaw rate approaches the wanted one within its own acceleration.
+    """
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
     after = limits.approach(now, wanted, duration_s)
@@ -171,7 +179,7 @@ def test_an_acceleration_of_zero_is_not_a_limit() -> None:
 
 @pytest.mark.parametrize("age_s", [0.0, 0.5, -0.5])
 def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
-    """With a timeout of 0.5 s, a stamp may be up to 0.5 s old or up to 0.5 s in the future."""
+    """At a timeout of 0.5 s, a stamp may be up to 0.5 s in the past or in the future."""
     require_timely("cmd_vel", age_s, 0.5)
 
 
@@ -181,6 +189,9 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """The refusal of a stamped command states the stamp's age and what to check."""
+    """The driver refuses a command because of its stamp. The refusal states the age of the stamp.
+
+    It also says that the clocks must agree.
+    """
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

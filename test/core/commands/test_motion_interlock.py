@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion interlock: when a robot may move again after the motion monitor has tripped."""
+"""Tests of the motion interlock, which decides when a robot may move after a trip of the monitor.
+"""
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
 
@@ -8,19 +9,22 @@ TIMEOUT_S = 0.5
 
 
 def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> bool:
-    """Return whether a command at ``now`` is accepted. ``stands``: whether it is a zero command."""
+    """Return whether a command at ``now`` is accepted.
+
+    ``stands``: whether it is a zero command.
+    """
     return not interlock.arrive(now, TIMEOUT_S, stands=stands)
 
 
 def test_motion_is_allowed_until_something_trips() -> None:
-    """Any number of commands is accepted before the first trip."""
+    """All commands are accepted as long as the motion monitor has not tripped."""
     interlock = MotionInterlock()
     assert all(arrives(interlock, 0.1 * step) for step in range(20))
     assert interlock.reason(TIMEOUT_S) == ""
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """After a trip, motion is refused until no command has arrived for the timeout."""
+    """The sender goes on after a trip. Motion is refused until no command comes for the timeout."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -37,7 +41,7 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """After a trip, a zero command is accepted, and then motion commands are accepted too."""
+    """The user sends a zero command after a trip. Afterwards, motion commands are accepted too."""
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -46,7 +50,10 @@ def test_a_zero_command_ends_the_refusal() -> None:
 
 
 def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
-    """After the second trip, motion is refused until ~/start, but zero commands are accepted."""
+    """The monitor trips twice within a minute. Motion is refused until ~/start, at any later time.
+
+    Zero commands are still accepted.
+    """
     interlock = MotionInterlock()
     interlock.trip(0.0)
     arrives(interlock, 1.0, stands=True)
@@ -60,7 +67,7 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip is a first trip after ~/start, or if the last trip was over a minute ago."""
+    """A trip counts as the first one if the last trip was over a minute ago, or before ~/start."""
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)
@@ -72,7 +79,10 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """Releasing the e-stop allows motion after a second trip, but not after a first trip."""
+    """The board has no ~/start. After a second trip, the release of the e-stop allows motion again.
+
+    After a first trip, the release of the e-stop changes nothing.
+    """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion rule: only a fresh command moves the robot, and only while the board sends data."""
+"""Tests of the motion rule: only a fresh command moves the robot, while the board sends data."""
 
 import contextlib
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def unpause(bench: Bench) -> None:
-    """Let another program pause the board and resume it before the driver notices."""
+    """Pause and resume the board, as another program does, before the driver notices."""
     bench.board.receive(b"P")
     bench.run(0.02)
     bench.board.receive(b"P")
@@ -43,7 +43,10 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """A command from before the interruption never moves the robot again."""
+    """The board or the driver's command is interrupted while the robot drives.
+
+    The command from before never moves the robot again, but a new command does.
+    """
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -58,7 +61,10 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """The board restarts while its data is lost, so only its counters reveal the restart."""
+    """While the board's data is lost, the board restarts and another program starts it.
+
+    The driver notices the restart by the counters alone, and discards the command.
+    """
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -77,7 +83,12 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """A booted board would obey the letter S in a motion frame, so none is sent to it."""
+    """The board restarts while the robot drives.
+
+    The driver stops sending motion before it has booted.
+
+    A booted board would take a byte of a motion frame for the letter S and start.
+    """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -92,7 +103,10 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """After a request to pause or reset, no motion frame is sent, even if the board drives on."""
+    """The user requests a pause or a reset, but the board receives nothing and drives on.
+
+    The driver sends no motion frame after the request.
+    """
     bench.drive(0.4)
     start = len(bench.written)
     bench.hears = False
@@ -104,7 +118,10 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """A paused board would read a byte 0x52 of a motion command as the letter R, a reset."""
+    """The board is connecting or paused, and the driver refuses motion.
+
+    A paused board would take a byte 0x52 of a motion command for the letter R, and reset.
+    """
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state(state)
@@ -120,7 +137,7 @@ def test_motion_is_refused_without_a_port() -> None:
 
 
 def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
-    """After the command timeout, Stop is sent for 1 s; then nothing is sent."""
+    """After the command timeout, the driver sends Stop for 1 s and then nothing."""
     bench.drive(0.5)
     bench.run(0.4)
     assert not bench.still()
@@ -132,7 +149,10 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
-    """Only data from the board is lost; the board still receives, so Stop is sent."""
+    """The board's data is lost while the robot drives, but the board still receives.
+
+    The driver sends Stop and refuses commands. After a while it shows ``connecting``.
+    """
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False
@@ -154,7 +174,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(ben
 
 
 def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
-    """A zero command is sent as Stop even to a silent board, which may still receive."""
+    """The board is silent but may still receive. The driver sends a zero command to it as Stop."""
     bench.speaks = False
     bench.run(1.45)
     start = len(bench.written)
@@ -163,7 +183,8 @@ def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
 
 
 def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Bench) -> None:
-    """A thousand zero commands a second cause only one Stop per control tick."""
+    """The user sends a thousand zero commands a second. The driver sends one Stop per control tick.
+    """
     bench.speaks = False
     bench.run(0.5)
     start = len(bench.written)
@@ -179,7 +200,10 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """After the outage, the board repeats its last command until the driver's Stop arrives."""
+    """The line is cut in both directions, and the robot drives on with its last command.
+
+    When the line works again, the driver's Stop stops the robot.
+    """
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = bench.hears = False
@@ -191,7 +215,10 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """After a stall of the driver, only Stop is sent; the notice names the driver as the cause."""
+    """The driver stalls for 3 s while the robot drives. Afterwards it sends only Stop.
+
+    The notice names the driver as the cause, not the board or the line.
+    """
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

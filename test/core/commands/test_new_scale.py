@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes of the board's scales while the robot drives: the current command is converted."""
+"""The board's scales change while the robot drives, and the current command is converted."""
 
 from robots import driving
 from session_bench import STOP, Bench, bare
@@ -17,7 +17,7 @@ def last(bench: Bench) -> bytes:
 
 
 def going_to(x_m: float) -> Bench:
-    """Return a bench whose robot drives to a goal ``x_m`` ahead, on position control."""
+    """Return a bench on position control whose robot drives to a goal ``x_m`` ahead."""
     bench = Bench(BoardSettings(running=True, control="position"))
     bench.open()
     bench.run_until_state("nominal")
@@ -27,7 +27,10 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """0.4 m/s is 28 LSB at 70 LSB per m/s and 40 LSB at 100; no new command is needed."""
+    """The user commands 0.4 m/s, and then the scale changes from 70 to 100 LSB per m/s.
+
+    The driver sends 40 LSB instead of 28, without a new command.
+    """
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -38,7 +41,10 @@ def test_a_velocity_is_repeated_in_the_new_scale() -> None:
 
 
 def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> None:
-    """10 rad/s at a radius of 0.029 m and 70 LSB per m/s is 20 LSB; at twice the radius, 41 LSB."""
+    """The user commands a wheel rate of 10 rad/s, and then the wheel radius is doubled.
+
+    The driver sends 41 LSB instead of 20, without a new command.
+    """
     bench = driving()
     bench.turn_wheels(10.0, 0.0, -10.0)
     bench.run(0.1)
@@ -49,7 +55,10 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """A goal at 1 m is 1000 LSB at 1000 LSB per m, and 500 LSB at 500 LSB per m."""
+    """The robot drives to a goal at 1 m, and the scale changes from 1000 to 500 LSB per m.
+
+    The driver sends 500 LSB instead of 1000.
+    """
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)
@@ -58,7 +67,10 @@ def test_a_goal_is_repeated_in_the_new_scale() -> None:
 
 
 def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() -> None:
-    """A goal at 10 m exceeds a 16-bit word at 10,000 LSB per m, so the robot is stopped."""
+    """The robot drives to a goal at 10 m, and the scale changes to 10,000 LSB per m.
+
+    The goal does not fit a 16-bit word any more, so the driver sends Stop and a notice.
+    """
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
     assert last(bench) == bare(STOP)
@@ -68,7 +80,7 @@ def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() ->
 
 
 def test_a_ramp_goes_on_from_where_it_was() -> None:
-    """The ramp continues in the new scale, without a step in speed."""
+    """The scale changes during a ramp. The ramp continues without a step in speed."""
     bench = Bench(BoardSettings(running=True), limits=RAMP)
     bench.open()
     bench.run_until_state("nominal")
@@ -88,7 +100,7 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """A speed that the new scale rounds to 0 is sent as Stop, not as zeros in mode 1."""
+    """The new scale rounds the commanded speed to 0. The driver sends Stop, not zeros in mode 1."""
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)
@@ -97,7 +109,7 @@ def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
 
 
 def test_a_robot_that_nobody_commands_hears_nothing_of_it() -> None:
-    """If no command is active, the driver sends nothing when a scale changes."""
+    """A scale changes while no command is active. The driver sends nothing."""
     bench = driving()
     bench.run(3.0)
     start = len(bench.written)

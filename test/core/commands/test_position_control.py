@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Goals sent through a session to a simulated board whose switch is set to position control."""
+"""Goals through a session to a simulated board whose switch is set to position control."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ ORIGIN = BoardPose()
 def at_position_control(
     initial_pose: BoardPose = ORIGIN, *, imu_only: bool = False, **options: object
 ) -> Bench:
-    """Return a bench with a running board whose switch is on position control."""
+    """Return a bench with a running board whose switch is set to position control."""
     settings = BoardSettings(
         running=True, control="position", initial_pose=initial_pose, imu_only=imu_only
     )
@@ -48,7 +48,7 @@ def words(bench: Bench) -> list[int]:
 
 
 def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench: Bench) -> None:
-    """A goal is sent at once and then repeated, because the board does not acknowledge goals."""
+    """The driver sends a goal at once, and repeats it because the board does not acknowledge it."""
     start = len(bench.written)
     bench.go_to(1.0, -0.5, 1.571)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 03 E8 FE 0C 06 23")
@@ -64,7 +64,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """The robot reaches its goals, whatever the board's first pose and the signs of its axes."""
+    """The robot reaches its goals for any first pose of the board and any signs of its axes."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)
@@ -76,7 +76,10 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The board's heading is not wrapped, and a goal never turns the robot back by full turns."""
+    """The robot has made several full turns, and the board counts them in its heading.
+
+    A goal turns the robot by the shorter way, never back by full turns.
+    """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
     bench.go_to(0.0, 0.0, 0.4)
@@ -90,7 +93,8 @@ def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(tur
 
 
 def test_a_goal_beyond_the_words_is_refused_and_the_old_one_stays(bench: Bench) -> None:
-    """A goal beyond the range of 16-bit words is refused, and the previous goal stays active."""
+    """A goal does not fit into 16-bit words. The driver refuses it, and the old goal stays active.
+    """
     bench.go_to(0.2, 0.0, 0.0)
     for x in (33.0, 1e300, -1.7e308):
         with pytest.raises(CommandRefused, match="the limits are"):
@@ -108,7 +112,10 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 
 
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
-    """With its switch on position, the board would take 0.3 m/s for a goal at 21 mm."""
+    """The driver is set to position control and refuses velocities.
+
+    The board would take 0.3 m/s for a goal at 21 mm.
+    """
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
         with pytest.raises(CommandRefused, match="`control_method` is 'position'"):
@@ -117,7 +124,10 @@ def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench
 
 
 def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
-    """With its switch on velocity, the board would take a goal at 1 m for 14 m/s."""
+    """The driver is set to velocity control and refuses goals.
+
+    The board would take a goal at 1 m for a velocity of 14 m/s.
+    """
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(1.5)
@@ -129,14 +139,20 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """The driver needs the board's poses to convert a place in odom to the board's frame."""
+    """The board sends no poses, or the driver does not use them, so goals are refused.
+
+    Without the board's pose, a goal in odom cannot be converted to the board's frame.
+    """
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
         bench.go_to(1.0, 0.0, 0.0)
 
 
 def test_a_goal_is_right_also_after_a_gap_and_before_the_next_pose(bench: Bench) -> None:
-    """After a lost displacement, the driver still converts a goal in odom correctly."""
+    """Displacements are lost, and a goal arrives before the board's next pose.
+
+    The driver still converts the goal correctly.
+    """
     bench.go_to(1.0, 0.0, 0.0)
     bench.run(0.5)
     bench.speaks = False
@@ -171,7 +187,10 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """After the event the robot rests until a newer goal, which uses the board's new frame."""
+    """An event discards commands while the robot drives to a goal. The robot rests afterwards.
+
+    A newer goal is reached, even if the board has a new frame.
+    """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -189,7 +208,10 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """A stop on the way to a goal is sent as Stop; zeros in mode 1 would mean the origin."""
+    """The odometry is reset while the robot drives to a goal, so the driver stops the robot.
+
+    It sends Stop, because zeros in mode 1 would be a goal at the origin.
+    """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)
@@ -206,7 +228,8 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 ) -> None:
     """The board's switch is on velocity, but the driver's parameter says position.
 
-    The board takes the goal for a velocity, so the robot drives away from the goal and is stopped.
+    The board takes the goal for a velocity. The robot drives away from the goal, and the driver
+    stops it.
     """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()
@@ -218,7 +241,7 @@ def test_a_robot_that_drives_away_from_its_goal_is_stopped(
 
 
 def test_a_robot_that_is_pushed_a_little_keeps_its_goal(bench: Bench) -> None:
-    """The board moves back to its goal after each push."""
+    """The robot is at its goal and is pushed by hand. The board moves it back, without a notice."""
     bench.go_to(0.3, 0.0, 0.0)
     bench.run(3.0)
     pushed = bench.board.odometry

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The e-stop in the stream of set points, and its release."""
+"""Tests of the e-stop in the stream of set-points, and of its release."""
 
 import pytest
 from set_point_bench import BOTH, GO, STOP, TURN, Stream, make_stream, order, run
@@ -15,7 +15,10 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """On a new connection the driver sends the e-stop twice, even if it has just sent one."""
+    """The port is opened while the e-stop is latched. The driver sends the e-stop twice at once.
+
+    It does so even if it has just sent an e-stop on the old connection.
+    """
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -23,7 +26,10 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """A change of authority makes a Stop and a command due; an e-stop cancels both."""
+    """A change of authority makes a Stop and a command due, and then the e-stop is latched.
+
+    Neither of the two is sent, only the e-stop.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -33,7 +39,10 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """A Stop follows each ES, for firmware without mode 10; the first ES and Stop come twice."""
+    """The e-stop is sent at once as ES and Stop, both twice, and is repeated without end.
+
+    A Stop follows each ES, because some firmware does not know ES.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -46,7 +55,7 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stre
 def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
     stream: Stream,
 ) -> None:
-    """While letters are written at 50 Hz, the e-stop is still repeated at 20 Hz."""
+    """Letters are written at 50 Hz while the e-stop is latched. It is still repeated at 20 Hz."""
     stream.latch(1.0)
     written = 0
     for step in range(1000):
@@ -58,7 +67,7 @@ def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
 
 
 def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
-    """A node may request e-stops at any rate; the driver sends 20 a second, to spare the line."""
+    """A node requests a thousand e-stops a second. The driver sends only 20, to spare the line."""
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
@@ -69,7 +78,7 @@ def test_a_flood_of_emergency_stops_keeps_the_pace(stream: Stream) -> None:
 
 
 def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stream) -> None:
-    """The robot moves again only on a command that is newer than the release."""
+    """After the release of the e-stop, the driver sends only Stop. The old command is forgotten."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.1)
@@ -79,7 +88,7 @@ def test_a_release_sends_stop_and_forgets_what_was_commanded_before(stream: Stre
 
 
 def test_a_release_without_a_latch_does_nothing(stream: Stream) -> None:
-    """A release without a latched e-stop must not stop a robot that drives."""
+    """A user releases an e-stop that is not latched. The robot drives on."""
     order(stream, GO, 1.0)
     stream.release(1.0)
     assert stream.write(1.0) == GO

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pacing, repetition and timeout of set points whose frames are arbitrary bytes."""
+"""Tests of the pace, the repetition and the timeout of set-points with arbitrary bytes."""
 
 import math
 from typing import Any
@@ -21,7 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """A test motion whose frame differs each time, for a given number of frames."""
+    """A test motion whose frame differs each time, for the given number of frames."""
 
     authority, is_zero = Authority.BASE, False
 
@@ -46,13 +46,13 @@ def stream() -> Stream:
 
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
-    """If nothing was sent for a while, the driver sends a command at once."""
+    """The driver has sent nothing for a while. It sends a command at once."""
     order(stream, GO, 1.0)
     assert stream.write(1.0) == GO
 
 
 def test_within_the_pace_only_the_newest_command_goes_out(stream: Stream) -> None:
-    """Of several commands within 18 ms, the driver sends only the newest, to save bytes."""
+    """Several commands arrive within 18 ms. The driver sends only the newest, to save bytes."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, b"older", 1.002)
@@ -75,7 +75,10 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """Stop is repeated at 20 Hz, for 1 s if the robot is seen at rest, otherwise for 5 s."""
+    """After the timeout, the driver sends Stop at 20 Hz, also at a lower command rate.
+
+    It does so for 1 s if the robot is seen at rest, and otherwise for 5 s.
+    """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
@@ -107,7 +110,8 @@ def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
 
 
 def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
-    """At a command rate of 1 Hz, Stop is repeated faster, because a single Stop may be lost."""
+    """The command rate is 1 Hz. The driver repeats Stop faster, because a single Stop may be lost.
+    """
     stream = Stream(CommandSettings(rate_hz=1.0))
     order(stream, STOP, 1.0)
     assert len(run(stream, 1.0, 1.49)) == pytest.approx(10, abs=1)
@@ -116,7 +120,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """The zeros before a letter may complete a cut frame, so the current command is sent again."""
+    """The driver writes a letter while the robot drives, with zeros before the letter.
+
+    The zeros may complete a cut frame to a wrong one, so the current command is sent again.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.actuator.wrote(packed(b"S"), 1.02)
@@ -124,7 +131,8 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 
 
 def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
-    """Of a thousand Stop requests in a second, only about a hundred are sent."""
+    """The user sends a thousand zero commands in a second. The driver sends about a hundred Stops.
+    """
     written = []
     for step in range(1000):
         now = 1.0 + step * 0.001
@@ -136,7 +144,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """Each new frame of a changing motion is sent 18 ms after the previous frame."""
+    """The frames of a motion still change. The driver sends each 18 ms after the one before."""
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]
@@ -144,7 +152,10 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
 
 
 def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
-    """Stop is sent at once, and the command of the new authority one control tick later."""
+    """The authority changes.
+
+    The driver sends Stop at once, and the new command a control tick later.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -154,7 +165,10 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """One Stop precedes the newest of three commands; the command in between is never written."""
+    """Commands of three authorities arrive at almost the same time.
+
+    The driver sends one Stop and then the newest command. It never writes the one in between.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -168,7 +182,10 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """No second Stop is needed: one was sent when the first authority's command expired."""
+    """The command of the first authority expires, and the driver sends Stop.
+
+    When the authority then changes, a second Stop is not needed.
+    """
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
     order(stream, TURN, 1.62, Authority.WHEELS)
@@ -178,7 +195,7 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """If the driver has just sent Stop, a change of authority does not cause a second Stop."""
+    """The driver has just sent Stop when the authority changes. It does not send a second Stop."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)
@@ -188,7 +205,7 @@ def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
 
 
 def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
-    """When a command is discarded, the Stop that was due and its repetitions are discarded too."""
+    """A command is discarded together with the Stop that was due. The driver writes nothing."""
     order(stream, GO, 1.0)
     stream.halt(1.0)
     stream.discard(1.0)
@@ -197,7 +214,8 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """After a long stall of the process, Stop is sent instead of an old command."""
+    """The pacer stalls for a minute while a command is active. It then sends Stop, not the command.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     assert stream.write(60.0) == STOP
@@ -216,7 +234,7 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """Random sequences of events never break the rules for outbound frames."""
+    """Random events never break the rules for frames that the driver writes."""
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:

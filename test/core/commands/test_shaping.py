@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands through a session: checked, limited and written in the manual's frames."""
+"""Commands through a session are checked, limited and written in the manual's frames."""
 
 import math
 
@@ -17,14 +17,17 @@ def bench() -> Bench:
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
-    """0.3 m/s is sent as 21 LSB, -0.2 m/s as -14 LSB and 0.5 rad/s as 250 LSB."""
+    """The driver sends a command at once: 0.3 m/s as 21 LSB, −0.2 m/s as −14, 0.5 rad/s as 250."""
     start = len(bench.written)
     bench.drive(0.3, -0.2, 0.5)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 15 FF F2 00 FA")
 
 
 def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
-    """10 rad/s at a radius of 29 mm is 20.3 LSB; a limit scales all wheels by one factor."""
+    """A wheel rate of 10 rad/s at a radius of 29 mm is sent as 20 LSB.
+
+    If a wheel exceeds its limit, the rates of all wheels are scaled by one factor.
+    """
     start = len(bench.written)
     bench.session.command_wheels((10.0, -10.0, 0.0), bench.now)
     bench.settle()
@@ -37,7 +40,7 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """A zero twist is sent as Stop, not as zeros in mode 1, which may be a goal at the origin."""
+    """The driver sends a zero twist as Stop. Zeros in mode 1 may mean a goal at the origin."""
     bench.drive(0.3)
     start = len(bench.written)
     bench.drive()
@@ -46,7 +49,7 @@ def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: float) -> None:
-    """A command with infinity or NaN does not move the robot; the last command expires as usual."""
+    """The driver refuses a command with infinity or NaN. The command before it expires as usual."""
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match="NaN or infinity"):
@@ -59,7 +62,8 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """A wheel command needs three rates; the refusal of another number states that number."""
+    """A wheel command with a wrong number of rates is refused, and the refusal states the number.
+    """
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)
@@ -68,7 +72,7 @@ def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> N
 
 
 def test_a_huge_command_is_limited_in_its_own_direction(bench: Bench) -> None:
-    """A command of 1e300 m/s to the front left becomes 0.5 m/s, which is 24.7 LSB per axis."""
+    """The user commands 1e300 m/s to the front left. The driver sends 0.5 m/s, 25 LSB per axis."""
     start = len(bench.written)
     bench.drive(1e300, 1e300, -1e300)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 19 00 19 FF 06")

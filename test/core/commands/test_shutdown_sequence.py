@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The last bytes before the port is closed: Stop, then letters to pause or reset if requested."""
+"""Tests of the last bytes before the port is closed: Stop, then perhaps a pause or a reset."""
 
 import pytest
 from robots import driving, paused, standing
@@ -21,18 +21,21 @@ def bench() -> Bench:
 def test_the_shutdown_sequence_stops_the_robot_whatever_else_it_does(
     bench: Bench, on_exit: OnExit, expected: bytes
 ) -> None:
-    """At shutdown, Stop is written three times before the letters for a pause or a reset."""
+    """At shutdown, the driver writes Stop three times, then the letters for a pause or a reset."""
     assert bench.last_words(on_exit) == 3 * STOP + expected
 
 
 def test_a_shutdown_of_a_paused_board_does_not_unpause_it() -> None:
-    """The letter P is a toggle, so the shutdown does not send it to a paused board."""
+    """The board is paused at shutdown. The driver sends no P, which would resume the board."""
     bench = paused()
     assert bench.last_words("pause") == 3 * STOP
 
 
 def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -> None:
-    """A sent P is not confirmed yet; the shutdown sends no second P, which would undo the first."""
+    """At shutdown, the driver has sent P, but the pause is not confirmed yet.
+
+    It sends no second P, which would undo the first.
+    """
     bench.session.request(Request.PAUSE, object(), bench.now)
     bench.settle()
     bench.speaks = False
@@ -47,7 +50,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """A paused board receives S just before the shutdown; the shutdown pauses it again."""
+    """A paused board receives S just before the shutdown. The shutdown pauses it again."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -58,7 +61,7 @@ def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
 
 
 def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
-    """The last frame that the board receives is the e-stop, which forbids motion."""
+    """The e-stop is latched at shutdown. The last frame that the driver writes is ES."""
     bench.session.estop(True, bench.now)
     assert bench.last_words("stop") == 3 * STOP + EMERGENCY_STOP
 
@@ -72,7 +75,12 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """The final wait is silent, because damage on the line could turn any frame into a motion."""
+    """At shutdown, the driver stops the robot, then checks that it rests.
+
+    It writes nothing meanwhile.
+
+    A damaged line could turn any frame into a motion, so the check needs silence.
+    """
     bench = driving()
     left(bench)
     assert bench.session.shutdown.fall_silent(bench.now)
@@ -85,7 +93,10 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
 
 
 def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
-    """An inserted byte turns the last Stop into a motion, so Stop is sent again."""
+    """A byte inserted by the line turns the last Stop of the shutdown into a motion.
+
+    The driver sees that the robot moves, and sends Stop again.
+    """
     bench = driving()
     left(bench)
     bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))
@@ -96,7 +107,10 @@ def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
 
 
 def test_what_a_paused_board_cannot_show_is_not_waited_for() -> None:
-    """A paused board sends no displacements, but its motors are off, so the robot is at rest."""
+    """At shutdown, a paused board sends no displacements, but its motors are off.
+
+    The driver takes the robot to be at rest without waiting.
+    """
     bench = paused()
     left(bench)
     assert not bench.session.shutdown.fall_silent(bench.now)

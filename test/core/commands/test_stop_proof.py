@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Proof that a robot is at rest, by the displacements that its board reports."""
+"""Tests of the proof that a robot is at rest, made of the displacements that its board reports."""
 
 import pytest
 from hypothesis import given
@@ -27,7 +27,7 @@ def moved(speed_mps: float = 0.0, rate_radps: float = 0.0, lost: int = 0) -> Dis
 
 
 def shown(proof: StopProof, *speeds: float, begin_s: float = 10.0) -> bool:
-    """Return whether displacements at ``speeds``, at intervals of 40 ms, prove rest."""
+    """Deliver displacements at ``speeds``, 40 ms apart, and return whether they prove rest."""
     for number, speed in enumerate(speeds):
         proof.look(moved(speed), begin_s + 0.1 + number * PERIOD_S)
     return proof.proved
@@ -41,13 +41,16 @@ def proof() -> StopProof:
 
 
 def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof) -> None:
-    """Three displacements of zero, which take 0.12 s, prove rest; two are not enough."""
+    """Three displacements of zero, in 0.12 s, prove rest. Two are not enough."""
     assert not shown(proof, 0.0, 0.0)
     assert shown(proof, 0.0, 0.0, 0.0)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """With displacements every 0.4 s a proof takes longer, as the first may begin before Stop."""
+    """Displacements come only every 0.4 s, and the first may have begun before Stop.
+
+    The proof then takes longer than with frequent displacements.
+    """
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
     proof.look(rare, 10.3)
@@ -61,7 +64,8 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
-    """A single displacement after Stop does not prove rest, even if its duration is 0.1 s."""
+    """One displacement after Stop does not prove rest, even if it covers 0.1 s. A second one does.
+    """
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved
@@ -70,12 +74,13 @@ def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopPro
 
 
 def test_without_stop_standing_still_proves_nothing() -> None:
-    """Without a Stop, rest is not proved, because a command may still be on its way."""
+    """No Stop was sent, so a command may still be on its way. Displacements of zero prove nothing.
+    """
     assert not shown(StopProof(), *[0.0] * 50)
 
 
 def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
-    """Displacements after a command to move prove nothing until the next Stop."""
+    """After a command to move, displacements of zero prove nothing until the next Stop."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.moved()
     assert not proof.proved
@@ -83,14 +88,15 @@ def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
 
 
 def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
-    """A displacement that arrives up to 50 ms after Stop may have ended before Stop arrived."""
+    """A displacement within 50 ms after Stop may have ended before Stop arrived, so it is ignored.
+    """
     for _ in range(10):
         proof.look(moved(), 10.049)
     assert not proof.proved
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """Neither a new connection nor a Stop replaces the proof that a driven robot is at rest."""
+    """After a motion, a proof of rest is owed. Neither a new connection nor a Stop replaces it."""
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -105,14 +111,14 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """A displacement above the rest thresholds ends a proof that the robot is at rest."""
+    """Rest is proved, and then a displacement exceeds the thresholds of rest. The proof ends."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved
 
 
 def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) -> None:
-    """A displacement of unknown duration, for example after a pause, does not prove rest."""
+    """Displacements of unknown duration, for example after a pause, do not prove rest."""
     for number in range(50):
         unknown = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=None, lost=0)
         proof.look(unknown, 10.1 + number * PERIOD_S)
@@ -120,7 +126,7 @@ def test_a_displacement_of_unknown_duration_is_not_evidence(proof: StopProof) ->
 
 
 def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
-    """The paused state proves that the robot is at rest, without any displacement."""
+    """The board is paused. This proves that the robot is at rest, without any displacement."""
     proof.paused()
     assert proof.proved
 
@@ -133,7 +139,8 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """Four displacements below the rest thresholds prove rest, whatever came before."""
+    """The robot moves in any way and then rests. Four displacements of a resting robot prove rest.
+    """
     proof = StopProof()
     proof.stopped(10.0)
     shown(proof, *before)
@@ -143,7 +150,7 @@ def test_whatever_came_before_standing_for_long_enough_proves_it(
 
 
 def without_deltas(bench: Bench) -> None:
-    """Discard all delta frames from now on; IMU frames and poses still arrive."""
+    """Discard all delta frames from now on. IMU frames and poses still arrive."""
     step = bench.board.step
 
     def heard() -> bytes:
@@ -155,7 +162,10 @@ def without_deltas(bench: Bench) -> None:
 
 
 def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it() -> None:
-    """If all odometry frames are lost, the log only says that the stop is not confirmed."""
+    """All delta frames are lost.
+
+    The log says that the stop is unconfirmed, not that the robot moves.
+    """
     bench = driving()
     without_deltas(bench)
     bench.run(8.0)
@@ -165,7 +175,10 @@ def test_the_log_does_not_say_that_a_robot_moves_where_no_displacement_shows_it(
 
 
 def test_the_log_says_that_a_robot_moves_where_displacements_show_it() -> None:
-    """The board misses Stop while the motion monitor is off; the log says that the robot moves."""
+    """The board does not receive Stop, and the motion monitor is off.
+
+    The log says that the robot still moves.
+    """
     bench = driving()
     bench.configure(motion_monitor=False)
     bench.hears = False

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits and a command timeout that change while the robot drives."""
+"""Speed limits and the command timeout change while the robot drives."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,10 @@ DRIVES = Bench.drive, (0.4,)
 def test_what_was_commanded_under_looser_ones_ends(
     command: Callable[..., None], values: tuple[float, ...], changed: dict[str, object]
 ) -> None:
-    """When a limit or the timeout becomes stricter, Stop is sent; the next command is accepted."""
+    """A limit or the timeout becomes stricter while the robot drives. The driver sends Stop.
+
+    The next command is accepted.
+    """
     bench = driving()
     command(bench, *values)
     bench.run(0.05)
@@ -54,7 +57,10 @@ def test_what_was_commanded_under_looser_ones_ends(
     ],
 )
 def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
-    """A looser limit or timeout, a new acceleration or a new rate does not stop the robot."""
+    """A limit or the timeout becomes looser, or the acceleration or the command rate changes.
+
+    The robot drives on.
+    """
     bench = driving()
     start = len(bench.written)
     bench.drive(0.4)
@@ -65,7 +71,10 @@ def test_looser_ones_disturb_nobody(changed: dict[str, object]) -> None:
 
 
 def test_a_robot_that_stands_is_told_nothing() -> None:
-    """A stricter setting causes no notice if the robot has no command or a zero command."""
+    """A setting becomes stricter while the robot has no command or a zero command.
+
+    No notice appears.
+    """
     bench = driving()
     bench.drive()
     bench.configure(limits=SpeedLimits(linear_mps=0.1))

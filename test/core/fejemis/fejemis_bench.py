@@ -28,8 +28,11 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 class Bench:
     """A session with both simulated boards.
 
-    ``hears``: channels on which the robot receives bytes. ``speaks``: channels on which the driver
-    receives bytes from the robot. ``read_s``: time between two reads of a port, in s.
+    ``hears``: channels on which the robot receives bytes.
+
+    ``speaks``: channels on which the driver receives bytes.
+
+    ``read_s``: time between two reads of a port, in s.
     """
 
     def __init__(
@@ -54,7 +57,10 @@ class Bench:
         self.now = 1000.0
         self.hears, self.speaks = {DRIVE, FRONT}, {DRIVE, FRONT}
         self.carry: Callable[[int, bytes], bytes] = lambda _, data: data
-        """Function that changes or drops the bytes from the robot, by channel."""
+        """Function that changes or drops the bytes from the robot.
+
+        Its arguments are channel and bytes.
+        """
         self.read_s = 0.0
         self._unread, self._read_at = [b"", b""], [-math.inf, -math.inf]
         self.events: list[Event] = []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The front wheel's angle on its way to the drive board, on a line that loses characters."""
+"""The front wheel's angle is relayed to the drive board on a line that loses characters."""
 
 import itertools
 import math
@@ -25,15 +25,18 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether some angle to the right within half a degree of this one has a digit 6.
+    """Return whether an angle to the right with a digit 6 is within half a degree of this one.
 
-    Such angles are about -60° to -69°, and -6°, -16° and so on.
+    Such angles are about −60° to −69°, and −6°, −16° and so on.
     """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """Most angles are sent in steps of 0.1°; some are rounded more, so that damage is noticed."""
+    """The driver sends most angles in steps of 0.1°.
+
+    It rounds some more, so that damage is noticed.
+    """
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -41,9 +44,10 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """The loss of two characters can change only angles to the right that have a digit 6.
+    """Two lost characters can change an angle only if it is to the right and has a digit 6.
 
-    The changed angle is less than 10° to the left. Fewer than a tenth of all angles can change.
+    The board then reads an angle of 0° to 10° to the left. Fewer than a tenth of all angles are
+    affected.
     """
     across = 0
     for angle_deg in EVERY:
@@ -60,7 +64,10 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """Characters of the checksum may be lost too, and the reader in this test is lenient."""
+    """Any one or two characters of a line are lost, perhaps of the checksum.
+
+    A board that reads as leniently as possible still reads no other angle.
+    """
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):
@@ -69,7 +76,8 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """An angle of -60° to -69° has a minus sign and a 6; no checksum detects the loss of both."""
+    """Every text for −60° to −69° has a minus sign and a 6. No checksum detects the loss of both.
+    """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):
         assert {"-", "6"} <= {*f"{angle_deg}"}
@@ -77,7 +85,10 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """Less than 1 % of lines that lost three characters pass; see docs/boards/fejemis.md."""
+    """Three characters of a line are lost.
+
+    Less than 1 % of such lines pass (docs/boards/fejemis.md).
+    """
     chance = random.Random(seed)
     passed = total = 0
     for _ in range(3):
@@ -91,7 +102,7 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Without checksums, whole degrees are sent, and lost characters never leave more than 90°.
+    """Without checksums, the driver sends whole degrees. Lost characters never leave more than 90°.
 
     Only beyond 90° would the inner wheel be faster than the outer one.
     """
@@ -106,7 +117,7 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 @pytest.mark.parametrize("sums", [True, False])
 @pytest.mark.parametrize("angle_deg", [0.3, 5.5, 12.4, 45.5, -6.25, -64.9])
 def test_the_mean_of_what_is_told_is_the_angle(angle_deg: float, *, sums: bool) -> None:
-    """The rounding error of an angle is added to the next one, so the mean is exact."""
+    """The driver adds the rounding error of an angle to the next one, so the mean is exact."""
     relay = AngleRelay()
     told = [float(relay.text(math.radians(angle_deg), sums=sums)[4:]) for _ in range(200)]
     assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The configuration on the boards: read, written where the user has set it, and read back."""
+"""Tests of the boards' configuration: it is read, written where the user set it, and read back."""
 
 import itertools
 
@@ -25,7 +25,7 @@ WRITTEN: dict[Written, tuple[float, ...]] = {
 
 
 def test_only_what_the_user_set_is_written() -> None:
-    """Without settings by the user nothing is written; diagnostics show the boards' values."""
+    """The user has set nothing, so nothing is written. The diagnostics show the boards' values."""
     bench = nominal()
     bench.run(3.0)
     words = {text.split()[0] for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -43,7 +43,8 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """Each setting is written to the board that uses it, and again if that board restarts."""
+    """The driver writes each setting to the board that uses it, and again if that board restarts.
+    """
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
@@ -68,14 +69,20 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
 
 
 def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
-    """A notice names a setting that a board does not keep; here it is an impossible radius."""
+    """The user sets an impossible radius, and the board does not keep it.
+
+    A notice names the setting.
+    """
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: (0.08, -1.0, 1.0, 1.0, 1.0)}))
     bench.run(6.0)
     assert any("confw" in text for text in bench.notices)
 
 
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
-    """``confs`` lists track and wheelbase in either order; the track in ``conf`` shows which."""
+    """The line ``confs`` contains track width and wheelbase, in either order.
+
+    The driver finds the order by the track width in ``conf``.
+    """
     for turned in (False, True):
         configuration = Configuration("drive", {})
         for _ in range(2):
@@ -96,7 +103,10 @@ def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_no
 
 
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
-    """Two equal readings are needed, since one in 99 damaged answers passes its checksum."""
+    """The driver accepts a value when it was read twice alike.
+
+    A single reading is not enough, because one in 99 damaged answers passes its checksum.
+    """
     configuration = Configuration("drive", {})
     for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
         configuration.hear(parse(text))
@@ -108,7 +118,7 @@ def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
 
 
 def test_what_was_read_once_is_asked_for_again() -> None:
-    """A second reading confirms the first one; after that the value is not queried again."""
+    """The driver queries a value a second time to confirm it, and then not again."""
     bench = nominal()
     bench.run(2.0)
     assert bench.lines(DRIVE).count("confi") == 2
@@ -116,7 +126,10 @@ def test_what_was_read_once_is_asked_for_again() -> None:
 
 
 def test_what_was_written_and_read_once_is_not_written_again() -> None:
-    """A written value that was read back once is only queried a second time, to confirm it."""
+    """The driver has read back a written value once.
+
+    It queries the value again, but does not write it.
+    """
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     bench.run(2.0)
     assert bench.lines(FRONT).count("confs 0.41 0.43") == 1
@@ -124,7 +137,7 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
 
 
 def test_a_small_change_by_the_user_is_written() -> None:
-    """A setting that the user changes is written, even if the change is very small."""
+    """The user changes a setting very little. The driver still writes it."""
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: first}))
     bench.run(2.0)
@@ -137,7 +150,10 @@ def test_a_small_change_by_the_user_is_written() -> None:
 
 
 def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() -> None:
-    """While the robot is driven, the board still reports the old values, and nothing is written."""
+    """The user changes a setting while the robot is driven.
+
+    The driver writes it when the robot rests.
+    """
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.4, 0.42)}))
     bench.drive_on()
     bench.board.settings = FejemisSettings(written={Written.STEERING: (0.4, 0.4205)})
@@ -149,7 +165,10 @@ def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() ->
 
 
 def test_a_small_difference_is_written_after_a_start() -> None:
-    """The driver writes the user's settings even if the board's values differ only slightly."""
+    """After a start, the board's values differ only slightly from the user's.
+
+    The driver writes them.
+    """
     configuration = Configuration("front", {Written.STEERING: (0.4, 0.4205)})
     for _ in range(2):
         configuration.hear(parse("confs 0.4200 0.4000"))
@@ -161,7 +180,7 @@ def test_a_small_difference_is_written_after_a_start() -> None:
 
 
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
-    """A query that loses one or two characters does not become a command."""
+    """Without checksums, a query loses one or two characters. It does not become a command."""
     bench = nominal(Simulated(firmware=Firmware(sums=False)))
     bench.run(8.0)
     texts = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -175,7 +194,10 @@ def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """If the setting for checksums is wrong, only heartbeats are decoded; a notice explains it."""
+    """The user's setting for checksums is wrong, so only heartbeats are decoded.
+
+    A notice explains it.
+    """
     bench = Bench(settings=FejemisSettings(line_sums="off"))
     bench.open()
     bench.run(4.0)
@@ -184,7 +206,10 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
-    """If the geometries of two boards differ, one of them computes wrong speeds or angles."""
+    """The two boards have different geometries, so one computes wrong speeds or angles.
+
+    A notice says so.
+    """
     bench = nominal()
     bench.robot.receive(b"confs 0.4 0.5\n", bench.now, FRONT)
     bench.session.closed(bench.now)
@@ -194,9 +219,9 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """The line that writes a setting may be lost, and is not repeated while the robot is driven.
+    """A line that writes a setting may be lost, and is not repeated while the robot is driven.
 
-    So motion is refused until the board has the setting, even if the user changes it before that.
+    So motion is refused until the board has the setting, even if the user changes it meanwhile.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Faults of a front wheel that does not turn to its commanded angle."""
+"""Tests of the faults of a front wheel that does not turn to its commanded angle."""
 
 import contextlib
 import math
@@ -19,7 +19,8 @@ TICK_S = 0.015
 
 
 def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
-    """Command 1.5 rad, but hold the wheel at ``angle_rad``; return the time of the fault in s."""
+    """Command 1.5 rad while the wheel stays at ``angle_rad``. Return the time of the fault, in s.
+    """
     follower.aim(1.5)
     for n in range(200):
         if follower.look(angle_rad, since + TICK_S * n):
@@ -28,7 +29,8 @@ def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
 
 
 def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
-    """A blocked wheel is reported once; a wheel that approaches its angle, even slowly, is not."""
+    """A blocked wheel is reported once. A wheel that approaches its angle slowly is not reported.
+    """
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.015 * n, TICK_S * n) for n in range(100))
@@ -38,7 +40,10 @@ def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
 
 
 def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
-    """If the commanded angle changes, the wheel gets the full time again to reach the new angle."""
+    """The commanded angle changes while the wheel turns.
+
+    The wheel has the full time for the new angle.
+    """
     follower = Follower()
     follower.aim(1.5)
     assert not any(follower.look(0.02 * n, TICK_S * n) for n in range(60))
@@ -47,7 +52,10 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 
 
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """Commands that alternate between 0.9 and 1.5 rad do not extend a blocked wheel's time."""
+    """The commanded angle of a blocked wheel alternates between 0.9 and 1.5 rad.
+
+    These commands do not extend the wheel's time, so the fault is reported.
+    """
     follower = Follower()
     seen = 0
     for n in range(200):
@@ -57,7 +65,10 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 
 
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
-    """Motion is refused while the wheel is blocked; each command would move the robot for 1 s."""
+    """The wheel is blocked, and motion is refused until the wheel has moved.
+
+    Otherwise each new command would move the robot for 1 s.
+    """
     follower = Follower()
     at = blocked(follower, 0.0)
     assert follower.refusal == UNTIL_IT_MOVES
@@ -69,7 +80,8 @@ def test_motion_is_refused_until_the_wheel_has_moved() -> None:
 
 
 def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
-    """A fault ends when the wheel moves; the second fault within a minute ends only by a start."""
+    """The first fault ends when the wheel moves. A second one within a minute ends only by a start.
+    """
     follower = Follower()
     at = blocked(follower, 0.0)
     follower.look(1.0, at + 1.0)
@@ -87,7 +99,7 @@ def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
 
 
 def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> None:
-    """Command a twist ten times a second for ``seconds``, ignoring refusals."""
+    """Command a twist ten times a second for ``seconds``, and ignore refusals."""
     for _ in range(round(seconds / 0.1)):
         with contextlib.suppress(CommandRefused):
             bench.drive(v, w)
@@ -96,9 +108,9 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """Some firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
+    """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
 
-    It rolls less than 12 cm before the second fault refuses motion until a start.
+    The robot rolls less than 12 cm. After the second fault, motion is refused until a start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
@@ -117,7 +129,10 @@ def test_a_clamped_reverse_is_stopped(w: float) -> None:
 
 
 def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A turn on the spot waits for a wheel angle of 90°; a wheel that rests at 82° is reported."""
+    """A turn on the spot needs a wheel angle near 90°, but the wheel stops at 82°.
+
+    A notice says so.
+    """
     monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
     bench = nominal()
     drive_whatever_is_said(bench, 0.0, 0.5, 4.0)
@@ -128,7 +143,7 @@ def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.Monke
 def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A turn on the spot that has begun continues if the wheel goes back from 90° to 82°."""
+    """During a turn on the spot, the wheel goes back from 90° to 82°. The turn continues."""
     bench = nominal()
     bench.drive_on(0.0, 0.5, seconds=3.0)
     monkeypatch.setattr(vehicle, "MECHANICAL_STOP_DEG", 82.0)
@@ -138,7 +153,10 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """After a reconnect the driver itself starts the board; only a ~/start ends the refusal."""
+    """Motion is refused until ~/start. After a reconnect the driver starts the board by itself.
+
+    Motion is still refused, until the user calls ~/start.
+    """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START
     bench.close()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random input from the boards at any time: the driver does not raise, loop or move the robot."""
+"""Random input from the boards. The driver does not raise an error, loop or move the robot."""
 
 import contextlib
 import random
@@ -16,7 +16,7 @@ from omnibot_driver.core.requests import Request
 
 
 def any_line(chance: random.Random) -> bytes:
-    """Return a random line of either board, often damaged, or random bytes."""
+    """Return a line that one of the boards could send, often damaged, or random bytes."""
     text = chance.choice(list(GOLDEN)).encode()
     fields = text.split()
     for at in range(1, len(fields)):
@@ -34,7 +34,10 @@ def any_line(chance: random.Random) -> bytes:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
-    """Bytes, lost ports, commands and requests come in random order."""
+    """Bytes, lost ports, commands and requests come in random order. The session raises no error.
+
+    Its next wake-up is always in the future.
+    """
     chance = random.Random(seed)
     bench = Bench()
     bench.open()
@@ -72,7 +75,10 @@ def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
 
 
 def test_bytes_that_come_before_anything_is_known_move_nothing() -> None:
-    """Before its first heartbeat a board may send lines that a previous driver has requested."""
+    """A board sends lines that a previous driver has requested, before its first heartbeat.
+
+    The driver stays in ``connecting`` and publishes no odometry.
+    """
     bench = Bench()
     bench.open()
     for line in (b"fwl 10.50 0x0 0x3c2\n", b"pose 1.0 0 0 0\n", b"gyro 1 2 3\nacc 0 0 9.8\n"):
@@ -84,7 +90,7 @@ def test_bytes_that_come_before_anything_is_known_move_nothing() -> None:
 
 
 def test_many_lines_that_are_not_understood_are_told_once() -> None:
-    """Unknown lines, as from a help text or a damaged cable, lead to one notice."""
+    """Many unknown lines arrive, as from a help text or a damaged cable. One notice appears."""
     bench = nominal()
     for _ in range(3):
         bench.session.inbound.receive(
@@ -96,7 +102,10 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
 
 
 def test_a_stream_that_the_firmware_does_not_know_is_told_and_not_asked_for_again() -> None:
-    """Older firmware has no time-of-flight sensor, for example; a notice says so once."""
+    """The firmware does not know a stream, for example that of the time-of-flight sensor.
+
+    One notice says so, and the driver does not request the stream again.
+    """
     bench = nominal()
     del bench.robot.drive._items["tofd"]
     bench.robot.drive.reboot()

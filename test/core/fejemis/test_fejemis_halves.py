@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two boards of one robot: their ports may be swapped, and one alone may restart or be silent."""
+"""Tests of the two boards of one robot: swapped ports, and a restart or silence of one board."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -14,7 +14,7 @@ HALVES = {"drive": DRIVE, "front": FRONT}
 
 
 def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:
-    """Drive until a command is refused; return the time until the refusal, in s."""
+    """Drive until a command is refused, and return the time until then, in s."""
     began = bench.now
     with pytest.raises(CommandRefused):
         bench.drive_on(seconds=limit_s)
@@ -31,7 +31,8 @@ def assert_stands(bench: Bench) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
-    """The heartbeats show the driver which board is connected to which port."""
+    """The two boards are connected in either order. The driver finds the order by the heartbeats.
+    """
     bench = nominal(Simulated(swapped=swapped))
     bench.drive_on()
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -45,7 +46,10 @@ def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
-    """A silent board stops the robot; once both boards send again, a new command moves it."""
+    """One board becomes silent. The robot is stopped, and a notice names the board.
+
+    A new command moves the robot once both boards send again.
+    """
     bench = nominal()
     bench.drive_on()
     bench.speaks = {1 - HALVES[half]}
@@ -69,7 +73,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
 
 @pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
 def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
-    """After a stall of the driver, only a board that still sends nothing is reported as silent."""
+    """The driver stalls. Afterwards it reports only a board that still sends nothing."""
     bench = nominal()
     bench.drive_on()
     bench.now += 3.0
@@ -84,7 +88,12 @@ def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
-    """The robot stops until the restarted board sends again; then a new command moves it."""
+    """One board restarts while the robot drives.
+
+    The robot stops, and the board is subscribed again.
+
+    A new command then moves the robot.
+    """
     bench = nominal()
     bench.drive_on()
     before = dict(bench.robot.half(half).subscriptions)
@@ -103,7 +112,10 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """If one port disappears, the link closes both ports and reopens each port that exists."""
+    """The port of one board disappears while the robot drives. The link opens only the other port.
+
+    The other board receives a stop, and motion is refused until both ports are open.
+    """
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -139,7 +151,10 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
-    """Two boards that do not form a pair are reported once, and motion is refused."""
+    """The two boards do not form a pair, for example two drive boards. A notice says so once.
+
+    Motion is refused.
+    """
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -152,7 +167,10 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
-    """The driver sends no ``start``, which could release a robot that another user stopped."""
+    """One port leads to a board of another robot. The driver sends only stops and queries to it.
+
+    A ``start`` could release a robot that another user stopped.
+    """
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -162,7 +180,7 @@ def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[i
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_never_speaks_is_missed(half: str) -> None:
-    """If one of the boards never sends, one notice names this board."""
+    """One board never sends anything. One notice names it."""
     bench = Bench()
     bench.speaks = {1 - HALVES[half]}
     bench.open()
@@ -172,7 +190,10 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
-    """After a reconnect, the driver knows which board was at the silent port, and names it once."""
+    """After a reconnect one port is silent.
+
+    The driver knows which board was there, and names it once.
+    """
     bench = nominal()
     bench.close()
     bench.speaks = {1 - HALVES[half]}
@@ -183,7 +204,7 @@ def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
 
 
 def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
-    """If both boards are silent after a reconnect, one notice names neither of them."""
+    """After a reconnect both boards are silent. One notice says so and names neither."""
     bench = nominal()
     bench.close()
     bench.speaks = set()
@@ -195,7 +216,10 @@ def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """If the boards begin or end checksums, the robot stops once, and then drives as before."""
+    """The boards begin or stop to send checksums while the robot drives. The robot stops once.
+
+    A new command then moves it as before.
+    """
     bench = nominal(Simulated(firmware=Firmware(sums=not begins)))
     bench.drive_on()
     bench.robot.drive.sums = bench.robot.front.sums = begins
@@ -210,7 +234,8 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """The front board sends its angle 66 times a second; the drive board needs it without delay."""
+    """The front board sends its angle 66 times a second. The driver relays each one without delay.
+    """
     bench = nominal()
     mark = bench.now
     bench.drive_on(0.2, 0.4, 1.0)
@@ -222,7 +247,10 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """The robot is stopped when the angle becomes too old, not only with the next command."""
+    """No more angles arrive while the robot drives. It is stopped when the last angle is 60 ms old.
+
+    The driver does not wait for the next command.
+    """
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -243,7 +271,10 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """Each error bit of the angle sensor has a notice, and stops the robot while it is set."""
+    """The angle sensor sets an error bit while the robot drives. A notice names the error.
+
+    The robot is stopped, and motion is refused while the bit is set.
+    """
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -260,7 +291,7 @@ def test_a_broken_angle_sensor_stops_the_robot() -> None:
 
 
 def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
-    """A broken angle sensor is reported once, even if the robot is not driven."""
+    """The angle sensor breaks while the robot is not driven. One notice reports it."""
     bench = nominal()
     bench.robot.befall("front", "hall-broken")
     bench.run(1.0)
@@ -268,7 +299,10 @@ def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """A sensor that repeats its last angle reports no error; missing rotation shows the fault."""
+    """The angle sensor repeats its last angle and reports no error.
+
+    The driver notices the fault when the wheel should turn and its angle does not change.
+    """
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):
@@ -278,7 +312,10 @@ def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_t
 
 
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
-    """The driver ignores lines of help text; the diagnostics show an unknown line."""
+    """The boards send help text and an unknown line, and the robot still obeys commands.
+
+    The diagnostics show the unknown line.
+    """
     bench = nominal()
     bench.robot.receive(b"help\nxyz\n", bench.now, DRIVE)
     bench.robot.receive(b"help\nxyz\n", bench.now, FRONT)
@@ -293,7 +330,10 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
     Firmware(shows_source=False),
 ])  # fmt: skip
 def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
-    """Firmware variants differ in units, in optional fields and in the form of their lines."""
+    """The firmware differs in units, in optional fields or in the form of its lines.
+
+    The robot drives as commanded, without faults or notices.
+    """
     bench = nominal(Simulated(firmware=firmware))
     bench.drive_on(0.3, 0.2, 0.8)
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
@@ -302,7 +342,10 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
 
 
 def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
-    """When the command comes, the last angle is old: both boards have been silent for 0.1 s."""
+    """Both boards have been silent for 0.1 s, so the last angle is too old when a command comes.
+
+    The driver refuses the command.
+    """
     bench = nominal()
     bench.speaks = set()
     bench.run(0.1)
@@ -313,9 +356,9 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """The list of requests that a board does not know belongs to the board, not to its port.
+    """The boards change ports during each disconnection. The robot is driven as before each time.
 
-    So another board on the same port is queried for everything again.
+    The driver remembers which requests a board does not know. It does so by board, not by port.
     """
     bench = nominal()
     for swapped in (True, False, True):
@@ -331,7 +374,10 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
 
 
 def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
-    """After a reconnect another board may be at the port, so the old values are not shown."""
+    """After a reconnect another board may be at the port.
+
+    The diagnostics do not show the old values.
+    """
     bench = nominal()
     bench.run(6.0)
     told = {"Drive ver", "Drive bat", "Drive cvdrive", "Front id"}
@@ -345,10 +391,10 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The boards keep running; the front board's clock is ``ahead_s`` ahead.
+    """The boards change ports but keep running. The front board's clock is ``ahead_s`` ahead.
 
-    If the drive board's times were converted by the front board's clock, the stamps of the odometry
-    would be wrong, or the drive board would seem to have restarted.
+    With the front board's clock, the drive board's times would give wrong stamps of the odometry.
+    The drive board could also seem to have restarted.
     """
     bench = Bench()
     bench.robot.front._clock_s += ahead_s
@@ -365,7 +411,10 @@ def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) 
 
 
 def test_a_board_that_says_that_it_starts_when_the_port_opens_has_restarted() -> None:
-    """The start message shows a restart before any heartbeat does, and the pose begins at zero."""
+    """When the port opens, the board's start message arrives before its first heartbeat.
+
+    The driver reports the restart.
+    """
     bench = nominal()
     bench.close()
     bench.session.opened(bench.now)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pairs of a gyro line and an acceleration line: both lines of a pair are of the same sample."""
+"""Pairs of a gyro line and an acceleration line. Both lines of a pair must be of one IMU sample."""
 
 import itertools
 import math
@@ -17,12 +17,16 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 
 LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
-"""Time in s after which the order of the lines is known, if reads are at most 100 ms apart."""
+"""Time in s after which the order of the two lines is known. It holds for reads up to 100 ms apart.
+"""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line that the board sends at ``sent_s``; ``number`` is the number of its sample."""
+    """A line that the board sends at ``sent_s``.
+
+    ``number``: number of the line's sample.
+    """
 
     sent_s: float
     kind: str
@@ -31,10 +35,13 @@ class Line:
 
 @dataclass(frozen=True)
 class Layout:
-    """The order of the lines in a cycle.
+    """The order of the lines in a cycle of the board.
 
-    ``apart_s``: time between the two lines of a sample, in s. Some kinds of lines come only in
-    every second cycle; ``odd``: whether these are the cycles of the samples with odd numbers.
+    ``order``: first letters of the lines' keywords.
+
+    ``apart_s``: time between the gyro line and the acceleration line, in s.
+
+    ``odd``: whether the other lines come with odd samples. They come in every second cycle.
     """
 
     order: str
@@ -72,13 +79,16 @@ Read = tuple[float, list[Line]]
 
 
 def damaged(lines: list[Line], chance: random.Random, lost: float, twice: float) -> list[Line]:
-    """Return the lines that arrive: each is lost with chance ``lost``, doubled with ``twice``."""
+    """Return the lines that arrive.
+
+    Each is lost with probability ``lost``, and comes twice with probability ``twice``.
+    """
     kept = [line for line in lines if chance.random() >= lost]
     return [line for line in kept for _ in range(1 + (chance.random() < twice))]
 
 
 def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) -> list[Read]:
-    """Return the time and the lines of each read of a reader that reads every ``period_s``."""
+    """Divide the lines into the reads of a host that reads every ``period_s``."""
 
     def read(line: Line) -> int:
         return math.floor((line.sent_s - phase_s) / period_s) + 1
@@ -87,7 +97,8 @@ def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) ->
 
 
 def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[float]) -> list[Read]:
-    """Return the reads of a slow connection: pieces of 1 to 60 bytes, with pauses in between."""
+    """Divide the lines into the reads of a slow connection: 1 to 60 bytes, with pauses in between.
+    """
     reads: list[Read] = []
     now, due, sent = 0.0, 0, 0
     for line in lines:
@@ -105,7 +116,7 @@ def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[flo
 
 
 def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -> list[Read]:
-    """Return the reads of a prompt reader that now and then stalls for up to 0.15 s."""
+    """Divide the lines into the reads of a fast host that stalls at times, for up to 0.15 s."""
     reads: list[Read] = []
     free_at = 0.0
     for _, some in itertools.groupby(lines, lambda line: line.sent_s):
@@ -123,16 +134,19 @@ def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -
 
 @dataclass(frozen=True)
 class Outcome:
-    """The pairs that were found; each is given by the sample numbers of its two lines."""
+    """The pairs that were found, each as the sample numbers of its two lines.
+
+    ``false``: pairs with lines of two samples.
+    """
 
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """Wrong pairs (lines of two samples), if nothing in the stream shows that they are wrong."""
+    """False pairs that nothing in the stream shows to be false."""
 
 
 def outcome(reads: list[Read]) -> Outcome:
-    """Give the lines of the reads to ``ImuPairs``; return the pairs that it finds."""
+    """Give the lines of the reads to ``ImuPairs``, and return the pairs that it finds."""
     pairs, given = ImuPairs(), []
     for now, lines in reads:
         for line in lines:
@@ -157,7 +171,7 @@ def outcome(reads: list[Read]) -> Outcome:
 
 
 def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
-    """Return whether the stream shows that ``pair``, with lines of two samples, is wrong."""
+    """Return whether the stream shows that ``pair``, whose lines are of two samples, is false."""
     wanted = {("gyro", pair[0]), ("acc", pair[1])}
     found = [(now, line) for now, lines in reads for line in lines]
     both = [
@@ -173,7 +187,10 @@ def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
 
 
 def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Read]) -> None:
-    """Check that each sample after ``KNOWN_S`` came once; the last samples may still be missing."""
+    """Check that each sample after ``KNOWN_S`` was found once.
+
+    The last samples may still be missing.
+    """
     assert result.false == []
     known = next(line.number for now, some in reads if now > KNOWN_S for line in some)
     wanted = range(known + 1, lines[-1].number - 3)
@@ -185,7 +202,10 @@ def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Re
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
 @pytest.mark.parametrize("period_s", [0.001, 0.004, 0.0075, 0.02, 0.033, 0.1])
 def test_every_sample_is_given_if_no_line_is_lost(layout: Layout, period_s: float) -> None:
-    """The reads come at regular intervals, shorter or longer than the period of the samples."""
+    """All lines arrive, in regular reads that are shorter or longer than the period of the samples.
+
+    Every sample is found.
+    """
     lines = layout.lines(4.0)
     for phase_s in (0.0, 0.0003, 0.0031):
         reads = reads_every(lines, period_s, phase_s)
@@ -200,7 +220,10 @@ pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
 def test_every_sample_is_given_in_pieces(
     layout: Layout, chance: random.Random, pauses_s: list[float]
 ) -> None:
-    """The connection may be slower than the board, so the pieces arrive later and later."""
+    """The lines arrive in small pieces, perhaps more slowly than the board sends them.
+
+    Every sample is found, even if the pieces arrive later and later.
+    """
     lines = layout.lines(3.0)
     reads = reads_of_pieces(lines, chance, pauses_s)
     assert_nothing_is_missing(outcome(reads), lines, reads)
@@ -211,7 +234,8 @@ def test_every_sample_is_given_in_pieces(
 def test_every_sample_is_given_by_a_reader_that_stalls(
     layout: Layout, chance: random.Random, stalls: float
 ) -> None:
-    """A stall may come between the two lines of a sample."""
+    """The host stalls at times, perhaps between the two lines of a sample. Every sample is found.
+    """
     lines = layout.lines(3.0)
     reads = reads_with_stalls(lines, chance, stalls)
     assert_nothing_is_missing(outcome(reads), lines, reads)
@@ -234,9 +258,9 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Up to a tenth of the lines are lost or come twice; reads are regular or stalled.
+    """Up to a tenth of the lines are lost, and up to a tenth come twice. The host may stall.
 
-    A wrong pair is allowed only if its lines arrived late, and no pose follows in the same read.
+    A false pair is allowed only if its lines arrived late and no pose follows in the same read.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines of both Teensys: checksums, messages, damage. Golden lines are copied from the manual."""
+"""Tests of the lines of both Teensy boards: checksums, messages and damage.
+
+The golden lines are copied from the manual.
+"""
 
 import random
 
@@ -120,7 +123,7 @@ def feed(decoder: FejemisDecoder, data: bytes) -> list[Message]:
 
 @pytest.mark.parametrize("line", GOLDEN_SUMS)
 def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
-    """A checksum is written and checked as the public host programs do it."""
+    """The driver writes and checks a checksum as the public host programs do."""
     text = line[3:]
     assert with_sum(text) == line
     assert without_sum(line) == (text, True)
@@ -129,7 +132,7 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """The tested lines cover the manual's examples and its lists of fields."""
+    """Every example line of the manual, and a line for each of its lists of fields, is decoded."""
     assert parse(text) == GOLDEN[text]
 
 
@@ -142,7 +145,8 @@ def test_what_no_board_sends_is_not_a_message(text: str) -> None:
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("sums", [False, True])
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
-    """The same bytes give the same messages at once, byte by byte and in random pieces."""
+    """The same bytes arrive at once, byte by byte or in random pieces. The messages are the same.
+    """
     of_each_kind = {text.split()[0]: (text, GOLDEN[text]) for text in GOLDEN}.values()
     texts = [text.encode() for text, _ in of_each_kind]
     lines = [with_sum(text) if sums else text for text in texts]
@@ -162,13 +166,16 @@ def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
 
 
 def test_extra_fields_are_left_alone() -> None:
-    """Newer firmware may add fields at the end of a line; the known fields are still decoded."""
+    """Newer firmware adds fields at the end of a line. The known fields are still decoded."""
     assert parse("vel 1.0 0.250 -0.250 7 8") == WheelSpeeds(0.25, -0.25, 1.0)
     assert parse("gyro 1 2 3 4 5") == Gyro(1.0, 2.0, 3.0)
 
 
 def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
-    """A line that lost its end also spoils the line that is joined to it, but no later line."""
+    """A line has lost its end, so the next line is joined to it and both are discarded.
+
+    No later line is discarded.
+    """
     decoder = FejemisDecoder("on")
     good = with_sum(b"gyro 1.0 2.0 3.0") + b"\n"
     assert feed(decoder, good[:9] + good + good) == [Gyro(1.0, 2.0, 3.0)]
@@ -179,7 +186,7 @@ def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
 
 
 def test_a_line_may_have_200_characters_and_no_more() -> None:
-    """A line of over 200 characters is discarded up to its end, in whatever pieces it comes."""
+    """A line of over 200 characters is discarded up to its end, whatever its pieces are."""
     decoder = FejemisDecoder()
     text = b"# " + b"x" * (LONGEST_LINE - 2)
     assert len(feed(decoder, text + b"\n")) == 1
@@ -189,7 +196,7 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 
 
 def test_half_a_line_at_the_end_is_none() -> None:
-    """Text without a line end is not decoded, because the line may be incomplete."""
+    """The bytes end without a line end. The last line is not decoded, as it may be incomplete."""
     decoder = FejemisDecoder()
     assert feed(decoder, b"gyro 1 2 3") == []
     assert decoder.flush(0.0) == []
@@ -201,7 +208,10 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 
 @pytest.mark.parametrize("sums", [False, True])
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
-    """If the first heartbeat has a checksum, lines without one are discarded, and vice versa."""
+    """The first heartbeat shows whether lines have checksums.
+
+    Lines of the other kind are discarded.
+    """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
     beat, gyro = (with_sum(t) if sums else t for t in (BEAT, b"gyro 1 2 3"))
@@ -214,7 +224,7 @@ def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> 
 
 
 def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None:
-    """One heartbeat that lost or gained its checksum may be damaged; two show a real change."""
+    """One heartbeat without its checksum may be damaged. Two in a row show a real change."""
     decoder = FejemisDecoder("auto")
     feed(decoder, with_sum(BEAT) + b"\n")
     feed(decoder, BEAT + b"\n" + with_sum(BEAT) + b"\n" + BEAT + b"\n")
@@ -229,7 +239,7 @@ def test_sums_that_begin_or_cease_are_believed_by_the_second_heartbeat() -> None
 def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
     setting: str, *, sums: bool
 ) -> None:
-    """Heartbeats that contradict the user's checksum setting do not change the setting."""
+    """Heartbeats contradict the user's setting for checksums. The setting stays as it is."""
     decoder = FejemisDecoder(setting)  # type: ignore[arg-type]
     right, wrong = (with_sum(BEAT), BEAT) if sums else (BEAT, with_sum(BEAT))
     for beat in (wrong, wrong, right):
@@ -239,7 +249,10 @@ def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
 
 
 def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None:
-    """A board always prints a value with the same number of decimals, so a change shows damage."""
+    """A board prints a value always with the same number of decimals.
+
+    A line with another number of decimals is damaged and discarded.
+    """
     decoder = FejemisDecoder("off")
     feed(decoder, b"pose 1.00000 1.234 0.567 0.1000\n" * 3)
     assert feed(decoder, b"pose 1.00000 1.24 0.567 0.1000\n") == []
@@ -248,7 +261,7 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Of five lines with a new number of decimals, the decoder discards only the first two.
+    """Five lines have a new number of decimals. The decoder discards only the first two.
 
     If the number of decimals varies from the beginning, the decoder accepts any number at once.
     """
@@ -262,7 +275,8 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
-    """Random bytes in random pieces never raise; the buffer stays shorter than the longest line."""
+    """Random bytes in random pieces raise no error. The buffer stays shorter than the longest line.
+    """
     decoder = FejemisDecoder()
     for piece in pieces:
         feed(decoder, piece)
@@ -272,13 +286,13 @@ def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
 
 @given(st.text(alphabet="0123456789.-+eExX hbtfwlposevgyrac;#\r", max_size=60))
 def test_no_line_raises(text: str) -> None:
-    """The random text consists of characters of real lines, so it often resembles a line."""
+    """A random text of characters that real lines have raises no error."""
     parse(text)
     feed(FejemisDecoder(), b";07" + text.encode() + b"\n")
 
 
 def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
-    """One damaged line in 99 passes, so ranges, decimals and steps of values are checked too."""
+    """One damaged line in 99 passes its checksum. So the driver also checks the values."""
     chance, passed = random.Random(1), 0
     line = with_sum(b"pose 45.37199 1.234 -0.056 0.7854")
     for _ in range(20_000):
@@ -291,7 +305,7 @@ def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
 
 
 def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone() -> None:
-    """The query ``svpi`` without its ``i`` would set the servo, so it always has a checksum."""
+    """The query ``svpi`` without its ``i`` would set the servo. It is sent only with a checksum."""
     for sums in (True, False):
         polls = Polls("front")
         texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]

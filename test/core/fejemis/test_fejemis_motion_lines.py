@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion lines that lose characters on the way to a board."""
+"""Motion lines that lose characters on their way to a board."""
 
 import itertools
 import math
@@ -28,8 +28,11 @@ def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[f
     """Return the motions that a board with checksums reads from these bytes.
 
     The board reads numbers as C does, and is as lenient as possible: missing numbers are 0, further
-    text is ignored, and a checksum may have one digit. ``keyword``: first word of the lines to
-    read; ``count``: how many numbers follow it.
+    text is ignored, and a checksum may have one digit.
+
+    ``keyword``: first word of the lines to read.
+
+    ``count``: how many numbers follow the keyword.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -56,14 +59,20 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The driver chooses the digits of its lines so that a loss of two characters is detected."""
+    """Two characters of the manual's example line are lost, and the board reads another motion.
+
+    So the driver chooses its digits such that the checksum shows this loss.
+    """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """Commands of the complete range are tried, each together with the line after it."""
+    """One or two characters are lost from any motion line. The board never reads another motion.
+
+    The line after it is included, because a line end may be lost.
+    """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -88,7 +97,7 @@ def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
 
 
 def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
-    """No motion results if any one to four characters of the stop lines are removed."""
+    """Any one to four characters are lost from the stop line. The board reads no motion."""
     data = line(STOP, sums=True)
     for count in range(1, 5):
         for lost in itertools.combinations(range(len(data)), count):
@@ -97,10 +106,11 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """``rc 2 0 0`` and the next line must not become ``rc 2 0 092``, which is 92 degrees/s.
+    """A line end after ``rc 2 0 0`` and the ``;`` of the next line are lost.
 
-    If the line end and the ``;`` of the next line are lost, the checksum of the next line extends
-    the last 0. A checksum of 02 or 92 leaves the sum of the line unchanged.
+    The checksum of the next line then extends the last 0. With 92, the result ``rc 2 0 092`` means
+    92 degrees/s. A checksum of 02 or 92 leaves the sum of the line unchanged, so the driver avoids
+    this.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -110,9 +120,11 @@ def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) 
 
 
 def test_what_three_lost_characters_leave() -> None:
-    """Less than 1 % of the lines that lost three characters command another motion.
+    """Three characters of a motion line are lost.
 
-    The figures are in docs/boards/fejemis.md.
+    Less than 1 % of such lines command another motion.
+
+    The numbers are in docs/boards/fejemis.md.
     """
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
@@ -127,9 +139,9 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front wheel's angle is right within 0.02°, and a gentle curve within 1 %.
+    """The front line gives the angle within 0.02°, and a gentle curve within 1 %.
 
-    The outer wheel's speed is right within 0.6 %.
+    The drive line gives the outer wheel's speed within 0.6 %.
     """
     if v == w == 0.0:
         return
@@ -144,9 +156,11 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
-    """The numbers v and w avoid certain digits, but together they reach every wheel speed.
+    """The two numbers in the drive line avoid certain digits.
 
-    Negative numbers have fewer digits; even so, the speed is right within 1.8 %.
+    Together they still reach every wheel speed.
+
+    Negative numbers have fewer digits, so the speed is only right within 1.8 %.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.03**n for n in range(240))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -157,7 +171,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """The lift line has 60 to 100 % of the requested voltage, and at most the requested time.
 
-    If it is damaged, the voltage is at most 12 V, and the time at most the requested one.
+    Two characters of it are lost. The voltage is then at most 12 V, and the time no longer.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -174,9 +188,9 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """A related firmware compares the complete line with ``stop``, so nothing is appended.
+    """Nothing is added to a line except a checksum and perhaps an empty line before it.
 
-    An empty line may precede the line.
+    A related firmware obeys ``stop`` only if it is the complete line.
     """
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
@@ -206,7 +220,10 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
 
 
 def test_without_sums_the_front_board_gets_both_numbers() -> None:
-    """Without checksums the front board gets both numbers, as their ratio gives its angle."""
+    """Without checksums, the front board still gets both numbers.
+
+    Their ratio gives the wheel's angle.
+    """
     assert plain_front_line(0.25, 0.5) == b"rc 2 0.25 28.65"
     assert plain_front_line(0.0, -0.5) == b"rc 2 0 -28.65"
     assert plain_drive_line(0.0004, 0.0) == STOP

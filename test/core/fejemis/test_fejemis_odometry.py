@@ -25,14 +25,14 @@ TRACK_M = 0.4
 
 
 def told(place: Pose, time_s: float) -> BoardPose:
-    """Return the pose message of the drive board, rounded as the board prints it."""
+    """Return the drive board's pose message, rounded as the board prints it."""
     return BoardPose(
         round(time_s, 5), round(place.x_m, 3), round(place.y_m, 3), round(place.yaw_rad, 4), 3
     )
 
 
 class Drive:
-    """A simulated drive: its pose and speed messages go to odometry every 20 ms."""
+    """A simulated drive board whose pose and speed messages go to the odometry every 20 ms."""
 
     def __init__(self, *, with_speeds: bool = True) -> None:
         self.odometry = PoseOdometry(TRACK_M)
@@ -63,7 +63,7 @@ class Drive:
 
 
 def test_displacements_add_up_to_the_pose() -> None:
-    """The rounding of single messages must not accumulate."""
+    """The messages of a drive are rounded. The sum of the displacements still equals the pose."""
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     for v, w in ((0.3, 0.5), (0.1, -0.7), (0.0, 1.0), (0.5, 0.0)):
@@ -74,7 +74,10 @@ def test_displacements_add_up_to_the_pose() -> None:
 
 
 def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
-    """Poses have steps of 1 mm in 20 ms, which alone would give speed steps of 0.05 m/s."""
+    """The board prints poses in steps of 1 mm, which alone would give steps of 0.05 m/s.
+
+    With the wheel speeds, the published speed is smoother.
+    """
     spread = {}
     for with_speeds in (True, False):
         drive = Drive(with_speeds=with_speeds)
@@ -86,7 +89,8 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:
-    """No pose arrives while the robot drives a curve for 2 s; the next pose corrects odometry."""
+    """No pose arrives while the robot drives a curve for 2 s. The next pose corrects the odometry.
+    """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.2, 1.0)
@@ -107,7 +111,8 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
     ],
 )
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
-    """A false pose is skipped, and the next correct pose continues from the last correct one."""
+    """A false pose arrives, and the odometry skips it. The next correct pose continues as before.
+    """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
     drive.run(0.3, 0.4, 2.0)
@@ -119,7 +124,7 @@ def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) ->
 
 
 def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
-    """Another program sets the board's pose to zero (``enc0``); the pose of the odometry stays."""
+    """Another program sets the board's pose to zero (``enc0``). The pose of the odometry stays."""
     drive = Drive()
     drive.run(0.5, 0.2, 4.0)
     before = drive.out
@@ -133,7 +138,10 @@ def test_a_pose_that_was_set_to_zero_is_a_new_frame() -> None:
 
 @pytest.mark.slow
 def test_the_covariance_is_consistent_over_fifty_drives() -> None:
-    """Wheels slip and have wrong sizes; the normalised squared error (NEES) is 3 on average."""
+    """In fifty drives, wheels slip and have wrong sizes, as the covariance assumes.
+
+    The normalised squared error (NEES) is about 3 on average.
+    """
     noise = OdometryNoise(wheels=WHEELS)
     squares = []
     for seed in range(50):
@@ -165,7 +173,7 @@ def test_the_covariance_is_consistent_over_fifty_drives() -> None:
 
 
 def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
-    """Return the normalised squared error of the pose (NEES), by its covariance."""
+    """Return the normalised squared error (NEES) of the pose."""
     e = (
         pose.x_m - truth.x_m,
         pose.y_m - truth.y_m,
@@ -188,7 +196,7 @@ def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
 
 
 def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> None:
-    """Drive a figure eight of ten metres; repeat commands that are refused."""
+    """Drive a figure eight of ten metres. Repeat commands that are refused."""
     rate = speed / radius_m
     lap_s = math.tau / rate
     end_s, began = 2 * lap_s, bench.now
@@ -203,9 +211,9 @@ def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> Non
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> None:
-    """The error after 10 m is below 1 % and 2°.
+    """The robot drives 10 m while one character in a thousand is lost, in both directions.
 
-    One character in a thousand is lost, in both directions.
+    Odom ends within 1 % and 2° of the true pose.
     """
     chance = random.Random(seed)
     bench = nominal(Simulated(seed=seed, lose_inbound=1e-3))
@@ -220,7 +228,7 @@ def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> Non
 
 
 def test_joint_states_follow_the_wheels() -> None:
-    """The rolled distances in the odometry equal those of the simulated wheels."""
+    """The robot drives a curve. Odometry has the same rolled distances as the simulated wheels."""
     bench = nominal()
     bench.drive_on(0.3, 0.3, 3.0)
     bench.run(1.5)
@@ -231,7 +239,10 @@ def test_joint_states_follow_the_wheels() -> None:
 
 
 def test_odometry_goes_out_with_every_pose() -> None:
-    """The board sends a pose fifty times a second; the twist comes from the wheel speeds."""
+    """The board sends fifty poses a second, and odometry is published with each.
+
+    The twist comes from the wheel speeds.
+    """
     bench = nominal()
     bench.drive_on(0.3, 0.2, 2.0)
     bench.events.clear()
@@ -242,6 +253,6 @@ def test_odometry_goes_out_with_every_pose() -> None:
 
 
 def test_the_logarithm_leads_to_the_pose() -> None:
-    """The logarithm of a pose is the twist whose integral along an arc leads to this pose."""
+    """The logarithm of a pose is a twist. The arc of this twist leads to the pose."""
     way = Pose(0.3, 0.1, 0.7)
     assert roll(log_of(way)).way_to(way).way_m < 1e-12

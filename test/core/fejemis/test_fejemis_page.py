@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each command in both boards' help has a golden line, and a use or a reason for having none."""
+"""Every command in the boards' help has a golden line, and a use or the reason why it has none."""
 
 import math
 import re
@@ -25,9 +25,13 @@ from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP, FRONT_HELP
 
 @dataclass(frozen=True)
 class Row:
-    """One command: a ``golden`` line, and its ``use``: a topic, service, parameter or key.
+    """One command of the boards.
 
-    ``by`` is what the driver does instead, if it never sends the command.
+    ``golden``: an example line.
+
+    ``use``: the topic, service, parameter or diagnostic key that sends or shows it.
+
+    ``by``: what the driver does instead, if it never sends the command.
     """
 
     golden: str
@@ -136,7 +140,7 @@ def listed(text: str) -> tuple[set[str], set[str]]:
 
 @pytest.mark.parametrize("text", [DRIVE_HELP, FRONT_HELP], ids=["drive", "front"])
 def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
-    """Each command of the help has a row in the table SAID, each subscription one in HEARD."""
+    """Each command in the help is in the table SAID, and each subscription in the table HEARD."""
     said, heard = listed(text)
     assert said <= SAID.keys()
     assert heard <= HEARD.keys()
@@ -145,7 +149,7 @@ def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
 
 
 def test_no_row_is_of_something_else() -> None:
-    """The rows contain only what a help list contains, and ``sub``, which subscribes."""
+    """The tables contain only what the help contains, and ``sub``, which subscribes."""
     drive, front = listed(DRIVE_HELP), listed(FRONT_HELP)
     assert SAID.keys() - {"sub"} <= drive[0] | front[0]
     assert HEARD.keys() <= drive[1] | front[1]
@@ -153,7 +157,7 @@ def test_no_row_is_of_something_else() -> None:
 
 @pytest.mark.parametrize("keyword", HEARD)
 def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
-    """Each message is requested by a subscription, by a poll or with the configuration."""
+    """Each message has a golden line. The driver subscribes to it, polls it or reads it once."""
     golden = [text for text in GOLDEN if text.split()[0] == keyword]
     assert golden
     assert parse(golden[0]) is not None
@@ -165,7 +169,7 @@ def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
 
 
 def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
-    """The front board's ``bat``, for example, has no topic, so diagnostics show it."""
+    """Diagnostics show each message that is not a stream, for example the front board's ``bat``."""
     bench = nominal()
     bench.run(6.5)
     shown = bench.board.figures.own
@@ -209,7 +213,10 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """A command without a use, such as ``setid``, which can erase the board, is never sent."""
+    """The driver sends each used command as in its golden line.
+
+    It never sends the others, such as ``setid``, which can erase the board.
+    """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden
     words = {text.split()[0] for text in said}

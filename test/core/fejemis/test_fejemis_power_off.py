@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A power off: what cancels it, and what does not."""
+"""Tests of what cancels a requested power off, and of what does not."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -13,7 +13,7 @@ from omnibot_driver.core.requests import Request
 
 @pytest.fixture
 def bench() -> Bench:
-    """Return a bench whose drive board will cut the power in 99 s."""
+    """Return a bench whose drive board has been asked to cut the power in 99 s."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -25,7 +25,7 @@ def bench() -> Bench:
 
 
 def assert_still_refused(bench: Bench) -> None:
-    """Check that the drive board still counts down to the power off, and that motion is refused."""
+    """Check that the drive board still counts down to the power off and that motion is refused."""
     assert bench.robot.drive.off_at_s is not None
     with pytest.raises(CommandRefused, match="call ~/start"):
         bench.drive()
@@ -36,7 +36,10 @@ def assert_still_refused(bench: Bench) -> None:
 
 
 def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
-    """During an e-stop, a start sends only ``on``, which cancels the power off."""
+    """The user calls ~/start during an e-stop.
+
+    The driver sends only ``on``, and the power stays on.
+    """
     bench.estop(True)
     bench.session.request(Request.START, None, bench.now)
     bench.settle()
@@ -45,7 +48,8 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 
 def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> None:
-    """The board does not confirm ``on``, and one line may be lost, so three are sent."""
+    """The board does not confirm ``on``, and a line may be lost. The driver sends it three times.
+    """
     mark = bench.now
     bench.hears = {FRONT}
     bench.session.request(Request.START, None, bench.now)
@@ -58,7 +62,10 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 
 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
-    """A power off that is requested after a start drops the remaining repetitions of ``on``."""
+    """The user requests a power off just after ~/start, while ``on`` is still being repeated.
+
+    The driver stops repeating ``on``, so the power off stays.
+    """
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -67,7 +74,10 @@ def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
 
 
 def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """After a silence the driver itself starts the board; only a ~/start cancels a power off."""
+    """After a silence of the board, the driver starts it by itself. The power off stays.
+
+    Only ~/start by the user cancels it.
+    """
     mark = bench.now
     bench.speaks = set()
     bench.run(2.5)
@@ -80,7 +90,7 @@ def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
 
 
 def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """After a reconnect, the drive board still counts down, so motion is refused."""
+    """After a reconnect, the drive board still counts down, and motion is still refused."""
     bench.close()
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
@@ -91,7 +101,10 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """After a reconnect, the estimate of the board's clock shows that the board has restarted."""
+    """The drive board restarts while the port is closed, so the power off is cancelled.
+
+    The driver notices the restart by the board's clock, and accepts motion.
+    """
     bench.run(5.0)
     bench.close()
     bench.speaks = set()
@@ -106,7 +119,10 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
 
 
 def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
-    """Only the drive board cuts the power, so a restart of the front board does not matter."""
+    """The front board restarts after a request to power off. Only the drive board cuts the power.
+
+    The request succeeds, and motion is refused.
+    """
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -120,7 +136,10 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
 
 
 def test_a_power_off_without_an_answer_may_still_come() -> None:
-    """The board may have obeyed ``off`` while its heartbeats were lost; ~/start cancels it."""
+    """The drive board's heartbeats are lost after a request to power off, so the request fails.
+
+    The board may still have obeyed, so motion is refused until ~/start.
+    """
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board that restarts: short and long boots, lost start lines, and reads of several lengths."""
+"""A board restarts: short and long boots, lost start lines, and reads of several lengths."""
 
 import contextlib
 import itertools
@@ -26,7 +26,10 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 
 
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
-    """The driver handles the pose first, then the start line, which resets the board's clock."""
+    """One read contains a pose and then a start line. The pose is from before the restart.
+
+    The driver handles the pose first, and then resets the board's clock.
+    """
     bench = nominal()
     drive = bench.robot.drive
     pose = with_sum(drive._pose().encode("ascii")) + b"\n"
@@ -44,7 +47,10 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """A read brings the lines of 20 ms, so it may have poses from before and after a restart."""
+    """The drive board restarts at any time within a read of 20 ms.
+
+    So a read may contain poses from before and after the restart. Odom still has no jump.
+    """
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
     for phase in range(10):
@@ -69,7 +75,10 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """If a board sends no start line, the time in its lines shows that it has restarted."""
+    """A board restarts, and the driver reports it and subscribes to the board's lines again.
+
+    If the board sends no start line, the times in its lines show the restart.
+    """
     bench = nominal(Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)))
     bench.run(2.0)
     bench.read_s = read_s
@@ -88,10 +97,9 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 
 
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
-    """Restart a board while the robot is driven; return the reasons why commands were refused.
+    """Restart a board while commands are sent, and return the reasons for which they were refused.
 
-    Between the loss of the board's data and the end of its configuration, the robot must not be
-    driven.
+    Check that the robot is not driven until the front board has its configuration again.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)
@@ -117,7 +125,11 @@ def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
 def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
     boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """Without a start line, only heartbeats show that the front board lost its settings."""
+    """The front board restarts and loses its settings while the robot drives.
+
+    Motion is refused until they are written again. Without a start line, heartbeats show the
+    restart.
+    """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         FejemisSettings(written=FRONT_OFFSET),
@@ -130,7 +142,10 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """A late read may bring a heartbeat that the board sent before a restart."""
+    """After a silence of the front board, a heartbeat from before the silence is read late.
+
+    It does not show that the board has not restarted. A new heartbeat shows it.
+    """
     bench = nominal()
     bench.run(2.0)
     half, front = bench.board._ports.halves[FRONT], bench.robot.front
@@ -149,7 +164,10 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """After a gap in its data a board may have restarted, unless a heartbeat rules it out."""
+    """The data of one board stops for a while, so the board may have restarted.
+
+    The state becomes nominal only after a heartbeat shows that it has not restarted.
+    """
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
     bench.run(pause_s)
@@ -163,7 +181,11 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """A requested heartbeat shows a restart at once; periodic ones come only every 0.4 s."""
+    """While a board is silent, the driver requests heartbeats ten times a second.
+
+    They show sooner than the periodic ones, which come every 0.4 s, whether the board has
+    restarted.
+    """
     bench = nominal()
     bench.speaks = {DRIVE}
     bench.run_until(lambda: bench.board._ports.halves[FRONT].unsure)
@@ -178,7 +200,7 @@ def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
 
 @pytest.mark.parametrize("read_s", [0.001, 0.05])
 def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) -> None:
-    """If one line in twenty is lost for 10 s, the driver does not suspect a restart."""
+    """One line in twenty is lost for 10 s. The driver does not suspect a restart."""
     bench = nominal()
     chance = random.Random(3)
 
@@ -197,7 +219,7 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
-    """After a stall, the next heartbeat shows that the boards have not restarted."""
+    """The computer stalls. The next heartbeat shows that the boards have not restarted."""
     bench = nominal()
     bench.run(2.0)
     read_s, bench.read_s = bench.read_s, stall_s

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests to the boards besides motion, and the sensor readings."""
+"""Tests of the services of the boards besides motion, and of the sensor readings."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -31,7 +31,10 @@ def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
 
 
 def test_the_gyro_is_calibrated_by_the_board() -> None:
-    """A calibration succeeds when the gyro offset that is read from the board has changed."""
+    """The board calibrates its gyro.
+
+    The request succeeds when the board reports another gyro offset.
+    """
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     done = ask(bench, Job.CALIBRATE_GYRO)
     assert done.success
@@ -42,7 +45,10 @@ def test_the_gyro_is_calibrated_by_the_board() -> None:
 
 
 def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
-    """One damaged answer may pass its checksum, so two equal readings are needed."""
+    """The driver needs two equal readings of new offsets before it reports success.
+
+    A single reading may be a damaged answer that passes its checksum.
+    """
     jobs = Jobs()
     jobs.ask(Job.CALIBRATE_GYRO, None, 0.0)
     jobs.due(0.0)
@@ -56,7 +62,7 @@ def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
 
 
 def lose(bench: Bench, word: bytes, times: int) -> None:
-    """On the way to the boards, lose the first ``times`` packets that contain ``word``."""
+    """Lose the first ``times`` packets to the boards that contain ``word``."""
     receive, left = bench.robot.receive, [times]
 
     def lossy(data: bytes, now: float, channel: int) -> None:
@@ -69,7 +75,7 @@ def lose(bench: Bench, word: bytes, times: int) -> None:
 
 
 def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
-    """The board does not confirm a calibration command; unchanged offsets show its loss."""
+    """The command to calibrate is lost, so the offsets do not change. The driver sends it again."""
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
     lose(bench, b"gyroc", 1)
     assert ask(bench, Job.CALIBRATE_GYRO).success
@@ -81,7 +87,10 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """Sensor noise changes the offsets at each calibration; unchanged offsets are a failure."""
+    """Every command to calibrate is lost, so the offsets do not change. The request fails.
+
+    After a real calibration, sensor noise alone would make the offsets differ.
+    """
     bench = nominal()
     lose(bench, word.encode(), 99)
     done = ask(bench, job)
@@ -91,7 +100,7 @@ def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
 
 
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
-    """The robot must be on level ground, where gravity is the only acceleration."""
+    """The board calibrates its accelerometer, and the published force is then gravity alone."""
     bench = nominal(Simulated(accel_bias_mps2=(0.2, -0.1, 0.3)))
     assert ask(bench, Job.CALIBRATE_ACCELEROMETER).success
     bench.events.clear()
@@ -100,7 +109,10 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
 
 
 def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets() -> None:
-    """The driver refuses a calibration if a parameter sets the offsets and would undo it."""
+    """A parameter sets the accelerometer's offsets and would undo a calibration.
+
+    The driver refuses the calibration.
+    """
     offsets = (0.1, 0.2, 0.3, 1.0, 1.0, 1.0)
     bench = nominal(settings=FejemisSettings(written={Written.ACCELEROMETER: offsets}))
     bench.run(2.0)
@@ -112,9 +124,9 @@ def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets(
 
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
-    """While the robot is driven, no job is accepted but the loading of a configuration.
+    """While the robot is driven, only the loading of a configuration is accepted.
 
-    Loading a configuration first stops the robot.
+    The driver stops the robot before it loads.
     """
     bench = nominal()
     bench.drive_on()
@@ -127,7 +139,10 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
 
 
 def test_a_job_that_nothing_confirms_fails() -> None:
-    """A job that no board confirms fails within its time limit; until then no other job starts."""
+    """The board receives nothing, so the job is not confirmed and fails within its time limit.
+
+    Until then, other jobs are refused.
+    """
     bench = nominal()
     bench.hears = {FRONT}
     token = object()
@@ -141,7 +156,7 @@ def test_a_job_that_nothing_confirms_fails() -> None:
 
 
 def test_a_job_is_answered_when_the_port_is_lost() -> None:
-    """A job fails at once when the port is lost, even if the port does not come back."""
+    """The port is lost during a job. The job fails at once."""
     bench = nominal()
     token = object()
     bench.board.services.ask(Job.CALIBRATE_GYRO, token, bench.now)
@@ -153,7 +168,7 @@ def test_a_job_is_answered_when_the_port_is_lost() -> None:
 
 
 def test_a_robot_that_rolls_is_not_calibrated() -> None:
-    """A robot that was stopped but still rolls is not calibrated."""
+    """The robot was stopped but still rolls. The driver refuses to calibrate."""
     bench = nominal()
     bench.drive_on(0.5)
     bench.drive(0.0)
@@ -162,7 +177,7 @@ def test_a_robot_that_rolls_is_not_calibrated() -> None:
 
 
 def test_a_configuration_is_saved_and_loaded() -> None:
-    """Both boards save the configuration, and both load it."""
+    """The user saves the configuration and loads it again. Both boards do so."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     assert bench.robot.drive.saved.confs_m == (0.4, 0.42)
     assert ask(bench, Job.SAVE).success
@@ -172,7 +187,7 @@ def test_a_configuration_is_saved_and_loaded() -> None:
 
 
 def test_power_off_is_called_back_by_a_start() -> None:
-    """After a request to power off, motion, brush and lift are refused until a start cancels it."""
+    """After a request to power off, motion, brush and lift are refused until ~/start cancels it."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
     done = ask(bench, Job.POWER_OFF)
     assert done.success
@@ -189,7 +204,7 @@ def test_power_off_is_called_back_by_a_start() -> None:
 
 
 def test_power_off_cuts_the_power() -> None:
-    """The board cuts its power after the configured delay."""
+    """The user requests a power off. The board cuts its power after the configured delay."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))
     assert ask(bench, Job.POWER_OFF).success
     bench.run(4.0)
@@ -197,7 +212,10 @@ def test_power_off_cuts_the_power() -> None:
 
 
 def test_all_sensors_are_told_in_si_units() -> None:
-    """Battery, magnetometer, orientation, four ranges and the steered wheel are published."""
+    """All sensor readings are published in SI units.
+
+    These are battery, magnetometer, orientation, four ranges and the angle of the front wheel.
+    """
     bench = nominal(Simulated(front_m=0.3))
     bench.run(1.0)
     battery = bench.extras(BatteryReading)[-1]
@@ -215,7 +233,7 @@ def test_all_sensors_are_told_in_si_units() -> None:
 
 
 def test_a_low_battery_is_told_once_a_minute() -> None:
-    """The voltage per cell decides whether the battery is low."""
+    """The voltage per cell is low. The driver reports it once within a minute."""
     bench = nominal(Simulated(volts=20.4))
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low
@@ -224,7 +242,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
 
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
-    """A calibration in motion would measure a wrong offset, so motion is refused meanwhile."""
+    """During a calibration or a loading, motion is refused, as the robot must be at rest."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -239,7 +257,7 @@ def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.LOAD])
 @pytest.mark.parametrize("stop", ["e-stop", "pause"])
 def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: str) -> None:
-    """An e-stop or a pause ends a running job at once, as a failure."""
+    """An e-stop or a pause comes during a job. The job fails at once."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -256,7 +274,10 @@ def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: s
 
 
 def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None:
-    """An e-stop ends the job that loads saved values, but the boards may have loaded them."""
+    """An e-stop ends a loading, but the boards may already have loaded their saved values.
+
+    The driver writes the user's settings again.
+    """
     bench = nominal(settings=FejemisSettings(written={Written.FRONT_WHEEL: (2.5, 0.0)}))
     bench.run(2.0)
     bench.board.services.ask(Job.LOAD, None, bench.now)
@@ -270,7 +291,10 @@ def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None
 
 
 def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
-    """``eer`` makes both boards load their saved values, also the board that does not restart."""
+    """One board restarts during a loading, but both have loaded their saved values (``eer``).
+
+    The driver writes the user's settings to both again.
+    """
     wheels = (0.08, 0.08, 9.7, 48.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: wheels}))
     bench.run(2.0)
@@ -284,7 +308,10 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """Before saved values are loaded (``eer``), a stop is sent, and the robot gets time to stop."""
+    """The user loads a configuration while the robot drives. The driver first sends a stop.
+
+    It sends ``eer`` only after the robot had time to stop.
+    """
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -298,7 +325,10 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
-    """A restart of the drive board cancels the power off, so the robot may be driven again."""
+    """The drive board restarts after a request to power off, which cancels the power off.
+
+    The driver accepts motion again.
+    """
     bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
     assert ask(bench, Job.POWER_OFF).success
     with pytest.raises(CommandRefused, match="power"):
@@ -315,8 +345,10 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """If ``off 300`` loses its 3 and a 0, its checksum still fits, and the power is cut at once.
+    """The line ``off 300`` may lose its 3 and a 0, and its checksum still fits.
 
-    So the driver increases the delay to a number that does not have two such digits.
+    The power is cut at once.
+
+    So the driver increases the delay to a number without two such digits.
     """
     assert whole_seconds(wanted_s) == seconds

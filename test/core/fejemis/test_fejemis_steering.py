@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The set points of each board, and the body's motion that the manual's equations give for them."""
+"""The set-points of each board, and the motion that results by the manual's equations."""
 
 import math
 
@@ -31,7 +31,7 @@ angles = st.floats(-math.pi / 2, math.pi / 2)
 
 
 def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
-    """Return the body's speed and turn rate by the manual's section Turning control."""
+    """Return the robot's speed and turn rate by the manual's section Turning control."""
     b, f = 0.4, 0.5
     v2 = math.hypot(v, w) * (-1.0 if v < 0.0 else 1.0)
     if theta_rad == 0.0:
@@ -54,14 +54,14 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """By the manual's equations, ``rc`` with v and w does not move the body at v and w."""
+    """By the manual's equations, ``rc`` with a speed and a turn rate gives a different motion."""
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
 
 @given(speeds, rates, angles)
 def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: float) -> None:
-    """The driver's equations and the manual's agree for every angle that the wheel may have."""
+    """For every angle of the front wheel, the driver computes the same motion as the manual."""
     assume(math.hypot(v, w) > 1e-3 and abs(theta_rad) > 1e-6)
     body = told_twist(v, w, ROBOT, theta_rad)
     expected = manual(v, w, theta_rad)
@@ -70,7 +70,7 @@ def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: fl
 
 @given(speeds, rates)
 def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
-    """The set points move the body as commanded once the front wheel is at its commanded angle."""
+    """The front wheel is at its commanded angle. The set-points then give the commanded motion."""
     assume(outer_mps(BodyTwist(v, 0.0, w), 0.4) > 1e-3 and v >= 0.0)
     factor = scale(BodyTwist(v, 0.0, w), 0.4)
     theta_rad = math.atan2(0.5 * factor * w, factor * v)
@@ -82,7 +82,10 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The body may be faster only by as much as an error of 5° in the wheel's angle explains."""
+    """The front wheel still turns to its angle. The robot is not faster than commanded meanwhile.
+
+    An error of 5° in the wheel's angle is allowed for.
+    """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -96,7 +99,7 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 
 @given(rates, angles)
 def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> None:
-    """The drive board is stopped until the wheel is within 5° of ±90°."""
+    """At a turn on the spot, the drive board is stopped until the wheel is within 5° of ±90°."""
     assume(abs(w) > 0.01)
     told = steer(BodyTwist(0.0, 0.0, w), ROBOT, angle_rad, turning=False)
     stands = abs(angle_rad - math.copysign(math.pi / 2, w)) <= ALIGNED_RAD
@@ -105,7 +108,10 @@ def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> N
 
 
 def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
-    """Without a current angle, the drive board would compute with an old one, so it is stopped."""
+    """The front wheel's angle is not known, so the drive board would compute with an old one.
+
+    The driver stops the drive board.
+    """
     told = steer(BodyTwist(0.3, 0.0, 0.1), ROBOT, None, turning=False)
     assert told.part == 0.0
     assert told.speed_mps > 0.3
@@ -113,7 +119,7 @@ def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
 
 @given(speeds, rates)
 def test_the_steered_wheel_rolls_without_slip(v: float, w: float) -> None:
-    """The front wheel's velocity is along the wheel's own direction, forward or backward."""
+    """For every twist, the front wheel moves along its own direction, forward or backward."""
     assume(math.hypot(v, w) > 1e-3)
     wheels = SteeredKinematics(0.1, 0.4, 0.5)
     theta = wheels.steering_rad(BodyTwist(v, 0.0, w))
@@ -130,9 +136,9 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The speed is right within 1.2 % of the outer wheel's speed.
+    """The simulated robot moves at the commanded speed, within 1.2 % of the outer wheel's speed.
 
-    The turn rate is right within 3 % of the outer wheel's speed divided by the track width.
+    Its turn rate is right within 3 % of the outer wheel's speed divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -143,7 +149,7 @@ def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
 
 
 def test_the_digits_cost_less_than_one_per_cent() -> None:
-    """The rounding of the numbers in the lines changes the motion by less than 1 %."""
+    """The numbers in the lines are rounded. This changes the motion by less than 1 %."""
     for v in (0.05, 0.1, 0.15, 0.25, 0.5, 1.0):
         for w in (-1.5, -0.3, 0.0, 0.1, 0.12, 0.8):
             factor = scale(BodyTwist(v, 0.0, w), 0.4)
@@ -157,7 +163,10 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 
 
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
-    """If both boards got ``rc 2 0 w`` at once, the robot would roll 0.17 m before it turns."""
+    """The robot is commanded to turn on the spot, and it does not roll before it turns.
+
+    If both boards got ``rc 2 0 w`` at once, it would roll 0.17 m.
+    """
     bench = nominal()
     for _ in range(12):
         bench.drive(0.0, 1.0)
@@ -167,7 +176,10 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """The front wheel needs over 1 s for 180°; the robot rests until then, without a fault."""
+    """The turn on the spot is reversed, so the front wheel must turn by 180°, for over 1 s.
+
+    The robot rests until then, and no fault is reported.
+    """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     before_m = bench.robot.truth.x_m
@@ -179,7 +191,7 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
-    """At a wheel angle of 95°, the drive board would turn its inner wheel faster than the outer.
+    """The front wheel overshoots to 95°, where the drive board would turn its inner wheel faster.
 
     So the driver relays at most 90°.
     """
@@ -198,7 +210,10 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
 
 @pytest.mark.parametrize(("v", "w"), [(-0.2, 0.0), (-0.2, 0.3), (-0.01, 0.5)])
 def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
-    """If no parameter allows reverse, the robot only turns, and one notice explains why."""
+    """The user commands reverse, which no parameter allows. The robot only turns.
+
+    One notice explains why.
+    """
     bench = nominal()
     bench.drive_on(v, w, 3.0)
     truth = bench.robot.truth
@@ -209,7 +224,7 @@ def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
 
 
 def test_a_mirrored_reverse_is_driven() -> None:
-    """With firmware that mirrors the angle in reverse, the robot follows the commanded curve."""
+    """The firmware mirrors the angle in reverse. The robot follows a commanded curve backward."""
     bench = nominal(
         Simulated(firmware=Firmware(reverse="mirrored")), FejemisSettings(allow_reverse=True)
     )
@@ -220,7 +235,7 @@ def test_a_mirrored_reverse_is_driven() -> None:
 
 
 def test_a_speed_of_nothing_that_is_negative_is_none() -> None:
-    """A speed of -1e-9 m/s, a controller's rounding error, is not refused as reverse."""
+    """The user commands −1e-9 m/s, a rounding error. The driver does not refuse it as reverse."""
     bench = nominal()
     bench.drive_on(-1e-9, 0.5, 3.0)
     assert bench.robot.truth.yaw_rate_radps == pytest.approx(0.5, abs=0.02)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of e-stop and pause, of brush, lift and lights, and of the last lines before the exit."""
+"""Tests of e-stop and pause, of brush, lift and lights, and of the driver's last lines."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,11 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """The command is set to zero before ``start``, as some firmware resumes the old command."""
+    """The e-stop stops both boards. Its release sends ``start`` to the drive board alone.
+
+    The driver sets the command to zero before ``start``, because some firmware resumes the old
+    command.
+    """
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -47,7 +51,8 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
 
 
 def test_the_stop_of_an_estop_is_a_word_alone() -> None:
-    """Some related firmware accepts only the bare word, so ``stop`` is sent without padding."""
+    """The driver sends ``stop`` without padding. Some related firmware accepts only the bare word.
+    """
     bench = nominal()
     mark = bench.now
     bench.estop(True)
@@ -56,7 +61,8 @@ def test_the_stop_of_an_estop_is_a_word_alone() -> None:
 
 
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
-    """``start`` is repeated until the heartbeat shows that the drive board obeys again."""
+    """``start`` is lost after an e-stop. The driver repeats it until a heartbeat shows its effect.
+    """
     bench = nominal()
     bench.estop(True)
     bench.run(1.0)
@@ -72,7 +78,10 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The heartbeat says what stopped the board. A pause continues after an e-stop is released."""
+    """The heartbeat names the source of the board's commands, which proves a pause.
+
+    An e-stop and its release during the pause do not end the pause.
+    """
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -92,7 +101,8 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 
 
 def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
-    """The parameter ``auto_start`` decides whether the driver starts a stopped board."""
+    """The board is stopped when the driver connects. The driver starts it if ``auto_start`` is set.
+    """
     for run in (True, False):
         bench = Bench(run=run)
         bench.run(0.5)
@@ -108,7 +118,10 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The lift voltage is sent with a time limit, so the lift stops even if the driver crashes."""
+    """The driver sends the lift voltage with a time limit and then nothing.
+
+    The lift stops by itself.
+    """
     bench = nominal()
     lift_it(bench)
     bench.hears = {DRIVE}
@@ -121,7 +134,7 @@ def test_the_lift_runs_no_longer_than_a_command() -> None:
 
 
 def test_the_time_of_the_lift_follows_the_timeout() -> None:
-    """Each lift voltage is sent with a time limit of at most ``command_timeout_s``."""
+    """The time limit of each lift voltage is at most ``command_timeout_s``."""
     bench = nominal(settings=FejemisSettings(command_timeout_s=0.2))
     lift_it(bench, -6.0)
     said = [text for text in bench.lines(FRONT) if text.startswith("motv -")]
@@ -131,10 +144,10 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Lift voltages and colours are sent at most twenty times a second, the newest ones last.
+    """A thousand lift voltages and colours come in a second. The driver sends twenty of each.
 
-    A stop is sent at once. However many voltages and colours come, the driver sends the line for
-    the brush no more often.
+    The newest is sent last, and a stop is sent at once. The line for the brush is sent no more
+    often.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -155,7 +168,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """The time limit of a lift voltage begins when the voltage is sent, even if that is late.
+    """A lift voltage waits before it is sent. Its time limit begins when it is sent.
 
     A stop before that discards the voltage.
     """
@@ -190,7 +203,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
-    """An event stops brush and lift; they stay off when the robot works again."""
+    """An event stops brush and lift. They stay off when the robot works again."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
@@ -210,7 +223,7 @@ def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]
 
 
 def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
-    """In an e-stop or a pause, brush and lift may be switched off, but not on."""
+    """During an e-stop or a pause, brush and lift may be switched off, but not on."""
     bench = nominal()
     bench.estop(True)
     with pytest.raises(RequestRefused, match="e-stop"):
@@ -226,7 +239,10 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
 
 
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
-    """A command that expires stops only the wheels, because a robot that sweeps may stand still."""
+    """A command expires, and only the wheels stop.
+
+    The brush stays on, as a robot may sweep at rest.
+    """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.drive_on()
@@ -236,7 +252,7 @@ def test_a_command_that_expires_leaves_the_brush_on() -> None:
 
 
 def test_the_lights_are_given_back_at_the_end() -> None:
-    """At the exit the board controls the lights again, if the driver has changed them."""
+    """The user has set the lights. At the exit, the driver lets the board control them again."""
     bench = nominal()
     assert not any(b"leds" in data for _, data in bench.board.switch_off())
     bench.board.services.set_led(300, 128, -5, bench.now)
@@ -247,7 +263,10 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard's lines (after a stop or an e-stop) and those at the exit stop all motors."""
+    """The lines of the guard, with or without an e-stop, stop all motors.
+
+    So do the driver's last lines.
+    """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
         bench.board.services.set_brush(True, bench.now)
@@ -267,7 +286,10 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
 
 @pytest.mark.parametrize("again", ["e-stop", "pause"])
 def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> None:
-    """After an e-stop, ``start`` is repeated for a second, unless another stop comes first."""
+    """The driver still repeats ``start`` when the user stops the robot again.
+
+    It sends no more ``start``.
+    """
     bench = nominal()
     bench.estop(True)
     bench.run(0.5)
@@ -286,9 +308,9 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 
 
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
-    """The guard switches the brush off while the driver is stalled.
+    """The driver stalls, and the guard switches the brush off.
 
-    The driver repeats ``brush 1`` each second, and must not do so after the stall.
+    The driver must not repeat ``brush 1`` after the stall, as it does every second otherwise.
     """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
@@ -305,7 +327,10 @@ def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
 
 
 def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
-    """A silent front board may have restarted, so its brush is switched off and stays off."""
+    """The front board becomes silent while its brush is on, and may have restarted.
+
+    The driver switches the brush off and leaves it off.
+    """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -320,7 +345,10 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
 
 @pytest.mark.parametrize("seconds", [0.7, 3.0])
 def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(seconds: float) -> None:
-    """A board that hangs misses the stop of its brush, so the driver sends the stop again."""
+    """The front board hangs and does not receive the stop of its brush.
+
+    The driver sends the stop again when the board works again.
+    """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -334,7 +362,7 @@ def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(secon
 
 
 def test_the_brush_is_off_as_soon_as_the_driver_begins_to_end() -> None:
-    """The brush is switched off at once, before the driver waits for the wheels to stop."""
+    """The driver shuts down. It switches the brush off before it waits for the wheels to stop."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()
@@ -349,7 +377,7 @@ def test_the_brush_is_off_as_soon_as_the_driver_begins_to_end() -> None:
 
 
 def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
-    """Brush and lift are switched off with three copies of each line, as one may be lost."""
+    """At the exit, the driver sends each line that stops brush or lift three times."""
     bench = nominal()
     front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stamps of readings: of lines that contain a Teensy's time, and of IMU lines, which do not."""
+"""Tests of the stamps of readings. Some lines contain the Teensy's time, those of the IMU do not.
+"""
 
 import itertools
 import math
@@ -21,7 +22,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 
 def late(chance: random.Random) -> float:
-    """Return the delay of a read in s: 0.36 ms on average, and up to 20 ms more in one of 100."""
+    """Return the delay of a read in s: 0.36 ms on average, and in one of 100 up to 20 ms more."""
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 
@@ -36,9 +37,9 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Stamps of poses are right within 0.05 ms, and those of IMU samples within 0.2 ms.
+    """Reads are late, the board's clock is fast or slow, and up to 3 % of the lines are lost.
 
-    The lines of the IMU carry no time. Up to three lines in a hundred are lost.
+    Stamps of poses are right within 0.05 ms, and those of IMU samples within 0.2 ms.
     """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
@@ -73,7 +74,7 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """The clock ignores a single implausible time; several that agree show a restart."""
+    """The clock ignores a single implausible time. Several that agree show a restart."""
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
@@ -86,7 +87,7 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """A restart soon after the start looks almost like late lines, but the times begin again."""
+    """A restart soon after the start looks almost like late lines. The clock still notices it."""
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
     restarts = 0
@@ -98,7 +99,10 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """A stamp that goes back is increased, and one in the future is set to the present time."""
+    """One stamp goes back, and another one is in the future.
+
+    The first is increased, and the second is set to the present time.
+    """
     stamped = StampedReadings()
     stamped.begin()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -110,7 +114,8 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 
 def test_a_sample_has_si_units() -> None:
-    """The board sends degrees per second, and on some firmware g; both are converted."""
+    """The board sends degrees per second and, on some firmware, g. Both are converted to SI units.
+    """
     pair = Pair(Gyro(180.0, 0.0, -180.0), Acceleration(0.0, 0.0, 1.0), 1.0, 1.0, 0, doubtful=False)
     reading = ImuSamples("g").reading(pair)
     assert reading.angular_velocity == pytest.approx((math.pi, 0.0, -math.pi))
@@ -119,7 +124,8 @@ def test_a_sample_has_si_units() -> None:
 
 @pytest.mark.parametrize("sums", [True, False])
 def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
-    """The samples of the IMU, a hundred a second, have stamps 10 ms apart, within 1.5 ms."""
+    """The board sends a hundred IMU samples a second. Their stamps are 10 ms apart, within 1.5 ms.
+    """
     bench = nominal(Simulated(firmware=Firmware(sums=sums)))
     bench.events.clear()
     bench.run(3.0)
@@ -131,7 +137,8 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
-    """The drive board's lines of 0.3 s arrive in one read, the front board's lines as usual."""
+    """The drive board's lines of 0.3 s arrive in one read. Orientations have their samples' stamps.
+    """
     bench = nominal()
     bench.run(3.0)
     waiting = bytearray()
@@ -162,7 +169,7 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """A battery line that arrives late does not move the stamps of later orientations."""
+    """A battery reading has a late stamp. The stamps of the orientations do not change."""
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
         stamped.add(ExtraReading(content), stamp_s, 2.0)
@@ -170,7 +177,10 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """A restart sets the board's time back; lines that waited only make it jump ahead."""
+    """Lines that waited before the port was opened arrive first. Then the board's time jumps ahead.
+
+    This is not a restart, which would set the board's time back.
+    """
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
@@ -184,7 +194,10 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 
 
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
-    """After a stall of the host, many lines arrive at once; their times increase: no restart."""
+    """The host stalls, and then many lines arrive at once. Their times still increase.
+
+    This is not a restart.
+    """
     clock = TeensyClock()
     for n in range(100):
         assert clock.see(5.0 + 0.02 * n, 100.0 + 0.02 * n)
@@ -201,7 +214,7 @@ def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
 
 
 def numbered() -> Bench:
-    """Return a bench whose gyro and acceleration lines contain the number of their cycle, as x."""
+    """Return a bench whose gyro and acceleration lines have the number of their cycle as x."""
     bench = nominal()
     drive = bench.robot.drive
     drive._items["gyro"] = lambda: f"gyro {drive._cycles % 20_000 / 1000:.3f} 0.100 0.200"
@@ -212,7 +225,7 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return, for each published sample, the cycle numbers of its gyro and acceleration lines."""
+    """Return for each published sample the cycle numbers of its two lines."""
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
         for e in bench.imu
@@ -221,7 +234,10 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
-    """A read every 100 ms brings ten samples; one line in a hundred is lost, or comes twice."""
+    """A read every 100 ms contains ten samples. One line in a hundred is lost or comes twice.
+
+    No published sample has lines of two cycles.
+    """
     bench = numbered()
     chance = random.Random(5)
     times = {"all": 1, "lost": 0, "twice": 2}[kept]
@@ -239,7 +255,10 @@ def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
 
 @pytest.mark.parametrize("pause_s", [0.001, 0.006])
 def test_a_sample_whose_lines_come_in_pieces_is_published(pause_s: float) -> None:
-    """The pieces have 1 to 60 bytes, so a pause may come between the two lines of a sample."""
+    """The lines arrive in pieces, with pauses that may fall between the two lines of a sample.
+
+    Every sample is published with its own lines.
+    """
     bench = numbered()
     chance = random.Random(7)
     unsent, sent_at = bytearray(), bench.now
