@@ -17,7 +17,9 @@ def standing() -> Bench:
 
 
 def paused() -> Bench:
-    """Return a bench whose board is paused and reports this. The driver does not start the board.
+    """Return a bench whose board is paused and reports this.
+
+    The driver does not start the board.
     """
     bench = Bench(run=False)
     bench.open()

@@ -77,8 +77,7 @@ class Bench:
         self.settle()
 
     def settle(self) -> None:
-        """Write the session's output and collect its events, as the shell does after every input.
-        """
+        """Write the session's output and collect its events, as the shell does after each input."""
         data = joined(self.session.take_output(self.now))
         if data:
             self.written.append((self.now, data))

@@ -79,8 +79,7 @@ def ticks_of(name: str) -> tuple[bytes, ...]:
 
 
 def lengths_of(stream: bytes) -> list[int]:
-    """Return the lengths of the frames of an undamaged stream, found by the tables of the manual.
-    """
+    """Return the lengths of the frames of an undamaged stream, found by the manual's tables."""
     lengths, at = [], 0
     while at < len(stream):
         kind = stream[at + 1]

@@ -50,8 +50,7 @@ class Drive:
                 self.errors.append(Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau)))
 
     def wrong_imu(self) -> int:
-        """Return how many IMU readings are out of order or differ from those that the board sent.
-        """
+        """Return how many IMU readings are out of order or differ from those of the board."""
         scale, number, sent = ImuScale(), 0, list[object]()
         for frame in self.bench.board.sent:
             if frame.data[:2] == b"\xff\xfa":

@@ -73,7 +73,9 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
 
 
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
-    """The user commands zero while the robot drives. The driver accepts this, and the robot stops.
+    """The user commands zero while the robot drives.
+
+    The driver accepts this, and the robot stops.
     """
     bench.drive_on()
     for _ in range(10):
@@ -186,7 +188,9 @@ def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> N
 
 
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
-    """The user commands 100 m/s. The robot drives at 0.5 m/s, or 5 % more with measurement errors.
+    """The user commands 100 m/s.
+
+    The robot drives at 0.5 m/s, or 5 % more with measurement errors.
     """
     bench.drive_on(100.0, 2.0)
     before = bench.robot.way_m

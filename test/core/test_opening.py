@@ -52,7 +52,9 @@ def test_without_auto_start_a_paused_board_stays_paused() -> None:
 
 
 def test_imu_frames_without_deltas_are_imu_only_mode() -> None:
-    """The board does not report IMU-only mode. The driver infers it from IMU frames without deltas.
+    """The board does not report IMU-only mode.
+
+    The driver infers it from IMU frames without deltas.
     """
     bench = Bench(BoardSettings(imu_only=True))
     bench.open()

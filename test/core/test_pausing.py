@@ -180,7 +180,9 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
-    """Another program starts a paused board. The driver pauses it again and still refuses motion.
+    """Another program starts a paused board.
+
+    The driver pauses it again and still refuses motion.
     """
     assert bench.ask(Request.PAUSE, 5.0).success
     bench.board.receive(b"S")

@@ -78,7 +78,9 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """The port is lost before Stop and R of a reset are written. The next port does not get them.
+    """The port is lost before Stop and R of a reset are written.
+
+    The next port does not get them.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)

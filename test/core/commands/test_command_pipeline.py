@@ -39,8 +39,7 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return time and words of each frame since ``mark`` that is Stop or a base velocity (mode 1).
-    """
+    """Return time and words of each base velocity (mode 1) and each Stop since ``mark``."""
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -50,7 +49,9 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 
 
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
-    """The user commands the base, then the wheels, then the base. The driver sends Stop in between.
+    """The user commands the base, then the wheels, then the base.
+
+    The driver sends Stop in between.
     """
     bench.drive(0.3)
     bench.run(0.1)
@@ -187,8 +188,7 @@ def test_turning_is_ramped_by_its_own_limit() -> None:
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
-    """A zero command is sent as Stop without a ramp, because a person may be in front of the robot.
-    """
+    """A zero command is sent as Stop without a ramp. A person may be in front of the robot."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)

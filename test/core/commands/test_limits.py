@@ -25,7 +25,9 @@ ULPS = 1 + 1e-11
 
 
 def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
-    """Return whether two vectors have the same direction, to nine digits. Zero has any direction.
+    """Return whether two vectors have the same direction, to nine digits.
+
+    Zero has any direction.
     """
     largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
     if largest_a < 1e-290 or largest_b < 1e-290:
@@ -65,7 +67,9 @@ def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: 
 @given(vectors, limits)
 @example([1e308, -1e308], 17.0)
 def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
-    """If a wheel is too fast, all wheels are slowed by one factor, so the fastest is at the limit.
+    """If a wheel is too fast, all wheels are slowed by one factor.
+
+    The fastest is then at the limit.
     """
     slowed = slow(values, limit)
     assert max(map(abs, slowed)) <= limit * ULPS

@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion interlock, which decides when a robot may move after a trip of the monitor.
-"""
+"""Tests of the motion interlock: when a robot may move again after a trip of the motion monitor."""
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
 

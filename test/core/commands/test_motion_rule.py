@@ -183,7 +183,9 @@ def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
 
 
 def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Bench) -> None:
-    """The user sends a thousand zero commands a second. The driver sends one Stop per control tick.
+    """The user sends a thousand zero commands a second.
+
+    The driver sends one Stop per control tick.
     """
     bench.speaks = False
     bench.run(0.5)

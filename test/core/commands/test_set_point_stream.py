@@ -110,7 +110,9 @@ def test_a_repetition_does_not_make_a_new_command_wait(stream: Stream) -> None:
 
 
 def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
-    """The command rate is 1 Hz. The driver repeats Stop faster, because a single Stop may be lost.
+    """The command rate is 1 Hz.
+
+    The driver repeats Stop faster, because a single Stop may be lost.
     """
     stream = Stream(CommandSettings(rate_hz=1.0))
     order(stream, STOP, 1.0)
@@ -131,7 +133,9 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 
 
 def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
-    """The user sends a thousand zero commands in a second. The driver sends about a hundred Stops.
+    """The user sends a thousand zero commands in a second.
+
+    The driver sends about a hundred Stops.
     """
     written = []
     for step in range(1000):
@@ -214,7 +218,9 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """The pacer stalls for a minute while a command is active. It then sends Stop, not the command.
+    """The pacer stalls for a minute while a command is active.
+
+    It then sends Stop, not the command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

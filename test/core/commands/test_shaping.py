@@ -62,8 +62,7 @@ def test_a_command_that_is_not_finite_counts_as_no_command(bench: Bench, bad: fl
 
 @pytest.mark.parametrize("count", [0, 2, 4])
 def test_a_wheel_command_has_exactly_three_values(bench: Bench, count: int) -> None:
-    """A wheel command with a wrong number of rates is refused, and the refusal states the number.
-    """
+    """A wheel command with a wrong number of rates is refused. The refusal states the number."""
     start = len(bench.written)
     with pytest.raises(CommandRefused, match=f"{count} values"):
         bench.session.command_wheels([1.0] * count, bench.now)

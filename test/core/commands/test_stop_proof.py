@@ -64,7 +64,9 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
-    """One displacement after Stop does not prove rest, even if it covers 0.1 s. A second one does.
+    """One displacement after Stop does not prove rest, even if it covers 0.1 s.
+
+    A second one does.
     """
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
@@ -74,7 +76,9 @@ def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopPro
 
 
 def test_without_stop_standing_still_proves_nothing() -> None:
-    """No Stop was sent, so a command may still be on its way. Displacements of zero prove nothing.
+    """No Stop was sent, so a command may still be on its way.
+
+    Displacements of zero prove nothing.
     """
     assert not shown(StopProof(), *[0.0] * 50)
 
@@ -88,8 +92,7 @@ def test_a_command_to_move_ends_the_proof(proof: StopProof) -> None:
 
 
 def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopProof) -> None:
-    """A displacement within 50 ms after Stop may have ended before Stop arrived, so it is ignored.
-    """
+    """A displacement within 50 ms after Stop is ignored. It may have ended before Stop arrived."""
     for _ in range(10):
         proof.look(moved(), 10.049)
     assert not proof.proved
@@ -139,7 +142,9 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """The robot moves in any way and then rests. Four displacements of a resting robot prove rest.
+    """The robot moves in any way and then rests.
+
+    Four displacements of a resting robot prove rest.
     """
     proof = StopProof()
     proof.stopped(10.0)

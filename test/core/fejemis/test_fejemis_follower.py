@@ -19,7 +19,9 @@ TICK_S = 0.015
 
 
 def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
-    """Command 1.5 rad while the wheel stays at ``angle_rad``. Return the time of the fault, in s.
+    """Command 1.5 rad while the wheel stays at ``angle_rad``.
+
+    Return the time of the fault, in s.
     """
     follower.aim(1.5)
     for n in range(200):
@@ -29,7 +31,9 @@ def blocked(follower: Follower, since: float, angle_rad: float = 0.0) -> float:
 
 
 def test_a_wheel_that_does_not_follow_is_noticed_once() -> None:
-    """A blocked wheel is reported once. A wheel that approaches its angle slowly is not reported.
+    """A blocked wheel is reported once.
+
+    A wheel that approaches its angle slowly is not reported.
     """
     follower = Follower()
     follower.aim(1.5)
@@ -80,7 +84,9 @@ def test_motion_is_refused_until_the_wheel_has_moved() -> None:
 
 
 def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
-    """The first fault ends when the wheel moves. A second one within a minute ends only by a start.
+    """The first fault ends when the wheel moves.
+
+    A second one within a minute ends only by a start.
     """
     follower = Follower()
     at = blocked(follower, 0.0)

@@ -31,7 +31,9 @@ def assert_stands(bench: Bench) -> None:
 
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
-    """The two boards are connected in either order. The driver finds the order by the heartbeats.
+    """The two boards are connected in either order.
+
+    The driver finds the order by the heartbeats.
     """
     bench = nominal(Simulated(swapped=swapped))
     bench.drive_on()
@@ -234,7 +236,9 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
 
 
 def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """The front board sends its angle 66 times a second. The driver relays each one without delay.
+    """The front board sends its angle 66 times a second.
+
+    The driver relays each one without delay.
     """
     bench = nominal()
     mark = bench.now

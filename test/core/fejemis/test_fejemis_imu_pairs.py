@@ -97,7 +97,9 @@ def reads_every(lines: Iterable[Line], period_s: float, phase_s: float = 0.0) ->
 
 
 def reads_of_pieces(lines: list[Line], chance: random.Random, pauses_s: list[float]) -> list[Read]:
-    """Divide the lines into the reads of a slow connection: 1 to 60 bytes, with pauses in between.
+    """Divide the lines into the reads of a slow connection.
+
+    A read has 1 to 60 bytes, with pauses in between.
     """
     reads: list[Read] = []
     now, due, sent = 0.0, 0, 0
@@ -234,7 +236,9 @@ def test_every_sample_is_given_in_pieces(
 def test_every_sample_is_given_by_a_reader_that_stalls(
     layout: Layout, chance: random.Random, stalls: float
 ) -> None:
-    """The host stalls at times, perhaps between the two lines of a sample. Every sample is found.
+    """The host stalls at times, perhaps between the two lines of a sample.
+
+    Every sample is found.
     """
     lines = layout.lines(3.0)
     reads = reads_with_stalls(lines, chance, stalls)

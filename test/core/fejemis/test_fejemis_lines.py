@@ -145,7 +145,9 @@ def test_what_no_board_sends_is_not_a_message(text: str) -> None:
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])
 @pytest.mark.parametrize("sums", [False, True])
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
-    """The same bytes arrive at once, byte by byte or in random pieces. The messages are the same.
+    """The same bytes arrive at once, byte by byte or in random pieces.
+
+    The messages are the same.
     """
     of_each_kind = {text.split()[0]: (text, GOLDEN[text]) for text in GOLDEN}.values()
     texts = [text.encode() for text, _ in of_each_kind]
@@ -275,7 +277,9 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
 def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
-    """Random bytes in random pieces raise no error. The buffer stays shorter than the longest line.
+    """Random bytes in random pieces raise no error.
+
+    The buffer stays shorter than the longest line.
     """
     decoder = FejemisDecoder()
     for piece in pieces:

@@ -89,7 +89,9 @@ def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
 
 
 def test_a_gap_is_settled_by_the_pose_after_it() -> None:
-    """No pose arrives while the robot drives a curve for 2 s. The next pose corrects the odometry.
+    """No pose arrives while the robot drives a curve for 2 s.
+
+    The next pose corrects the odometry.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)
@@ -111,7 +113,9 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
     ],
 )
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
-    """A false pose arrives, and the odometry skips it. The next correct pose continues as before.
+    """A false pose arrives, and the odometry skips it.
+
+    The next correct pose continues as before.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)

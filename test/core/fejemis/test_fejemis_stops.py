@@ -51,7 +51,9 @@ def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) 
 
 
 def test_the_stop_of_an_estop_is_a_word_alone() -> None:
-    """The driver sends ``stop`` without padding. Some related firmware accepts only the bare word.
+    """The driver sends ``stop`` without padding.
+
+    Some related firmware accepts only the bare word.
     """
     bench = nominal()
     mark = bench.now
@@ -61,7 +63,9 @@ def test_the_stop_of_an_estop_is_a_word_alone() -> None:
 
 
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
-    """``start`` is lost after an e-stop. The driver repeats it until a heartbeat shows its effect.
+    """``start`` is lost after an e-stop.
+
+    The driver repeats it until a heartbeat shows its effect.
     """
     bench = nominal()
     bench.estop(True)
@@ -101,7 +105,9 @@ def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
 
 
 def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone() -> None:
-    """The board is stopped when the driver connects. The driver starts it if ``auto_start`` is set.
+    """The board is stopped when the driver connects.
+
+    The driver starts it if ``auto_start`` is set.
     """
     for run in (True, False):
         bench = Bench(run=run)

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the stamps of readings. Some lines contain the Teensy's time, those of the IMU do not.
+"""Tests of the stamps of readings.
+
+Some lines contain the Teensy's time, those of the IMU do not.
 """
 
 import itertools
@@ -114,7 +116,9 @@ def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
 
 
 def test_a_sample_has_si_units() -> None:
-    """The board sends degrees per second and, on some firmware, g. Both are converted to SI units.
+    """The board sends degrees per second and, on some firmware, g.
+
+    Both are converted to SI units.
     """
     pair = Pair(Gyro(180.0, 0.0, -180.0), Acceleration(0.0, 0.0, 1.0), 1.0, 1.0, 0, doubtful=False)
     reading = ImuSamples("g").reading(pair)
@@ -124,7 +128,9 @@ def test_a_sample_has_si_units() -> None:
 
 @pytest.mark.parametrize("sums", [True, False])
 def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
-    """The board sends a hundred IMU samples a second. Their stamps are 10 ms apart, within 1.5 ms.
+    """The board sends a hundred IMU samples a second.
+
+    Their stamps are 10 ms apart, within 1.5 ms.
     """
     bench = nominal(Simulated(firmware=Firmware(sums=sums)))
     bench.events.clear()
@@ -137,7 +143,9 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
-    """The drive board's lines of 0.3 s arrive in one read. Orientations have their samples' stamps.
+    """The drive board's lines of 0.3 s arrive in one read.
+
+    Orientations have their samples' stamps.
     """
     bench = nominal()
     bench.run(3.0)

@@ -24,7 +24,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 class Bench(AnyBench):
-    """A driver session with a simulated LOIS ECU; the session has been nominal for 1.5 s."""
+    """A session with a simulated LOIS ECU. It has been nominal for 1.5 s."""
 
     def __init__(self, firmware: str, settings: LoisEcuSettings | None = None) -> None:
         self.lois = LoisRobot(firmware)
@@ -54,7 +54,7 @@ class Bench(AnyBench):
 
 
 def told(bench: Bench, kind: type) -> list[Any]:
-    """Return the ``Extra`` values of this type that the session has passed on."""
+    """Return the values of this type in the ``Extra`` events of the session."""
     return [
         event.value
         for event in bench.events
@@ -63,6 +63,6 @@ def told(bench: Bench, kind: type) -> list[Any]:
 
 
 def configure(bench: Bench, settings: LoisEcuSettings) -> None:
-    """Change the board settings of the session, as the node does when parameters change."""
+    """Change the session's board settings, as the node does when parameters change."""
     bench.session.configure(SETTINGS, bench.now, board=settings)
     bench.settle()

@@ -30,14 +30,14 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""Settings with gains for the speed controllers.
+"""Settings with gains for the speed controllers of both wheels.
 
 With the boot gains of the public firmware, the right wheel's speed would oscillate.
 """
 REPEAT_S = 0.05
 
 Program = list[tuple[float, tuple[float, float]]]
-"""Steps of a drive: duration in s, and set-points of the left and right wheel in RPM."""
+"""Steps of a drive. Each has a duration in s and the set-points of left and right wheel in RPM."""
 
 CLASSES: dict[str, Program] = {
     "straight": [(21.0, (20, 20))],
@@ -57,7 +57,7 @@ CLASSES: dict[str, Program] = {
 
 
 MOTIONS = ("straight", "curve", "in place", "reverse", "reverse curve", "jerky", "left", "right")
-"""Motions of ``test/integrity/lois_odometry.py``; "left" and "right" are squares."""
+"""Names of motions in ``test/integrity/lois_odometry.py``. "left" and "right" are squares."""
 
 
 VARIED = (
@@ -69,14 +69,14 @@ VARIED = (
     "straight back",
     "curve back",
 )
-"""Motions of ``test/integrity/lois_odometry.py``: drives of 5 m, and turns by 80° to 400°.
+"""Names of motions in ``test/integrity/lois_odometry.py``: drives of 5 m, and turns of 80° to 400°.
 
-The seed of a drive gives its speed.
+The seed of a drive determines its speed.
 """
 
 
 def varied(name: str, seed: int) -> Program:
-    """Return the program of one of ``VARIED``; its speed is random, by the seed."""
+    """Return the program of one of the motions ``VARIED``. Its speed is random, from the seed."""
     random = Random(f"varied {name} {seed}")
     if name.startswith("place"):
         rpm, angle_rad = random.uniform(7, 20), math.radians(random.uniform(80, 400))
@@ -92,7 +92,10 @@ def varied(name: str, seed: int) -> Program:
 
 
 def jerky(seed: int, seconds: float = 20.0) -> Program:
-    """Return random set-points of either sign, each for 0.2 to 1.2 s; 15 % of them are Stop."""
+    """Return random set-points of either sign, each for 0.2 to 1.2 s.
+
+    About 15 % of them are Stop.
+    """
     random, program, left_s = Random(f"jerky {seed}"), [], seconds
     while left_s > 0:
         duration_s = random.choice((0.2, 0.3, 0.5, 0.8, 1.2))
@@ -106,7 +109,10 @@ def jerky(seed: int, seconds: float = 20.0) -> Program:
 class Drive:
     """The outcome of a drive.
 
-    ``true``: true pose at the time of the last estimate. ``way_m``: true length of the way, in m.
+    ``true``: true pose at the time of the last estimate.
+
+    ``way_m``: true length of the way, in m.
+
     ``turned_rad``: sum of the absolute values of all true turns, in rad.
     """
 
@@ -118,12 +124,12 @@ class Drive:
 
     @property
     def error(self) -> Pose:
-        """Estimated minus true pose, in the odometry frame."""
+        """Estimated pose minus true pose, in the odometry frame."""
         return self.last.pose - self.true
 
     @property
     def nees(self) -> float:
-        """Normalized squared error of x, y and yaw; 3 on average if the covariance is right."""
+        """Normalised squared error of x, y and yaw. Its mean is 3 if the covariance is right."""
         c, e = self.last.covariance, self.error
         rows = [
             [c.xx, c.xy, c.x_yaw, e.x_m],
@@ -149,12 +155,12 @@ class Drive:
 
 
 def nominal(firmware: Firmware, seed: int = 0) -> LoisSettings:
-    """Return settings with exact wheel sizes, on ground that loads the motors by 1 % of duty."""
+    """Return settings with exact wheel sizes. The ground loads the motors by 1 % of duty."""
     return LoisSettings(quirks=QUIRKS[firmware], seed=seed, load_percent=1.0)
 
 
 def wrong(firmware: Firmware, seed: int) -> LoisSettings:
-    """Return settings with slip and load, and with wheel sizes that are wrong by about 1 %."""
+    """Return settings with slip, load, and wheel sizes that are wrong by about 1 %."""
     random = Random(f"wrong {seed}")
     return LoisSettings(
         quirks=QUIRKS[firmware],
@@ -168,8 +174,9 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 class Rig:
     """A simulated board and the driver that talks to it, by default with ``HOST_GAINS``.
 
-    ``estimates``: all estimates of the odometry, each with the true pose at its time. ``loss``:
-    chance that a byte is lost, in either direction.
+    ``estimates``: all estimates of the odometry, each with the true pose at its time.
+
+    ``loss``: probability that a byte is lost, in either direction.
     """
 
     def __init__(
@@ -199,12 +206,12 @@ class Rig:
         return bytes(byte for byte in data if self._random.random() >= self._loss)
 
     def say(self, data: bytes) -> None:
-        """Send these bytes to the board."""
+        """Send these bytes to the board on behalf of the driver."""
         self.board.receive(self._arrived(data))
         self.driver.wrote(data, self.now)
 
     def run(self, seconds: float) -> None:
-        """Run the board for ``seconds``; the driver writes what is due and reads what arrives."""
+        """Run the board for ``seconds``. The driver writes what is due and reads what arrives."""
         for _ in range(round(seconds / self.board.tick_s)):
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))
@@ -220,28 +227,28 @@ class Rig:
                     self.estimates.append((reading, self.place))
 
     def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
-        """Send set points in RPM every ``REPEAT_S`` for ``seconds``; two zeros are a Stop."""
+        """Send the set-points every ``REPEAT_S`` for ``seconds``. Two zeros are a Stop."""
         for _ in range(round(seconds / REPEAT_S)):
             unit = math.tau / 60
             self.say(self.driver.wheels((left_rpm * unit, right_rpm * unit)))
             self.run(REPEAT_S)
 
     def drive(self, program: Program) -> Drive:
-        """Drive a program and stop; return the outcome."""
+        """Drive a program, stop, and return the outcome."""
         self.run(4.0)
         for seconds, (left, right) in [*program, (2.0, STOP)]:
             self.order(left, right, seconds)
         return self.outcome()
 
     def outcome(self) -> Drive:
-        """Return the outcome so far: the last estimate of odometry, and the truth at its time."""
+        """Return the outcome so far: the last estimate, and the true pose at its time."""
         last, true = self.estimates[-1]
         return Drive(true, self.way_m, self.turned_rad, last, self.driver)
 
     def square(self, side_m: float, sign: int) -> None:
-        """Drive a square, steered by the true pose, with stops before and after each turn.
+        """Drive a square that is steered by the true pose, with stops before and after each turn.
 
-        ``sign``: 1 for turns to the left, -1 for turns to the right.
+        ``sign``: 1 for turns to the left, −1 for turns to the right.
         """
         goal_rad = 0.0
         for _ in range(4):
@@ -266,7 +273,7 @@ class Rig:
 def motion(
     settings: LoisSettings, name: str, ours: LoisEcuSettings | None = None, *, side_m: float = 5.0
 ) -> Drive:
-    """Drive one of ``MOTIONS`` or ``VARIED``; return the outcome.
+    """Drive one of the motions ``MOTIONS`` or ``VARIED``, and return the outcome.
 
     The encoders begin at random positions between two ticks.
     """
@@ -285,7 +292,10 @@ def motion(
 
 
 def drive(settings: LoisSettings, program: Program, *, loss: float = 0.0) -> Drive:
-    """Drive a program and stop; each byte is lost with chance ``loss``, in either direction."""
+    """Drive a program, stop, and return the outcome.
+
+    Each byte is lost with probability ``loss``, in either direction.
+    """
     return Rig(settings, loss=loss).drive(program)
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Streams of a LOIS ECU that drives: its reports, and the timed pieces that encode them."""
+"""The stream of a LOIS ECU that drives: its reports, and the timed pieces that encode them."""
 
 import math
 import struct
@@ -22,7 +22,7 @@ Piece = tuple[float, bytes]
 
 
 def float32(number: float) -> float:
-    """Return the number rounded to a 32-bit float, as a decoder of the lines returns it."""
+    """Return the number rounded to a 32-bit float, as a decoder of the lines gives it."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", number))
     return float(rounded)
 
@@ -30,7 +30,7 @@ def float32(number: float) -> float:
 def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
     """Return the reports of a drive along a curve at 0.5 m/s, with their times in s.
 
-    Ticks, odometry and headings come every 0.4 s; position, time and date every 1.2 s.
+    Ticks, odometry and headings come every 0.4 s. Position, time and date come every 1.2 s.
     """
     said: list[tuple[float, Report]] = []
     for step in range(1, int(seconds / 0.4) + 1):
@@ -53,12 +53,12 @@ def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
 
 
 def pieces(said: list[tuple[float, Report]]) -> list[Piece]:
-    """Return the pieces of bytes in which the board sends these reports, each with its time."""
+    """Return the bytes of each report with the report's time."""
     return [(at, encode_report(report)) for at, report in said]
 
 
 def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Report], LoisDecoder]:
-    """Decode the pieces with a new decoder; return all reports found, and the decoder."""
+    """Decode the pieces with a new decoder. Return all reports found, and the decoder."""
     decoder = LoisDecoder(sum_required=sum_required)
     found: list[Report] = []
     for at, data in given:
@@ -68,5 +68,5 @@ def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Repo
 
 
 def lossy(given: list[Piece], chance: float, random: Random) -> list[Piece]:
-    """Return the pieces without the lost bytes; each byte is lost with chance ``chance``."""
+    """Return the pieces without the lost bytes. Each byte is lost with probability ``chance``."""
     return [(at, bytes(byte for byte in data if random.random() >= chance)) for at, data in given]

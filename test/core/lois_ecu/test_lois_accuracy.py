@@ -2,7 +2,7 @@
 
 """The error of a LOIS robot's odometry after a drive, on both kinds of firmware.
 
-``test/integrity/lois_odometry.py`` prints the figures of many drives; a few of them are run here.
+``test/integrity/lois_odometry.py`` prints the errors of many drives. A few of them are run here.
 """
 
 import math
@@ -20,7 +20,10 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @BOTH
 @pytest.mark.parametrize("name", ["straight", "curve"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
-    """The limits are the accuracy promised for a forward drive with wheels of the right size."""
+    """The robot drives 5 m forward with wheels of the right size.
+
+    The odometry is as accurate as promised for such a drive: within 2 % and 3°.
+    """
     one = driven(firmware, name)
     assert one.way_m > 5.0
     assert off_m(one) < max(0.02, 0.02 * one.way_m)
@@ -29,7 +32,10 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """In a turn on the spot, the public firmware counts no ticks of the wheel that reverses."""
+    """The robot turns on the spot, so one wheel turns backward.
+
+    The public firmware counts no ticks of this wheel. The angle is still right within 3 %.
+    """
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
     assert abs(one.error.yaw_rad) < 0.03 * one.turned_rad
@@ -38,23 +44,31 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """Wheels of wrong sizes slip on uneven ground; one drive in 10,000 exceeds the limit by chance.
+    """Wheels of wrong sizes slip on uneven ground. The error of the pose fits the covariance.
 
-    ``test/integrity/lois_odometry.py`` checks the mean of many drives.
+    The limit is exceeded by chance in one drive of 10,000. ``test/integrity/lois_odometry.py``
+    checks the mean of many drives.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
 
 @pytest.mark.parametrize("name", ["left", "right"])
 def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
-    """In a turn on the spot, the public firmware counts no ticks of the wheel that reverses."""
+    """The robot drives a square with turns on the spot.
+
+    The public firmware counts no ticks of a wheel that turns backward. The error is still within 3
+    sigma.
+    """
     one = motion(nominal("firmware", 1000), name, side_m=1.0)
     assert off_m(one) < 0.15
     assert one.sigmas < 3.0
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """The wheels reverse several times a second; documented firmware reports each tick."""
+    """The wheels reverse several times a second. Documented firmware reports each tick.
+
+    The odometry ends within 5 cm and 5°.
+    """
     one = motion(nominal("documented", 1001), "jerky")
     assert off_m(one) < 0.05
     assert abs(one.error.yaw_rad) < math.radians(5.0)
@@ -65,7 +79,10 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """If 1 % of the bytes are lost, so are 60 % of the groups; counters show the missed ticks."""
+    """One byte in a hundred is lost, and with it 60 % of the groups of lines.
+
+    The counters in the other groups include the missed ticks, so the odometry is hardly worse.
+    """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)
     assert abs(one.error.yaw_rad) < math.radians(10.0)

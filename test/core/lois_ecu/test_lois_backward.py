@@ -21,10 +21,10 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """The public firmware counts no ticks backward and reports integer RPM, so the heading drifts.
+    """The robot drives backward. The public firmware counts no ticks then and reports integer RPM.
 
-    The mean error of the position is 4.9 % of the way in eight drives, and 13 % in the worst of
-    them.
+    So the estimated heading drifts. In eight drives the mean error of the position is 4.9 % of the
+    way, and in the worst of them 13 %.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -40,7 +40,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
     """With the boot gains, the right wheel oscillates, comes to rest, and keeps its last speed.
 
-    If the covariance is right, the normalized squared error of half of all drives is below 2.4; a
+    If the covariance is right, the normalised squared error of half of all drives is below 2.4. A
     few drives with the boot gains are far above.
     """
     seeds = range(1000, 1005)
@@ -53,7 +53,9 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> Non
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again(
     seed: int,
 ) -> None:
-    """A wheel with set point -19 falls from 41 to 20 RPM and stops, but 20 RPM is still reported.
+    """A wheel with set-point −19 RPM slows from 41 to 20 RPM and stops.
+
+    The board still reports 20 RPM.
 
     An odometry that believed the report would turn by 600° in 15 s.
     """
@@ -63,7 +65,9 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """A wheel with set point -7 is at rest if the board keeps reporting 12 RPM.
+    """A wheel has the set-point −7 RPM, and the board keeps reporting 12 RPM.
+
+    So the wheel is at rest.
 
     A wheel that rolled would become slower.
     """
@@ -76,7 +80,10 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """In some drives a wheel rolls at 46 RPM instead of 34, in others it overshoots at first."""
+    """The robot drives backward with the user's gains. Some wheels overshoot or roll much too fast.
+
+    One rolls at 46 RPM instead of 34. The odometry is still right within 10 % of the way.
+    """
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
     assert one.sigmas < 3.0
@@ -84,7 +91,12 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """Too much feed-forward makes the wheels too fast; report 0x20 shows it, but no ticks do."""
+    """Too much feed-forward makes the wheels too fast backward.
+
+    Report 0x20 shows it, but no ticks do.
+
+    The estimated distance is still right within 3 %.
+    """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
     assert one.way_m > 11.0
@@ -93,7 +105,10 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM some ticks follow each other so soon that the firmware loses their speed."""
+    """At 62 RPM some ticks follow each other so soon that the firmware loses their speed.
+
+    So the yaw variance grows, which it does not at 32 RPM.
+    """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)
 

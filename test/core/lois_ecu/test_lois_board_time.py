@@ -13,7 +13,10 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 
 @pytest.mark.parametrize("lost", [0.0, 0.067], ids=["goes on", "stands while it sends"])
 def test_a_read_that_is_late_is_told(lost: float) -> None:
-    """The estimate finds late reads, although the board's clock may stop while the board sends."""
+    """One read is 40 ms late.
+
+    The estimate shows it, even if the board's clock stops during sending.
+    """
     board = BoardTime()
     found = []
     for step in range(60):
@@ -27,7 +30,10 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """Groups that are read together get times in the order in which the board sent them."""
+    """Several groups are read at once.
+
+    Their times are in the order in which the board sent them.
+    """
     board = BoardTime()
     taken_s = []
     for step in range(60):
@@ -40,7 +46,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """If reads are up to 30 ms late at random, the estimate has a sigma of 5 ms to 25 ms."""
+    """Reads are up to 30 ms late at random. The estimate has a sigma of 5 to 25 ms."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -49,7 +55,10 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """Before the clock's unit is known, and after a restart, the delay is 0 with sigma 12 ms."""
+    """The delay is 0 before the clock's unit is known.
+
+    After a restart it is 0 with a sigma of 12 ms.
+    """
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
     for step in range(20):
@@ -59,7 +68,7 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """Twenty groups in one read do not change the estimated clock rate, or later delays."""
+    """The host stalls, and twenty groups come in one read. Later delays are still right."""
     board = BoardTime()
     found = []
     for step in range(90):
@@ -78,7 +87,7 @@ def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
 def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
     reads: list[tuple[float, int]],
 ) -> None:
-    """At any times of reads and any rate of the board's clock, delays are finite.
+    """For any times of reads and any rate of the board's clock, delays are finite.
 
     Groups stay in order.
     """

@@ -33,7 +33,10 @@ RPM = math.tau / 60
 
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """Low pass, periods and the user's gains arrive at the board although single lines are lost."""
+    """After the opening, low pass, periods and the user's gains arrive at the board.
+
+    The robot drives.
+    """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
     rig.run(5.0)
@@ -48,7 +51,10 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
 
 @pytest.mark.slow
 def test_a_restarted_board_is_configured_again() -> None:
-    """After a boot the firmware's low pass has gain 0, so the wheels would not turn."""
+    """The board restarts, and its low pass has gain 0, so the wheels would not turn.
+
+    The driver configures the board again, and the robot drives.
+    """
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     rig.order(20, 20, 4.0)
@@ -66,7 +72,10 @@ def test_a_restarted_board_is_configured_again() -> None:
 
 
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
-    """A board that restarts within a moment is noticed because its tick counters begin at zero."""
+    """The board restarts within a moment, without a silence.
+
+    The driver notices it because the tick counters begin at zero, and configures the board again.
+    """
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
     rig.order(20, 20, 6.0)
@@ -85,7 +94,10 @@ def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
 def test_a_board_that_was_left_in_another_mode_is_fetched_back(
     firmware: Firmware, before: TerminalMode
 ) -> None:
-    """Another program may have left the board in any mode; the driver restores its own mode."""
+    """Another program has left the board in some terminal mode.
+
+    The driver restores its own mode.
+    """
     rig = Rig(nominal(firmware))
     rig.run(2.1)
     for _ in range(6):
@@ -100,7 +112,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """Value 4 of command 0x11 selects lines without checksum.
+    """The user wants lines without checksum, which value 4 of command 0x11 selects.
 
     The command overwrites the left wheel's "short correction", which the driver then restores.
     """
@@ -116,7 +128,10 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
-    """The public firmware counts no ticks backward, so after a backward drive rest is unproved."""
+    """The robot stops after a forward drive, and its ticks prove that it is at rest.
+
+    The public firmware counts no ticks backward. So rest is not proved after a backward drive.
+    """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 4.0)
@@ -138,7 +153,11 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """The driver clears the old speed that the firmware keeps for a wheel at rest."""
+    """The robot is stopped and started again at several speeds.
+
+    It starts each time, because the driver clears the old speed that the firmware keeps for a wheel
+    at rest.
+    """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     for _ in range(3):
@@ -150,9 +169,9 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """Without RPM 0/0 after a Stop, the public firmware does not start a wheel at a lower speed.
+    """A robot on the public firmware was stopped, and RPM 0/0 is not sent after the Stop.
 
-    The test is without feed-forward.
+    Without feed-forward, its wheels then do not start at a lower speed.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -168,7 +187,10 @@ def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
 @pytest.mark.slow
 @BOTH
 def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
-    """The e-stop button makes the board cut the motors, and the driver publishes the press."""
+    """The user presses the e-stop button.
+
+    The board cuts the motors, and the driver publishes the press.
+    """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -182,7 +204,10 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The record arrives while the wheels turn; its time unit depends on the kind of firmware."""
+    """The user requests a record while the wheels turn. It arrives complete.
+
+    Its time unit depends on the kind of firmware.
+    """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
     rig.order(20, 20, 3.0)
@@ -197,7 +222,7 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
 
 
 def test_a_record_that_lost_a_line_is_given_up() -> None:
-    """The driver reports the failure of the record and discards all its samples."""
+    """A line of a record is lost. The driver reports the failure and discards all samples."""
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
     rig.driver.record(RecordKind.TORQUE, 100)
@@ -223,7 +248,10 @@ def test_a_record_that_lost_a_line_is_given_up() -> None:
     ],
 )
 def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -> None:
-    """A notice names the likely sender of foreign data; the first valid line ends the notice."""
+    """Foreign data arrives, and a notice names its likely sender.
+
+    The first valid line ends the notice.
+    """
     ecu = LoisConversation(HOST_GAINS)
     assert ecu.receive(data * 100, 0.0) == []
     assert ecu.advice is not None
@@ -235,7 +263,7 @@ def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -
 
 
 def test_the_number_of_damaged_groups_survives_a_new_connection() -> None:
-    """Damaged groups are counted over all connections, not from the last one on."""
+    """The driver counts damaged groups over all connections, not only since the last one."""
     ecu = LoisConversation(LoisEcuSettings())
     groups = [encode_report(Ticks(1000 + 200 * i, 5 + i, 7 + i)) for i in range(3)]
     last_line_at = 3 * len(groups[0]) // 4

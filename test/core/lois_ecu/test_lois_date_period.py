@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The period of the GPS date, and the requests for a single date that confirm the settings."""
+"""Tests of the period of the GPS date, and of requests for one date, which confirm the settings."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench
@@ -11,9 +11,11 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 class DeafBench(Bench):
-    """A bench whose board does not receive copy number ``nth`` of the line ``lost``.
+    """A bench whose board does not receive one copy of the line that sets the date period.
 
-    That line sets the period of the GPS date.
+    ``lost``: that line.
+
+    ``nth``: number of the copy, from 1. With 0, the board receives every copy.
     """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
@@ -33,7 +35,10 @@ class DeafBench(Bench):
 
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """A request for a single date replaces the date period, so the period is then sent again."""
+    """A request for one date replaces the date period, so the driver sends the period again.
+
+    One of these lines is lost, and the board still has the right period at the end.
+    """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
         bench = DeafBench(firmware, 500, nth)
@@ -43,7 +48,10 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The settings restart the date period, so only dates on request can confirm the settings."""
+    """The settings restart the date period, so only requested dates can confirm the settings.
+
+    The driver confirms the settings and leaves the right period.
+    """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)
     assert bench.session.board._ecu.confirmed

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS decoder on undamaged and damaged streams."""
+"""Tests of the LOIS decoder on undamaged and damaged streams."""
 
 import itertools
 from random import Random
@@ -31,13 +31,16 @@ GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d"
 
 
 def rounded(found: list[Report]) -> list[bytes]:
-    """Encode the reports as lines, to compare them; rounded floats do not change the lines."""
+    """Return the reports as lines, which can be compared in spite of rounded floats."""
     return [encode_report(report) for report in found]
 
 
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> None:
-    """A stream gives the same reports if it is fed byte by byte or cut at random places."""
+    """A stream is decoded at once, byte by byte or cut at random places.
+
+    The reports are the same.
+    """
     said = reports(20.0, firmware=firmware)
     sent = [report for _, report in said]
     stream = pieces(said)
@@ -55,7 +58,10 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """After the first group of a kind, a plausible group is returned with its last byte."""
+    """The decoder returns a plausible group with the group's last byte.
+
+    Only the first group of each kind has to wait.
+    """
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
         for group in (odometry, ticks):
@@ -69,9 +75,9 @@ def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() 
 
 
 def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
-    """A group that ends with two equal lines waits for the next line, or for 50 ms of silence.
+    """A group ends with two equal lines, which might be one line that was received twice.
 
-    The equal lines might be one line that was received twice.
+    The decoder waits for the next line, or for 50 ms of silence, before it returns the group.
     """
     alike = encode_report(Ticks(1000, 5, 5))
     decoder = LoisDecoder()
@@ -95,9 +101,12 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     ],
 )
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """A group with a damaged line is discarded, unless its last line arrives twice.
+    """One line of a group is damaged, and the decoder discards the group.
 
-    A GPS fix is discarded even then, since it waits for the next line.
+    The next group is returned.
+
+    A group whose last line arrives twice is returned, except a GPS fix, which waits for the next
+    line.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -128,7 +137,10 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
 
 
 def test_a_doubled_marker_costs_nothing() -> None:
-    """Two markers enclose an empty group, which counts as damaged; the next group is returned."""
+    """A marker arrives twice, with an empty group in between that counts as damaged.
+
+    The group after the second marker is returned.
+    """
     marker, *values = encode_report(TICKS[0]).splitlines(keepends=True)
     decoder = LoisDecoder()
     found = decoder.feed(marker + marker + b"".join(values), 0.0) + decoder.flush(0.0)
@@ -138,7 +150,10 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """If a line of ticks is lost, the odometry after the ticks is still decoded, and vice versa."""
+    """Odometry follows a group of ticks, and a line of one of the two is lost.
+
+    The other is decoded.
+    """
     decoder = LoisDecoder()
     found: list[Report] = []
     sent: list[bytes] = []
@@ -158,7 +173,10 @@ def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> Non
 
 @pytest.mark.parametrize("kind", RecordKind)
 def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKind) -> None:
-    """If a line of a record is lost, doubled, cut or foreign, no wrong record is returned."""
+    """A line of a record is lost, doubled, cut or foreign. The decoder returns no wrong record.
+
+    It then decodes the next record.
+    """
     samples = tuple(range(20, 31))
     record = Record(kind, samples, () if kind is RecordKind.HEADING else samples[:5])
     whole = encode_report(record)
@@ -185,14 +203,17 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 
 
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
-    """In a record that was not requested, lost lines could not be noticed, so it is discarded."""
+    """A record that was not requested is discarded.
+
+    The decoder cannot tell whether lines of such a record are lost.
+    """
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
     assert decoder.group_statistics.damaged_groups == 1
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """One group of ticks that jumps is an error; two that agree show that the board restarted."""
+    """A single group of ticks that jumps is an error. Two such groups that agree show a restart."""
     decoder = LoisDecoder()
     said = [
         Ticks(400, 1000, 1001),
@@ -222,7 +243,10 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
     ],
 )
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
-    """A line of unknown kind or with a value out of range is counted and gives no report."""
+    """A valid line has an unknown kind or a value out of range.
+
+    It is counted and gives no report.
+    """
     total = 0
     for character in line[:11]:
         total ^= character
@@ -233,14 +257,20 @@ def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
 
 @pytest.mark.parametrize("unit", ["ms", "ns"])
 def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
-    """The board's clock counts ns in the manual, but ms in the public firmware."""
+    """The board's clock counts ns in the manual, but ms in the public firmware.
+
+    The decoder finds out.
+    """
     said = reports(4.0, firmware=unit == "ms")
     _, decoder = decoded(pieces(said))
     assert decoder.clock_unit == unit
 
 
 def test_a_line_that_lost_its_end_costs_no_other() -> None:
-    """A line without its line end is ended by the colon of the next line, which is decoded."""
+    """A line has lost its line end.
+
+    The colon of the next line ends it, and the next line is decoded.
+    """
     heading = encode_report(Heading(5))
     decoder = LoisDecoder()
     assert decoder.feed(b"x:\xff:12" + heading[:9] + heading, 0.0) == [Heading(5)]
@@ -248,7 +278,10 @@ def test_a_line_that_lost_its_end_costs_no_other() -> None:
 
 
 def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required() -> None:
-    """A checksum that is present must be right, even where checksums are optional."""
+    """A line with a wrong checksum is refused, even where checksums are optional.
+
+    A line without a checksum is refused only where a checksum is required.
+    """
     heading = encode_report(Heading(5))
     for sum_required in (True, False):
         decoder = LoisDecoder(sum_required=sum_required)
@@ -258,7 +291,10 @@ def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required
 
 
 def test_lines_of_a_sensor_come_out_where_they_are_expected() -> None:
-    """Sensor lines are passed on in a terminal mode; in other modes they count as damage."""
+    """The decoder passes sensor lines on in a terminal mode.
+
+    In other modes they count as damage.
+    """
     data = b"$HEHDT,12.3,T*1F\r\n\xff\xfe\n" + encode_report(Heading(5))
     decoder = LoisDecoder()
     assert decoder.feed(data, 0.0) == [Heading(5)]

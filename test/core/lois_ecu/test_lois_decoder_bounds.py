@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Limits of the LOIS decoder: any bytes are safe, and lost bytes give no wrong value.
+"""Limits of the LOIS decoder: it accepts any bytes, and lost bytes give no wrong value.
 
-Set ``LOIS_SEEDS`` to measure longer: ``LOIS_SEEDS=100 pytest -s -k byte_loss`` prints the figures.
+Set ``LOIS_SEEDS`` to measure longer: ``LOIS_SEEDS=100 pytest -s -k byte_loss`` prints the results.
 """
 
 import os
@@ -32,7 +32,10 @@ codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
 def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
     chunks: list[bytes], terminal: bool
 ) -> None:
-    """Any bytes in any chunks raise nothing, and fewer than 256 bytes are held between calls."""
+    """Any bytes arrive in any chunks. The decoder raises no error and gives the same reports.
+
+    It holds fewer than 256 bytes between calls.
+    """
     data = b"".join(chunks)
     results = []
     for cut in (chunks, [data], [bytes([byte]) for byte in data]):
@@ -54,7 +57,10 @@ def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
 def test_any_lines_are_taken_in_any_chunks_with_equal_results(
     lines: list[tuple[int, int, int, int]], kind: RecordKind
 ) -> None:
-    """Valid lines, and lines that lost a character, come in any order and any chunks."""
+    """Valid and damaged lines arrive in any order and any chunks.
+
+    The reports do not depend on the chunks.
+    """
     data = b""
     for code, payload, at, harm in lines:
         line = b":%02x%08x" % (code, payload)
@@ -77,9 +83,9 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end of a record, but must not end it.
+    """A torque sample of 0/0 looks like the end of a record. It does not end the record.
 
-    The record may come under either of two command numbers.
+    The public firmware and the manual have different command numbers for such a record.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)
@@ -94,7 +100,7 @@ def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> No
 
 
 def test_a_record_without_end_is_not_kept() -> None:
-    """The decoder holds at most the requested number of samples of a record."""
+    """A record never ends. The decoder holds at most the requested number of samples."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 10, 10)
     decoder.feed(b":04000a000b3d\n" * 5000, 0.0)
@@ -106,7 +112,10 @@ def test_a_record_without_end_is_not_kept() -> None:
 @pytest.mark.parametrize("sum_required", [True, False], ids=["with sum", "sum off"])
 @pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "documented"])
 def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmware: bool) -> None:
-    """In drives of ten minutes no report is wrong, and at least 85 % of each kind arrive."""
+    """Bytes are lost during drives of ten minutes. No report is wrong.
+
+    Of the reports that lost no byte, at least 85 % arrive.
+    """
     sent, came, wrong = Counter[str](), Counter[str](), Counter[str]()
     for seed in range(SEEDS):
         said = reports(600.0, firmware=firmware)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The notice about controller gains that the user has not set, for which the board uses its own."""
+"""The notice about controller gains that the user has not set, so that the board uses its own."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def opened(settings: LoisEcuSettings) -> AnyBench:
-    """Return a session that was opened ten seconds ago."""
+    """Return a bench whose session was opened ten seconds ago."""
     bench = AnyBench(LoisEcuBoard(settings), LoisRobot("firmware"))
     bench.open()
     bench.run(10.0)
@@ -28,7 +28,10 @@ def told(bench: AnyBench) -> list[str]:
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """The log has one notice, and the diagnostics name the gains until they are set."""
+    """The user has set no gains.
+
+    One notice says so, and the diagnostics name them until they are set.
+    """
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
     assert "by 0.2 to 2 m in a few drives. Run calibrate step" in sentence
@@ -38,7 +41,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
 
 
 def test_gains_that_are_set_need_no_words() -> None:
-    """The notice names each gain that is not set, and is absent if all are set."""
+    """The notice names only gains that are not set, and does not appear if all are set."""
     assert told(opened(HOST_GAINS)) == []
     written = {name: one for name, one in HOST_GAINS.written.items() if name != Setting.RIGHT_TN}
     (sentence,) = told(opened(replace(HOST_GAINS, written=written)))
@@ -46,5 +49,5 @@ def test_gains_that_are_set_need_no_words() -> None:
 
 
 def test_without_a_speed_controller_its_gains_do_not_matter() -> None:
-    """Duty commands bypass the speed controllers, so no notice is needed."""
+    """Duty commands bypass the speed controllers. The notice does not appear."""
     assert told(opened(LoisEcuSettings(drive_mode="duty"))) == []

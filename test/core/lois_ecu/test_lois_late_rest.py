@@ -22,7 +22,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "
 
 
 def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
-    """Return the reports of the pieces, even those that only silence completes."""
+    """Decode the pieces and return all reports, even those that only a silence completes."""
     decoder, found = LoisDecoder(), list[Report]()
     for at, data in given:
         if decoder.resolves_at <= at:
@@ -34,7 +34,7 @@ def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
 @FIRMWARE
 @pytest.mark.parametrize("pause_s", [0.06, 0.1, 0.14])
 def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: float) -> None:
-    """Each burst of lines is read in two parts; the second part is read ``pause_s`` later."""
+    """The host reads each burst of lines in two parts, ``pause_s`` apart. No report is lost."""
     said = reports(4.0, firmware=firmware)
     bursts = [
         (at, b"".join(encode_report(report) for _, report in group))
@@ -51,7 +51,10 @@ def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: fl
 
 @given(st.data(), st.booleans())
 def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject, cut: bool) -> None:
-    """Each burst is read in parts within 145 ms; the reports are the same as from one read."""
+    """The host reads each burst in parts within 145 ms.
+
+    The reports are the same as from one read.
+    """
     firmware = data.draw(st.booleans())
     said = reports(2.4, firmware=firmware)
     read: list[Piece] = []
@@ -72,7 +75,7 @@ def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject,
 def test_lines_of_two_groups_never_make_one_group(kind: str, step_s: float) -> None:
     """The end of one burst and the beginning of the next are lost.
 
-    If as many lines remain as a group has, only the time between these lines shows the loss.
+    As many lines may remain as a group has. Only the time between these lines then shows the loss.
     """
     groups: list[list[Report]] = []
     for n in range(1, 7):

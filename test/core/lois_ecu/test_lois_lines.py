@@ -102,7 +102,10 @@ def sum_in_capitals(lines: bytes) -> bytes:
 
 @pytest.mark.parametrize(("line", "command"), COMMANDS, ids=lambda value: str(value)[:32])
 def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
-    """The manual's lines are encoded and decoded; upper case and a carriage return are accepted."""
+    """Each command is encoded to the manual's line, and the line is decoded to the command.
+
+    Upper case and a carriage return are accepted.
+    """
     assert encode_command(command) == line
     for form in (line, in_capitals(line), sum_in_capitals(line), line[:-1] + b"\r\n"):
         decoded = decode_command(form)
@@ -127,9 +130,9 @@ def test_a_command_without_checksum_is_two_characters_shorter(
 
 @pytest.mark.parametrize(("lines", "report"), REPORTS, ids=lambda value: str(value)[:32])
 def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
-    """The lines are decoded to the report, and the report is encoded to the lines.
+    """Each report is encoded to the manual's lines, and the lines are decoded to the report.
 
-    Upper case is decoded like lower case.
+    Upper case and a carriage return are accepted.
     """
     assert encode_report(report) == lines
     for form in (lines, in_capitals(lines), sum_in_capitals(lines), lines.replace(b"\n", b"\r\n")):
@@ -139,7 +142,10 @@ def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
 
 
 def test_odometry_behind_ticks_is_told_by_its_length() -> None:
-    """Message 0x12 of the public firmware has 3 lines of ticks, or 6 lines with odometry."""
+    """Message 0x12 of the public firmware contains ticks (3 lines) or odometry (6 lines).
+
+    The decoder tells them apart by the number of lines.
+    """
     decoder = LoisDecoder()
     ticks = b":12ffffffff39\n:120000019031\n:120000000a68\n:120000000930\n"
     odometry = encode_report(BoardOdometry(0.5, 0.25, 0.125, 0.0, 0.0, 0.0, appended=True))
@@ -151,7 +157,10 @@ def test_odometry_behind_ticks_is_told_by_its_length() -> None:
 
 
 def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
-    """A velocity of NaN is reported as missing; the pose in the same report stays valid."""
+    """A report has NaN or infinity as velocity.
+
+    The decoder passes it on, and the pose stays valid.
+    """
     decoder = LoisDecoder()
     lines = encode_report(BoardOdometry(1.0, 2.0, 3.0, math.nan, math.inf, -math.inf))
     (report,) = decoder.feed(lines, 0.0) + decoder.flush(0.0)
@@ -162,7 +171,10 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """Zeros end a record of tick times; the decoder removes the padding (10) from a channel."""
+    """Zeros end a record of tick times.
+
+    The decoder removes the padding (10) from the shorter channel.
+    """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)
     data = b":04000a000b3d\n" + encode_report(Record(RecordKind.RPM, (10, 12), (11,)))[14:]
@@ -171,7 +183,10 @@ def test_a_record_of_tick_times_ends_with_zeros() -> None:
 
 
 def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> None:
-    """The public firmware answers the request 0x17 (torque) with 0x04 (tick times)."""
+    """The public firmware answers a request for torque (0x17) with the number of tick times (0x04).
+
+    The decoder accepts both numbers.
+    """
     for code in (b"04", b"17"):
         decoder = LoisDecoder()
         decoder.expect_record(RecordKind.TORQUE, 1, 1)
@@ -181,7 +196,7 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """Two values of 362° end a record of headings; a third makes the number of values even."""
+    """Two values of 362° end a record of headings. A third makes the number of values even."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)
     data = b":0c0005fffb68\n:0c0003016a3c\n:0c016a016a69\n"
@@ -204,7 +219,10 @@ def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
     ids=str,
 )
 def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
-    """The encoder refuses, for example, a period of 0, which would make the board deaf."""
+    """The encoder refuses values out of range.
+
+    An example is a period of 0, which would make the board deaf.
+    """
     with pytest.raises(FrameError):
         encode_command(command)
 

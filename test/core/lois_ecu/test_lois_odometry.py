@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How odometry of a LOIS robot is estimated from ticks, reports and commands."""
+"""Tests of how the odometry of a LOIS robot is estimated from ticks, reports and commands."""
 
 import math
 from dataclasses import replace
@@ -37,7 +37,7 @@ def settled(firmware: Firmware) -> Rig:
 
 
 def test_the_boards_own_odometry_would_be_wrong() -> None:
-    """The odometry that the board sends misses over 15 % of a straight drive, so it is not used."""
+    """The board's own odometry misses over 15 % of a straight drive. The driver does not use it."""
     rig = settled("firmware")
     rig.order(20, 20, 8.0)
     board = rig.board.odometry.pose
@@ -49,7 +49,10 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The public firmware counts no ticks backward; commands and heading are then used instead."""
+    """The odometry names its source. Forward it is the ticks.
+
+    The public firmware counts no ticks backward, so commands and heading are used then.
+    """
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
     assert rig.estimates[-1][0].source == "ticks"
@@ -67,7 +70,7 @@ def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
 
 @BOTH
 def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
-    """Report 0x20 repeats an old velocity, which must not move the pose."""
+    """The robot has stopped, but report 0x20 repeats the old velocity. The pose does not move."""
     rig = settled(firmware)
     rig.order(20, 25, 4.0)
     rig.order(0, 0, 2.0)
@@ -82,9 +85,9 @@ def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
 
 @BOTH
 def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
-    """Predictions between two estimates are wrong by less than 3 cm on average.
+    """Between two estimates, the pose is predicted, and its covariance grows.
 
-    Their covariance grows.
+    The predictions are wrong by less than 3 cm on average.
     """
     rig = settled(firmware)
     rig.order(20, 24, 6.0)
@@ -110,7 +113,10 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 
 @BOTH
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
-    """The wheels' displacements add up to the distance; no step exceeds that at 1 m/s by 3 cm."""
+    """The displacements of the wheels add up to the driven distance.
+
+    No step is longer than 3 cm plus what 1 m/s would cover.
+    """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
     rig.order(*STOP, 2.0)
@@ -122,7 +128,10 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """A restart sets the counters to zero; odometry adds at most 5 cm, in which the robot stops."""
+    """The board restarts, which sets its counters to zero and stops the robot.
+
+    The odometry adds at most 5 cm, for the way in which the robot stops.
+    """
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
     for step in range(1, 11):
@@ -141,7 +150,10 @@ def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
 def test_a_board_that_restarts_ends_the_motion_in_odom(
     firmware: Firmware, pair: tuple[int, int]
 ) -> None:
-    """The pose must not move further than the robot if set points are sent during a restart."""
+    """The board restarts while the driver sends set-points.
+
+    Odom moves no further than the robot.
+    """
     rig = settled(firmware)
     rig.order(*pair, 4.0)
     first = rig.driver.predicted(rig.now)
@@ -164,7 +176,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """A new wheel radius scales only later distances, not the distance driven before the change."""
+    """The user changes the wheel radius. Only later distances are scaled with it."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -186,7 +198,7 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
     """The odometry predicts motion between two groups of ticks, and a setting changes meanwhile.
 
-    The next group must not add the predicted motion again.
+    The next group does not add the predicted motion again.
     """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
@@ -205,9 +217,9 @@ def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """After half a second of silence, the ticks show that the wheels did not roll on as predicted.
+    """The wheels stop while the board is silent for half a second, but the prediction moves on.
 
-    The prediction was too far ahead. How far the wheels roll after their stop is not counted.
+    The next ticks show that the wheels have hardly rolled. The odometry then follows the ticks.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -226,7 +238,7 @@ def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_sa
 
 
 def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
-    """A velocity of NaN is ignored; the heading in the same report is used."""
+    """A report has NaN as velocity. The odometry ignores the velocity, but uses the heading."""
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(-20, -20), 0.0)
     found: list[FusedOdometry] = []
@@ -242,7 +254,10 @@ def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """In a backward drive by duty, only commands are known: sigma exceeds 20 % of the way."""
+    """The robot drives backward by duty, so only the commands are known.
+
+    The sigma of the distance exceeds 20 % of it.
+    """
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
     found: list[FusedOdometry] = []
@@ -256,9 +271,9 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 
 @BOTH
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
-    """On an inverted board, the board's left wheel is the robot's right one.
+    """On an inverted board, the board's left wheel is the robot's right wheel.
 
-    The estimate is still right.
+    The estimate of the yaw is still right.
     """
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)
@@ -272,10 +287,13 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the boot gains a wheel's speed oscillates, and no report shows it between two groups."""
+    """With the boot gains a wheel's speed oscillates, and no report shows it between two groups.
+
+    So the variance of a predicted speed grows after an unexpected number of ticks.
+    """
 
     def variance() -> float:
-        """Return the variance in (m/s)² of a speed predicted after a group with 4 extra ticks."""
+        """Return the variance in (m/s)² of the predicted speed after a group with 4 extra ticks."""
         odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
         odometry.wrote(SetRpm(20, 20), 0.0)
         for step in range(52):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry of a LOIS robot across a new connection."""
+"""Odometry of a LOIS robot after a reconnect."""
 
 import math
 
@@ -10,9 +10,9 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def test_odometry_before_the_first_ticks_of_a_new_line_leaves_the_covariance_finite() -> None:
-    """After a reconnect, a backward command precedes the first ticks, and the last group is old.
+    """After a reconnect, a backward command comes before the first ticks.
 
-    The covariance stays finite.
+    The last group of ticks is old by then. The covariance stays finite.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)

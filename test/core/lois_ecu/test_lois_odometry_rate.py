@@ -14,7 +14,7 @@ PERIOD_S = 0.05
 
 
 def published(board: LoisEcuBoard, now: float) -> bool:
-    """Let the time pass until ``now``; return whether the board published odometry."""
+    """Let the time pass until ``now``, and return whether the board published odometry."""
     return any(isinstance(reading, OdometryReading) for reading in board.elapse(now))
 
 
@@ -23,7 +23,7 @@ def published(board: LoisEcuBoard, now: float) -> bool:
 def test_odometry_that_is_late_is_not_published_twice_at_once(
     firmware: str, delay_s: float
 ) -> None:
-    """After a short delay the schedule of publication stays; after a long one it begins anew."""
+    """A publication is late. It is not followed at once by the next one."""
     bench = Bench(firmware)
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -37,7 +37,7 @@ def test_odometry_that_is_late_is_not_published_twice_at_once(
 
 @FIRMWARE
 def test_the_first_odometry_is_published_once(firmware: str) -> None:
-    """The second odometry is published one period after the first."""
+    """The first odometry is published once. The second one follows a period later."""
     lois = LoisRobot(firmware)
     board, now, times = LoisEcuBoard(LoisEcuSettings()), 1000.0, []
     board.connect()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to a LOIS ECU that lose characters: a short loss never makes another valid line."""
+"""Lines to a LOIS ECU lose characters. A short loss never makes another valid line."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -48,7 +48,7 @@ def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield all sets of at most ``most`` out of ``length`` positions."""
+    """Yield each set of at most ``most`` positions out of ``length``."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 
@@ -59,7 +59,10 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
 def test_no_loss_of_up_to_two_characters_makes_another_line(
     name: str, with_sum: bool, lenient: bool
 ) -> None:
-    """The firmware accepts only lines that were sent, in their order; it rejects damaged ones."""
+    """Up to two characters of the driver's lines are lost. The firmware rejects the damaged lines.
+
+    It accepts only lines that were sent, in their order.
+    """
     data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
     said = heard(data, with_sum=with_sum, lenient=lenient)
     assert len(said) == len(TALKS[name])
@@ -72,7 +75,10 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """A loss of fewer characters than a line has cannot join two lines to another valid line."""
+    """A run of characters shorter than a line is lost.
+
+    Two lines never join to another valid line.
+    """
     length = 14 if with_sum else 12
     for talk in TALKS.values():
         data = b"".join(encode_command(command, with_sum=with_sum) for command in talk)
@@ -84,9 +90,9 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """A loss of exactly one line's length may join two set points, so they are sent 18 ms apart.
+    """Exactly one line's length is lost across two set-points, and the rest is another valid line.
 
-    The board may be deaf for 13 ms without a break.
+    The board may be deaf for 13 ms at a time, so the driver sends set-points 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -97,7 +103,11 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """The LED's line is sent 15 ms after a motion line; a motion line may follow it at once."""
+    """One line's length is lost across a motion line and the LED's line after it.
+
+    The rest may be a wrong motion, so the LED's line is sent 15 ms after a motion line. A motion
+    line may follow the LED's line at once, because the rest is then never a wrong motion.
+    """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)
     led = encode_command(SetLed(True), with_sum=with_sum)
@@ -112,7 +122,7 @@ def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_
 
 
 def test_set_points_are_found_in_what_was_written() -> None:
-    """Set-points are found between other commands, which are ignored."""
+    """The written bytes contain set-points and other commands. Only the set-points are found."""
     commands = [STOP, Reset(), CLEAR, SetRpm(20, -20), SetDuty(5, 6)]
     for with_sum in (True, False):
         data = b"".join(encode_command(command, with_sum=with_sum) for command in commands)

@@ -54,7 +54,7 @@ def happen(odometry: LoisOdometry, what: object, now: float) -> None:
 
 @given(st.lists(st.tuples(WAITS_S, HAPPENINGS), max_size=30))
 def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, object]]) -> None:
-    """The pose stays finite after any reports, commands, restarts and connections."""
+    """Reports, commands, restarts and connections come in random order. The pose stays finite."""
     odometry, now = LoisOdometry(LoisEcuSettings()), 1000.0
     for wait_s, what in events:
         now += wait_s
@@ -67,7 +67,7 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """The robot starts backward between the first two groups after a reconnect.
+    """After a reconnect, the robot starts backward between the first two groups.
 
     The covariance stays finite.
     """
@@ -88,10 +88,10 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """After a silence of 12 s, the board's clock tells a restart from wheels that rolled back.
+    """After a silence of 12 s, the tick counters are at zero instead of 500.
 
-    The 500 ticks alone do not: wheels may have that speed, and a clock in ns wraps every 4.3 s. The
-    clock of a board that restarted does not fit the length of the silence.
+    Either the board has restarted, or the wheels have rolled back. The ticks alone do not show
+    which. Only the clock of a board that restarted does not fit the length of the silence.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Records as CSV files with units; a record that is abandoned leaves no file."""
+"""Tests of records as CSV files with units. A record that is abandoned leaves no file."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ def read(path: Path, record: Record, count_s: float | None = 1e-4) -> str:
 
 
 def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
-    """At 20 RPM, 60 ticks a turn are 50 ms apart; for an overflow (65535) the cells stay empty."""
+    """At 20 RPM, 60 ticks a turn are 50 ms apart. For an overflow (65535) the cells stay empty."""
     assert read(tmp_path / "new" / "rpm.csv", RPM).splitlines() == [
         "sample,left_tick_s,right_tick_s,left_rpm,right_rpm,left_counts,right_counts",
         "0,0.0500000,0.0250000,20.00,40.00,500,250",
@@ -32,13 +32,13 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
-    """If the time unit is unknown, times and speeds are left empty, and a remark explains why."""
+    """The time unit is unknown. Times and speeds are left empty, and a remark explains why."""
     assert read(tmp_path / "rpm.csv", RPM, None).splitlines()[1] == "0,,,,,500,250"
     assert "unit" in remark(RecordReading(RPM, None, 60))
 
 
 def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
-    """Torque is in counts of the ADC, whose scale is unknown; headings are in degrees."""
+    """Torque is in counts of the ADC, whose scale is unknown. Headings are in degrees."""
     torque = Record(RecordKind.TORQUE, (200, 300), (400, 500))
     assert read(tmp_path / "t.csv", torque).splitlines() == [
         "sample,left_adc_counts,right_adc_counts",
@@ -51,7 +51,7 @@ def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
 
 
 def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
-    """No file is left after a record is abandoned, or after a write that fails."""
+    """A record is abandoned, or its file cannot be written. No file is left."""
     assert not save(RecordReading(RPM, 1e-4, 60), tmp_path / "rpm.csv", lambda: False)
     (tmp_path / "taken").mkdir()
     with pytest.raises(OSError, match="taken"):
@@ -60,5 +60,5 @@ def test_a_record_that_nobody_waits_for_leaves_no_file(tmp_path: Path) -> None:
 
 
 def test_names_tell_what_and_when() -> None:
-    """The name of a record's file has the kind of record and the UTC time, to the microsecond."""
+    """The file name of a record contains its kind and the UTC time, to the microsecond."""
     assert file_name(RecordKind.TORQUE, 0.25) == "torque_19700101T000000_250000.csv"

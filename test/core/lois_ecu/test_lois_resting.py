@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a wheel at rest whose last speed the public firmware still reports."""
+"""Detection of a wheel that is at rest while the public firmware still reports its last speed."""
 
 import pytest
 
@@ -10,7 +10,7 @@ GROUP_S = 0.1
 
 
 def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
-    """Return an estimator that has received these speeds, one in each group."""
+    """Return a detector that has received these speeds, one with each group."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
         wheel.tell(rpm, GROUP_S, tuned=tuned)
@@ -18,14 +18,20 @@ def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
 
 
 def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands() -> None:
-    """With the boot gains a wheel falls from 31 to 12 RPM and stops; 12 RPM is then repeated."""
+    """The reported speed falls from 31 to 12 RPM, and then 12 RPM is repeated.
+
+    The wheel is at rest.
+    """
     assert told(31, 28, 19, 12).chance == 0.0
     assert 0.0 < told(31, 28, 19, 12, 12).chance < 1.0
     assert told(31, 28, 19, 12, 12, 12).chance == 1.0
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """After a fall from 41 to 20 RPM, the third repetition of 20 RPM shows that the wheel rests."""
+    """The reported speed falls from 41 to 20 RPM, which is fast.
+
+    Only the third repetition of 20 RPM shows that the wheel is at rest.
+    """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
     assert 0.0 < told(43, 41, 29, 20, 20, 20).chance < 1.0
@@ -33,33 +39,47 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """With the user's gains, wheels overshoot and then roll steadily; few stop by themselves."""
+    """The user has set the gains.
+
+    Wheels then overshoot and roll steadily, and few stop by themselves.
+
+    So even twenty repetitions do not show for certain that the wheel is at rest.
+    """
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 
 
 def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
-    """A speed that never fell is that of a rolling wheel, however often it is repeated."""
+    """The reported speed never fell. The wheel rolls, however often its speed is repeated."""
     assert told(19, 20, *[20] * 50).chance == 0.0
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """A late tick makes the next one seem early, so one report shows 27 RPM instead of 18."""
+    """A late tick makes the next one seem early, so one report has 27 RPM instead of 18.
+
+    This is not taken for a wheel that stopped.
+    """
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
 
 @pytest.mark.parametrize("rpm", [1, 3, 25, 40])
 def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
-    """A wheel that comes to rest by itself has a last speed of 4.5 to 23.5 RPM."""
+    """The repeated speed is below 4.5 or above 23.5 RPM.
+
+    No wheel comes to rest from such a speed.
+    """
     assert told(60, 58, 55, rpm, rpm, rpm, rpm).chance == 0.0
 
 
 def test_another_speed_ends_the_rest() -> None:
-    """A change of the reported speed shows another tick of the wheel."""
+    """The reported speed changes, which shows another tick. The wheel is not at rest any more."""
     assert told(31, 28, 12, 12, 12, 2).chance == 0.0
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """The board reports no speed while both wheels are equally fast; then estimates show a fall."""
+    """The board reports no speed while both wheels are equally fast.
+
+    Estimates then show the fall.
+    """
     wheel = told(12)
     for rpm in (30.0, 28.0):
         wheel.note(rpm, GROUP_S)

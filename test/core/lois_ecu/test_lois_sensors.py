@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings of GPS, clock and compass of a LOIS ECU."""
+"""Tests of the readings of GPS, clock and compass of a LOIS ECU."""
 
 import math
 from datetime import date
@@ -22,7 +22,10 @@ from omnibot_driver.simulator.lois_ecu import DOCUMENTED, LoisSettings
 
 
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
-    """East is yaw 0; a GPS time needs a date; the position 0/0 is not a fix."""
+    """The readings are in SI units, and yaw 0 is east.
+
+    A GPS time needs a date. The position 0/0 is not a fix.
+    """
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
         LoisEcuSettings(periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000}),
@@ -56,14 +59,17 @@ def test_gps_and_compass_come_in_si_units_and_enu() -> None:
     ids=str,
 )
 def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
-    """The expected seconds are those of ``date -u +%s``."""
+    """A date and a time become UTC seconds. The expected seconds are those of ``date -u +%s``."""
     ecu = LoisConversation(LoisEcuSettings())
     found = ecu.receive(encode_report(day) + encode_report(GpsTime(0, 0, 1)), 0.0)
     assert found == [TimeReading(utc_s + 1)]
 
 
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
-    """With the old date, the time after midnight would be a day too early."""
+    """After midnight the date is still the old one, so the time would be a day too early.
+
+    It is unknown until a new date arrives.
+    """
     ecu = LoisConversation(LoisEcuSettings())
     said = [GpsDate(26, 11, 22), GpsTime(23, 59, 59), GpsTime(0, 0, 1), GpsDate(26, 11, 23)]
     found: list[object] = []
@@ -76,14 +82,17 @@ def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
 
 
 def test_declination_turns_the_heading() -> None:
-    """Declination is positive to the east: yaw = pi/2 - (heading + declination)."""
+    """The declination is positive to the east: yaw = pi/2 − (heading + declination)."""
     ecu = LoisConversation(LoisEcuSettings(declination_rad=0.1))
     found = ecu.receive(encode_report(Heading(90)) * 3, 0.0)
     assert found[-1] == HeadingReading(pytest.approx(-0.1))
 
 
 def test_false_headings_at_north_are_refused() -> None:
-    """The public firmware averages headings around north wrongly: 359, 1 and 1 give 120."""
+    """The public firmware averages headings around north wrongly: 359°, 1° and 1° give 120°.
+
+    The driver refuses such headings.
+    """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)
     rig.readings.clear()
@@ -101,10 +110,10 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """The yaw is reset with the odometry, so later headings are compared with the new yaw.
+    """The odometry is reset, and later headings are compared with the new yaw.
 
-    Otherwise a reported heading of 120 degrees, which the firmware may send at north, would be
-    refused for good after a turn of 120 degrees.
+    Otherwise, after a turn of 120°, all headings would be refused once the firmware had sent a
+    wrong heading of 120° at north.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sessions with a simulated LOIS ECU: e-stop button, advice, resets, records, late reads."""
+"""Sessions with a simulated LOIS ECU: e-stop button, advice, resets, records, and late reads."""
 
 import pytest
 from any_board import TICK_S
@@ -19,7 +19,10 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The board obeys set points even while its button is held, so the e-stop stays latched."""
+    """The user holds the e-stop button, but the board obeys set-points even then.
+
+    So the driver does not release the e-stop before the button is released.
+    """
     bench = Bench(firmware)
     bench.drive_on()
     bench.presses(True)
@@ -36,7 +39,10 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """A LOIS ECU has no ~/start: advice names its own parameters, and the release of the e-stop."""
+    """The motion monitor trips. Its advice names parameters of the LOIS ECU.
+
+    The board has no ~/start, so the advice names the release of the e-stop instead.
+    """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
         with pytest.raises(CommandRefused, match="motion monitor"):
@@ -58,7 +64,10 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """Even after a drive of 1.2 s, with few ticks, the counters' change to zero is a proof."""
+    """The user resets the board, and its tick counters jump to zero. This proves the reset.
+
+    A drive of 1.2 s before it gives enough ticks.
+    """
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
     bench.run(3.0)
@@ -71,7 +80,10 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """If the tick counters were zero before, no report proves the reset: it stays unconfirmed."""
+    """The tick counters are zero before a reset, so no report can prove it.
+
+    The answer says that the reset is unconfirmed.
+    """
     bench = Bench(firmware)
     before = len(bench.written)
     done = bench.reset()
@@ -84,7 +96,10 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
-    """A change of fewer than twenty ticks does not prove that the board was reset."""
+    """The reset is lost at first, so the tick counters do not change and nothing is confirmed.
+
+    The driver repeats it, and the counters then prove the reset.
+    """
     bench = Bench(firmware)
     bench.drive_on(0.2, 1.2)
     bench.run(3.0)
@@ -102,7 +117,10 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
-    """The first reset set the counters to zero, so zeros do not prove the second, which is lost."""
+    """A first reset sets the tick counters to zero, and a second reset is lost.
+
+    Counters of zero do not prove the second one, so it is unconfirmed.
+    """
     bench = Bench(firmware)
     bench.drive_on(0.2, 6.0)
     bench.run(3.0)
@@ -115,7 +133,10 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
 @pytest.mark.slow
 @FIRMWARE
 def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
-    """For 1.2 s the board sends nothing but the record, while the robot is driven."""
+    """For 1.2 s the board sends only a record while the robot drives.
+
+    The record arrives complete.
+    """
     bench = Bench(firmware)
     bench.drive_on(0.6, 2.0)
     board = bench.session.board
@@ -131,7 +152,7 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
 
 
 def test_a_long_record_is_not_taken_for_damage() -> None:
-    """Lines of a record are valid although they are not reports, so no damage is reported."""
+    """The lines of a record are not reports, but they are valid. No notice about damage appears."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -145,7 +166,10 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """Half a line arrives, then nothing: the notice says so, and does not blame the baud rate."""
+    """The board loses power within a line. The notice says that no data arrives.
+
+    It does not blame the baud rate.
+    """
     bench = Bench("firmware")
     while not bench.board._uart.sending:
         bench.run(0.01)
@@ -159,10 +183,10 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """Each of the five rounds writes the settings in a different order.
+    """The driver writes the settings in five rounds, each in a different order.
 
-    A round can take as long as the time between two groups. In a fixed order, the board would then
-    be deaf for the same line in every round.
+    A round can take as long as the time between two groups. In a fixed order, the board would be
+    deaf for the same line in every round.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -176,7 +200,7 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
 
 @FIRMWARE
 def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
-    """All groups of 0.6 s arrive in one read; odometry stays within 0.15 m of the truth."""
+    """All groups of 0.6 s arrive in one read. Odometry stays within 0.15 m of the truth."""
     bench = Bench(firmware, HOST_GAINS)
     for _ in range(8):
         late: list[bytes] = []
@@ -194,7 +218,10 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
 
 @FIRMWARE
 def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
-    """After a connection the driver repeats its settings, but no longer after the final Stop."""
+    """The driver repeats its settings after a connection, and then the shutdown begins.
+
+    It sends only Stop from then on.
+    """
     bench = Bench(firmware)
     bench.close()
     bench.open()
@@ -208,7 +235,7 @@ def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
-    """A reset of the board's counters during a drive does not move the odometry."""
+    """The board's counters are reset during a drive. This does not move the odometry."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 4.0)
     before_m = bench.odometry[-1].pose.x_m - bench.robot.way_m

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motions encoded as set-points of a LOIS ECU, against lines that are typed by hand."""
+"""Motions encoded as set-points of a LOIS ECU are compared with lines typed by hand."""
 
 import math
 
@@ -18,14 +18,14 @@ RPM = math.tau / 60
 
 
 def started(settings: LoisEcuSettings | None = None) -> LoisConversation:
-    """Return a conversation that has already sent the three RPM 0/0 due after a Stop."""
+    """Return a conversation that has already sent RPM 0/0 three times, as is due after a Stop."""
     ecu = LoisConversation(LoisEcuSettings() if settings is None else settings)
     ecu.wrote(CLEAR * 3, 0.0)
     return ecu
 
 
 def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
-    """While the e-stop is latched, lines of duty zero and RPM zero alternate."""
+    """Stop is the line of duty zero, and the e-stop is the line of RPM zero."""
     ecu = LoisConversation(LoisEcuSettings())
     assert ecu.stop() == STOP
     assert ecu.emergency_stop() == CLEAR
@@ -43,7 +43,7 @@ def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
     ],
 )
 def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: bytes) -> None:
-    """Above 50 RPM both wheels are slowed by the same factor; rates that round to 0 are a Stop."""
+    """Above 50 RPM both wheels are slowed by one factor. Rates that round to 0 are a Stop."""
     ecu = started()
     total = 0
     for character in line[:11]:
@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """20 RPM are 0.2723 m/s; ``meaning`` turns the line back into the twist, up to rounding."""
+    """A speed of 0.2723 m/s is sent as 20 RPM. ``meaning`` gives the twist of the line, rounded."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -65,7 +65,7 @@ def test_a_twist_is_said_and_understood() -> None:
 
 
 def test_an_inverted_board_has_its_wheels_exchanged() -> None:
-    """On an inverted board, the wheels are exchanged in encoded and in decoded lines."""
+    """On an inverted board, left and right wheel are exchanged in encoded and in decoded lines."""
     ecu = started(LoisEcuSettings(inverted=True))
     left = ecu.velocity(BodyTwist(0.0, 0.0, 0.5))
     assert left == started().velocity(BodyTwist(0.0, 0.0, -0.5))
@@ -73,7 +73,7 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
 
 
 def test_duty_is_limited() -> None:
-    """Duty is in percent; above the limit, both duties are reduced by the same factor."""
+    """Duty is in percent. Above the limit, both duties are reduced by one factor."""
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
     percent_radps = 1 / (130.0 * 0.13)
     assert ecu.wheels([50 * percent_radps] * 2) == b":01003200323b\n"
@@ -83,12 +83,15 @@ def test_duty_is_limited() -> None:
 
 
 def encode_command_duty(left: int, right: int) -> bytes:
-    """Return the line of a duty command, made by the codec, which has tests of its own."""
+    """Return the line of a duty command, made by the codec. The codec has tests of its own."""
     return encode_command(SetDuty(left, right))
 
 
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
-    """After a Stop, RPM 0/0 is sent three times; without it a wheel at rest might never start."""
+    """After a Stop, RPM 0/0 is sent before each of the first three set-points.
+
+    Without it, a wheel at rest might never start.
+    """
     ecu = started()
     drive = b":020014001438\n"
     for now in (1.0, 1.1):
@@ -102,7 +105,7 @@ def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
 
 
 def test_a_record_that_cannot_complete_is_refused() -> None:
-    """The board never ends a record of more than 1024 samples."""
+    """The driver refuses records of over 1024 samples, because the board never ends them."""
     ecu = started()
     for samples in (0, 1025):
         with pytest.raises(RequestRefused, match="1 to 1024"):
@@ -118,7 +121,10 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
     ],
 )
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
-    """The request is sent three times, in case one is lost, and soon: each restarts the record."""
+    """The driver sends the request for a record three times, because one may be lost.
+
+    It does so quickly, because each request restarts the record.
+    """
     ecu = started()
     ecu.record(kind, samples)
     sent = b"".join(ecu.due(0.01 * step) for step in range(100))

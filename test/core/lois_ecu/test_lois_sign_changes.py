@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Covariance after set-points that change sign in quick succession."""
+"""The covariance after set-points that change their sign in quick succession."""
 
 import pytest
 from lois_drives import HOST_GAINS
@@ -11,7 +11,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def variance(settings: LoisEcuSettings, holds_s: float) -> float:
-    """Return the yaw variance in rad² after three changes of sign at intervals of ``holds_s``."""
+    """Return the yaw variance in rad² after three changes of sign, ``holds_s`` apart."""
     odometry = LoisOdometry(settings)
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     now, rpm, turned_s = 0.0, 20, 1.0
@@ -29,7 +29,10 @@ def variance(settings: LoisEcuSettings, holds_s: float) -> float:
 
 
 def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
-    """With the boot gains, a wheel still oscillates when the set point changes its sign again."""
+    """The set-points change their sign again while a wheel with the boot gains still oscillates.
+
+    The yaw variance is larger than with the user's gains.
+    """
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
 
@@ -37,7 +40,7 @@ def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own
 def test_a_wheel_that_has_settled_is_not_doubted(
     settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sign change of the set points adds an error only if it comes soon after another one."""
+    """A sign change of the set-points adds variance only if it comes soon after another one."""
     soon, late = variance(settings, 0.6), variance(settings, 15.0)
     monkeypatch.setattr(motion_filter, "UNSETTLED_S", (0.0, 0.0))
     assert soon > 1.02 * variance(settings, 0.6)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Loss of the connection while a LOIS robot drives: without a watchdog the wheels keep turning."""
+"""The connection is lost while a LOIS robot drives.
+
+It has no watchdog, so the wheels keep turning.
+"""
 
 import math
 
@@ -13,7 +16,9 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
     """Return a bench whose connection was lost for ``seconds``, in both directions, during a drive.
 
-    ``reopened``: whether the port was closed and opened again. The robot is at rest at the end.
+    The robot is at rest at the end.
+
+    ``reopened``: whether the port was closed and opened again.
     """
     bench = nominal(firmware)
     bench.drive_on(vx, 4.0)
@@ -31,7 +36,7 @@ def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> An
 
 
 def off_by(bench: AnyBench) -> tuple[float, float]:
-    """Return the error of the estimated position, and its standard deviation, in m."""
+    """Return the error of the estimated position and its standard deviation, both in m."""
     estimate, truth = bench.odometry[-1], bench.robot.board.truth  # type: ignore[attr-defined]
     error_m = math.hypot(estimate.pose.x_m - truth.x_m, estimate.pose.y_m - truth.y_m)
     return error_m, math.sqrt(estimate.covariance.xx + estimate.covariance.yy)
@@ -44,7 +49,10 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
-    """No Stop reaches the board, so the robot drives on by metres during the outage."""
+    """The connection is lost, so no Stop reaches the board, and the robot drives on for metres.
+
+    The error of the odometry afterwards is within 3 sigma.
+    """
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m
 
@@ -55,7 +63,10 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """After an outage, the ticks tell the way forward within a tenth of the distance."""
+    """The connection is lost while the robot drives forward. The ticks still count.
+
+    So the odometry afterwards is right within a tenth of the distance.
+    """
     bench = lost_line(firmware, 0.3, seconds, reopened=False)
     error_m, _ = off_by(bench)
     assert error_m <= 0.1 * bench.robot.way_m
@@ -63,7 +74,7 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
-    """While the board is silent, the robot may still be driving, so the covariance grows."""
+    """The board is silent and the robot may still be driving. The covariance grows meanwhile."""
     bench = nominal(firmware)
     bench.drive_on(0.3, 4.0)
     bench.speaks = bench.hears = False

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a commanded wheel that stands still: the public firmware may fail to start it."""
+"""Detection of a commanded wheel that is at rest. The public firmware may fail to start a wheel."""
 
 import math
 
@@ -30,7 +30,9 @@ def pose(x_m: float) -> BoardOdometry:
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
     """Return the times in s, within six seconds, at which a wheel looked stalled.
 
-    ``ticks``: ticks of both wheels in each 0.2 s; ``ways_m``: distance in m that report 0x20 adds.
+    ``ticks``: ticks of both wheels in each 0.2 s.
+
+    ``ways_m``: distance in m by which report 0x20 grows in each 0.2 s.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -46,17 +48,20 @@ def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float)
 
 
 def test_a_wheel_that_is_to_turn_forward_and_does_not_tick_looks_stalled() -> None:
-    """The driver reports the stall every 2 s as long as the wheel stands still."""
+    """A wheel is commanded forward and does not tick. A stall is reported every 2 s."""
     assert watched(SetRpm(20, 10), ticks=(3, 0), ways_m=0.1) == [2.0, 4.0, 6.0]
 
 
 def test_wheels_that_tick_do_not() -> None:
-    """Both wheels are commanded forward, so ticks show their motion."""
+    """Both wheels are commanded forward and tick. No stall is reported."""
     assert watched(SetRpm(20, 10), ticks=(3, 1), ways_m=0.0) == []
 
 
 def test_a_wheel_that_is_to_turn_backward_is_known_by_the_pose() -> None:
-    """The public firmware counts no ticks of a wheel that turns backward, so the pose is used."""
+    """A wheel is commanded backward, and the public firmware counts no ticks of it.
+
+    A stall is reported if the reported pose does not change.
+    """
     assert watched(SetRpm(-10, 10), ticks=(0, 1), ways_m=0.01) == []
     assert watched(SetRpm(-10, -10), ticks=(0, 0), ways_m=0.0) == [2.0, 4.0, 6.0]
 
@@ -68,7 +73,7 @@ def looks_stalled(
     resting: tuple[bool, bool] = (False, False),
     settings: LoisEcuSettings | None = None,
 ) -> bool:
-    """Return whether a wheel looks stalled if these pairs of speeds are reported, every 0.2 s."""
+    """Return whether a wheel looks stalled with these reported speeds, one pair every 0.2 s."""
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
     found = False
@@ -85,24 +90,27 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """A left wheel whose reported speed never changes stands, even if the reported pose moves.
+    """The left wheel's reported speed never changes, while the other wheel ticks. It is at rest.
 
-    The firmware computes the pose from the last speed.
+    The reported pose moves all the same time, because the firmware computes it from the last speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """Above its set point a wheel gets no power; if it rolled, its reported speed would fall."""
+    """A wheel's reported speed stays above its set-point, so the wheel gets no power.
+
+    It is at rest, because a rolling wheel would become slower.
+    """
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a wheel gets power even above its set point, so its speed may be constant.
+    """With feed-forward, a wheel gets power even above its set-point. Its speed may be constant.
 
-    If the other wheel's speed changes, a constant speed still shows a wheel at rest.
+    A constant speed shows a wheel at rest only if the other wheel's speed changes.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -110,26 +118,38 @@ def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> 
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """Backward, a wheel is up to 10 % too fast, and its integer speeds repeat without a stall."""
+    """Backward, a wheel is up to 10 % too fast, and its integer speeds repeat.
+
+    It is not stalled.
+    """
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """With some gains a robot rolls backward steadily at 1.3 times its set-points."""
+    """Both wheels roll backward steadily at 1.3 times their set-points. They are not stalled.
+
+    If only one of them is so fast, a wheel looks stalled.
+    """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """If the reported speed of a wheel at rest is near its set point, the wheel gets no power."""
+    """Odometry takes a wheel to be at rest whose reported speed is near its set-point.
+
+    The wheel gets no power, so it looks stalled.
+    """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
     assert not looks_stalled(still, targets=(-19, -19))
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """If the reported speed is below the set point, the wheel has power and starts by itself."""
+    """A wheel at rest has a reported speed below its set-point.
+
+    It gets power and starts by itself.
+    """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
 
@@ -141,13 +161,19 @@ def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """Below 2 RPM a wheel may stand still, and duty commands bypass the speed controller."""
+    """Below 2 RPM a wheel may be at rest. Duty commands bypass the speed controllers.
+
+    In both cases, no stall is reported.
+    """
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
 
 
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
-    """A saturated controller keeps a wheel at 68 RPM instead of -31 until RPM 0/0 is sent."""
+    """A saturated controller keeps a wheel at −68 RPM instead of −31. The driver sends RPM 0/0.
+
+    The motion of the wheel before that stays in the odometry.
+    """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
     for step in range(30):
@@ -173,9 +199,11 @@ def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """Wheels that are blocked after a drive forward do not move the pose back.
+    """The robot drives forward, then its wheels are blocked and commanded backward.
 
-    ``reset``: the odometry is reset before the wheels are commanded backward.
+    The pose does not move back.
+
+    ``reset``: whether the odometry is reset before the backward command.
     """
     driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
     for step in range(50):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Terminal modes and drive modes of a LOIS ECU: they stop the robot first and refuse motion."""
+"""Terminal modes and drive modes of a LOIS ECU. They stop the robot first and refuse motion."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure, told
@@ -18,7 +18,10 @@ COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
 
 @FIRMWARE
 def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
-    """A terminal mode is set once the robot is at rest; then the sensor's lines are passed on."""
+    """The user sets a terminal mode while the robot drives. The driver stops the robot first.
+
+    It then sets the mode and passes the sensor's lines on. Motion is refused meanwhile.
+    """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     begun = len(bench.written)
@@ -43,7 +46,12 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The end of a terminal mode is reported once, even if the first lines that end it are lost."""
+    """The user ends a terminal mode.
+
+    Its end is reported once, even if the first lines to end it are lost.
+
+    The driver restores the "short correction" that the mode overwrote.
+    """
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -63,7 +71,10 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 
 
 def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
-    """After a restart of the board, settings are written first, and then the terminal mode."""
+    """The board restarts in a terminal mode.
+
+    The driver writes the settings, then the terminal mode.
+    """
     bench = Bench("firmware", GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
     bench.run(1.0)
@@ -79,7 +90,10 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
 def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
     firmware: str, settings: LoisEcuSettings
 ) -> None:
-    """In a terminal mode the board reports no motion, so no pose is published."""
+    """In a terminal mode the board reports no motion, so no odometry is published.
+
+    It continues when the mode ends.
+    """
     bench = Bench(firmware)
     configure(bench, settings)
     bench.run_until(lambda: bool(told(bench, TerminalLine)))
@@ -97,7 +111,7 @@ def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """In a terminal mode the e-stop is latched as usual; its release does not allow motion."""
+    """The e-stop is latched and released in a terminal mode. Motion is still refused."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -111,7 +125,12 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 
 @FIRMWARE
 def test_another_drive_mode_stops_first(firmware: str) -> None:
-    """Until the robot is at rest, motion is refused; then the new drive mode (duty) is used."""
+    """The user sets another drive mode while the robot drives.
+
+    Motion is refused until it is at rest.
+
+    Then the new drive mode is used.
+    """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
     configure(bench, LoisEcuSettings(drive_mode="duty"))
@@ -127,7 +146,10 @@ def test_another_drive_mode_stops_first(firmware: str) -> None:
 
 
 def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
-    """A duty in percent depends on the duty scale, so a new scale stops the robot first."""
+    """The user changes the duty scale while the robot is driven by duties, which depend on it.
+
+    The robot is stopped first.
+    """
     bench = Bench("firmware", LoisEcuSettings(drive_mode="duty"))
     bench.drive_on(0.3, 3.0)
     configure(bench, LoisEcuSettings(drive_mode="duty", duty_scale=500.0))
@@ -137,7 +159,10 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 
 
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
-    """In compass mode the public firmware reads only 480 characters/s, so only Stop is sent."""
+    """In compass mode the public firmware reads only 480 characters a second.
+
+    So a latched e-stop sends only Stop, and the board still obeys later lines.
+    """
     bench = Bench("firmware")
     configure(bench, COMPASS)
     bench.run_until(lambda: bench.board.terminal_mode == 2)
@@ -151,7 +176,7 @@ def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass()
 
 
 def test_a_terminal_mode_ends_a_record() -> None:
-    """No record arrives in a terminal mode, so a record that is under way is abandoned."""
+    """A terminal mode begins during a record. The record is abandoned, because it cannot arrive."""
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A position without a date is not a fix, and an unknown date is requested."""
+"""The GPS has no date. Its position is then not a fix, and the driver requests the date."""
 
 from dataclasses import replace
 from functools import partial
@@ -27,10 +27,15 @@ WORKS = pytest.mark.parametrize(
 
 
 class GpsRig(Rig):
-    """A robot whose GPS has no date until ``dated`` is set; ``sent``: lines and their times.
+    """A robot whose GPS has no date at first.
 
-    ``requests``: times of the requests for a date; ``unknown``: what the GPS sends instead of a
-    date.
+    ``dated``: whether the GPS has a date.
+
+    ``unknown``: what the GPS sends instead of a date.
+
+    ``sent``: lines to the board, each with its time in s.
+
+    ``requests``: times of the requests for a date, in s.
     """
 
     def __init__(
@@ -59,7 +64,7 @@ class GpsRig(Rig):
         return [at for at, line in self.sent if line == REQUEST]
 
     def fixes(self) -> list[bool]:
-        """Return, for each position since the last call, whether it is a fix."""
+        """Return whether each position since the last call is a fix."""
         found = [reading.valid for reading in self.readings if isinstance(reading, FixReading)]
         self.readings.clear()
         return found
@@ -72,7 +77,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 ) -> None:
     """A position is a fix only if the GPS also reports a date.
 
-    Zeros and the start of the calendar are not a date.
+    Zeros, and the days on which the GPS calendar begins, are not a date.
     """
     rig = GpsRig(quirks, unknown=unknown)
     rig.run(8.0)
@@ -89,7 +94,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 
 @WORKS
 def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Quirks) -> None:
-    """The driver requests the date until it is known; a date of zeros does not end this."""
+    """The driver requests the date until it is known. A date of zeros does not end this."""
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()
@@ -104,7 +109,10 @@ def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Q
 
 @WORKS
 def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
-    """While the robot drives, the date is requested at least 15 ms after a motion line."""
+    """The robot drives, and the date is unknown.
+
+    Requests follow at least 15 ms after a motion line.
+    """
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()
@@ -118,7 +126,7 @@ def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
 
 @WORKS
 def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirks) -> None:
-    """After midnight the new date is requested at once, and positions remain fixes."""
+    """After midnight the driver requests the new date at once. Positions are still fixes."""
     rig = GpsRig(quirks, utc_s=UTC_S + DAY_S - 10, dated=True)
     rig.run(5.0)
     rig.fixes()
@@ -133,7 +141,7 @@ def test_past_midnight_positions_are_fixes_and_the_time_comes_back(quirks: Quirk
 
 
 def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
-    """The public firmware sends zeros as position, time and date, so no date is requested."""
+    """The public firmware sends zeros as position, time and date. The driver requests no date."""
     rig = GpsRig(FIRMWARE, dated=True)
     rig.run(5.0)
     rig.sent.clear()
@@ -142,7 +150,10 @@ def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
 
 
 def test_no_date_is_requested_where_dates_come_periodically() -> None:
-    """A request for a date would replace the period that the user has set."""
+    """The user has set a period for dates.
+
+    The driver requests no date, as this would end the period.
+    """
     rig = GpsRig(DOCUMENTED)
     rig.driver.settings = LoisEcuSettings(
         periods_ms={Stream.TICKS: 200, Stream.GPS_DATE: 1000, Stream.GPS_POSITION: 1000}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to a LOIS ECU while the robot drives: settings wait, and the LED's line does not."""
+"""Lines to a LOIS ECU while the robot drives. Settings wait, but the LED's line does not."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure
@@ -12,7 +12,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def switch_led(bench: Bench, on: bool) -> None:
-    """Call ``~/led`` as the node does."""
+    """Switch the LED as the node does when ``~/led`` is called."""
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
     board.set_led(on, bench.now)
@@ -20,7 +20,7 @@ def switch_led(bench: Bench, on: bool) -> None:
 
 
 def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
-    """Drive for ``seconds``; require at each step that the session is not due again at once."""
+    """Drive for ``seconds``, and check at each step that the session is not due again at once."""
     for step in range(round(seconds / 0.01)):
         if step % 10 == 0:
             bench.drive()
@@ -30,7 +30,7 @@ def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
 
 @FIRMWARE
 def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
-    """A gain is written only after the end of a drive, but the LED's line during the drive."""
+    """The user switches the LED while the robot drives. The line is sent during the drive."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 1.0)
     switch_led(bench, on=True)
@@ -42,7 +42,10 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If no date confirms the settings, they are written again, but not while the robot drives."""
+    """The settings are not confirmed by a date, so they wait to be written again after the drive.
+
+    The session is not due all the time meanwhile.
+    """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
     bench.drive_on(0.3, 1.0)
@@ -51,7 +54,10 @@ def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
 
 @FIRMWARE
 def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> None:
-    """A change of settings does not discard the copies of the LED's line that are not sent yet."""
+    """The user switches the LED, and settings change before all copies of its line are sent.
+
+    The other copies are still sent.
+    """
     bench = Bench(firmware)
     bench.hears = False
     switch_led(bench, on=True)
@@ -62,7 +68,10 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """If 13 ms of bytes are lost, the LED's line and a motion line could become a wrong motion."""
+    """The LED's line is sent at least 14.5 ms after a motion line.
+
+    If 13 ms of bytes were lost, the two lines could become a wrong motion.
+    """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)
     switch_led(bench, on=True)

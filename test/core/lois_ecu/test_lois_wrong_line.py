@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Foreign data on the port of a LOIS ECU leads to one notice; the board is then found again."""
+"""Foreign data arrives on the port of a LOIS ECU, and one notice appears."""
 
 from random import Random
 
@@ -29,7 +29,10 @@ WRONG = {
 
 @pytest.mark.parametrize(("data", "sentence"), WRONG.values(), ids=WRONG)
 def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, sentence: str) -> None:
-    """One notice names the foreign device; once the LOIS ECU is there, the robot can be driven."""
+    """Foreign data arrives. One notice names its likely source, and motion is refused.
+
+    When the LOIS ECU sends data, the robot can be driven.
+    """
     board, robot = MAKERS["lois_ecu"]()
     bench = AnyBench(board, robot)
     bench.speaks = False
@@ -55,7 +58,10 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
 def test_a_board_whose_checksum_is_set_otherwise_is_set_right(
     firmware: str, *, checks: bool
 ) -> None:
-    """The driver restores the board's checksum setting, without a restart."""
+    """The board is set to lines with or without checksum, unlike the driver.
+
+    The driver corrects this.
+    """
     _, robot = MAKERS[firmware]()
     robot.board._reader.checks = not checks
     bench = AnyBench(LoisEcuBoard(LoisEcuSettings(with_sum=checks)), robot)
