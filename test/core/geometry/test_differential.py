@@ -22,25 +22,35 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 
 
 def test_straight_ahead_both_wheels_roll_alike() -> None:
-    """1 m/s with wheels of radius 0.1 m is 10 rad/s for both wheels."""
+    """The robot drives forward at 1 m/s.
+
+    Both wheels have a radius of 0.1 m and turn at 10 rad/s.
+    """
     assert ROBOT.wheel_rates(BodyTwist(1.0, 0.0, 0.0)) == pytest.approx((10.0, 10.0))
 
 
 def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
-    """1 rad/s with wheels 0.2 m from the centre is 0.2 m/s at the rims, and 2 rad/s of a wheel."""
+    """The robot turns left on the spot at 1 rad/s. The wheels are 0.2 m from the centre.
+
+    Their rims move at 0.2 m/s, so the left wheel turns at −2 rad/s and the right wheel at 2 rad/s.
+    """
     assert ROBOT.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == pytest.approx((-2.0, 2.0))
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """At 0.5 rad/s, the left wheel runs at 0.4 m/s on a circle of 0.8 m, the right at 0.6 on 1.2 m.
+    """The robot turns at 0.5 rad/s about a point 1 m to its left.
 
-    The middle between the wheels moves at 0.5 m/s.
+    The left wheel moves at 0.4 m/s on a circle with a radius of 0.8 m, and the right wheel at 0.6
+    m/s on one of 1.2 m. The middle between the wheels moves at 0.5 m/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 
 
 def test_about_a_wheel_that_stands() -> None:
-    """Right wheel at rest, left at 0.4 m/s: the yaw rate is -1 rad/s, the speed 0.2 m/s."""
+    """The right wheel is at rest, and the left wheel moves at 0.4 m/s.
+
+    The robot turns at −1 rad/s and moves at 0.2 m/s.
+    """
     assert triple(ROBOT.body_twist((4.0, 0.0))) == pytest.approx((0.2, 0.0, -1.0))
 
 
@@ -48,7 +58,7 @@ def test_about_a_wheel_that_stands() -> None:
 def test_wheels_and_back_is_the_feasible_part(
     robot: DifferentialKinematics, twist: BodyTwist
 ) -> None:
-    """Converting a twist to wheel rates and back loses only the sideways velocity."""
+    """A twist is converted to wheel rates and back. Only the sideways velocity is lost."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
     assert robot.feasible(twist).vy_mps == 0.0
@@ -58,7 +68,7 @@ def test_wheels_and_back_is_the_feasible_part(
 def test_body_and_back_is_the_same_wheels(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """Wheel rates and twist have two degrees of freedom each, so the conversion loses nothing."""
+    """Wheel rates are converted to a twist and back. Nothing is lost."""
     back = robot.wheel_rates(robot.body_twist(wheel_rates))
     assert back == pytest.approx(wheel_rates, rel=1e-9, abs=1e-7)
 
@@ -67,7 +77,7 @@ def test_body_and_back_is_the_same_wheels(
 def test_each_wheel_rolls_about_the_instantaneous_centre(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """A rim's speed is the yaw rate times the wheel's distance from the centre of the turn."""
+    """The speed of a rim is the yaw rate times the wheel's distance from the centre of the turn."""
     twist = robot.body_twist(wheel_rates)
     if abs(twist.yaw_rate_radps) < 1e-3:
         return

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kinematics of three omni wheels, checked with the manual's equations, typed by hand."""
+"""Kinematics of three omni wheels, checked with the manual's equations, which are typed by hand."""
 
 import pytest
 from hypothesis import given
@@ -25,7 +25,10 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """v = ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, Vy − L Ω for C; divided by r, in rad/s."""
+    """The wheel rates are the manual's rim speeds divided by the wheel radius, in rad/s.
+
+    The rim speed is ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, and Vy − L Ω for C.
+    """
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
     rim_b = 0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -37,7 +40,10 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The expected matrix has 1/(2 cos 30°); the manual's expanded matrix is wrong by 4/3."""
+    """The twist comes from the manual's matrix with 1/(2 cos 30°).
+
+    The expanded matrix in the manual is wrong by 4/3.
+    """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
     expected = (
@@ -50,7 +56,7 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 
 @given(twists, st.floats(0.001, 1.0), st.floats(0.01, 2.0))
 def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base: float) -> None:
-    """Converting a twist to wheel rates and back gives the same twist, for any size of robot."""
+    """A twist is converted to wheel rates and back, for any size of robot. It is the same twist."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     back = kinematics.body_twist(kinematics.wheel_rates(twist))
     assert as_tuple(back) == close(as_tuple(twist), rel=1e-9)
@@ -60,23 +66,32 @@ def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base
 def test_body_and_back_is_the_same_wheels(
     rates: tuple[float, float, float], radius: float, base: float
 ) -> None:
-    """Wheel rates and twist have three degrees of freedom each; the conversion loses nothing."""
+    """Wheel rates are converted to a twist and back, for any size of robot. Nothing is lost."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     assert kinematics.wheel_rates(kinematics.body_twist(rates)) == close(rates, rel=1e-9, abs_=1e-7)
 
 
 def test_forward_turns_a_back_and_b_forth_and_leaves_c_alone() -> None:
-    """At 1 m/s forward, the rims of A and B move at ∓cos 30° m/s."""
+    """The robot drives forward at 1 m/s.
+
+    The rims of A and B move at ∓cos 30° m/s, and C is at rest.
+    """
     a, b, c = MANUAL.wheel_rates(BodyTwist(1.0, 0.0, 0.0))
     assert (a, b, c) == close((-SQRT3 / 2 / R, SQRT3 / 2 / R, 0.0))
 
 
 def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
-    """At 1 m/s to the left, the rim speed is Vy at C, and −sin 30° Vy at A and B."""
+    """The robot drives to the left at 1 m/s.
+
+    The rim of C moves at 1 m/s, those of A and B at −0.5 m/s.
+    """
     assert MANUAL.wheel_rates(BodyTwist(0.0, 1.0, 0.0)) == close((-0.5 / R, -0.5 / R, 1.0 / R))
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """At 1 rad/s to the left, each rim moves at −L m/s; the manual's «rotate all» turns right."""
+    """The robot turns left at 1 rad/s, and each rim moves at −L m/s.
+
+    The manual's «rotate all» turns the robot to the right.
+    """
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

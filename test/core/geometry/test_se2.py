@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The integral of a constant twist, and its inverse."""
+"""Tests of the integral of a constant twist, and of its inverse."""
 
 import pytest
 from hypothesis import given
@@ -14,7 +14,7 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 @pytest.mark.slow
 @given(small_moves)
 def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
-    """The expected poses come from the textbook's integral of a constant twist."""
+    """``roll`` gives the same pose as the textbook's integral of a constant twist."""
     chord = roll(tangent)
     expected = arc(tangent.x_m, tangent.y_m, tangent.yaw_rad)
     assert (chord.x_m, chord.y_m) == pytest.approx(expected, abs=1e-9)

@@ -38,31 +38,40 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
 def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
     twist: tuple[float, float, float], degrees: float
 ) -> None:
-    """The steering angles expected for eight twists are computed by hand."""
+    """The steering angles of eight twists are as worked out by hand."""
     assert math.degrees(ROBOT.steering_rad(BodyTwist(*twist))) == pytest.approx(degrees)
 
 
 def test_what_the_steered_wheel_does_to_the_body() -> None:
-    """A steered wheel 0.5 m ahead of the axle, at 45° and 1 m/s, gives 0.707 m/s and 1.41 rad/s."""
+    """The steered wheel is 0.5 m before the axle, at an angle of 45°, and moves at 1 m/s.
+
+    The robot moves at 0.707 m/s and turns at 1.41 rad/s.
+    """
     twist = ROBOT.steered_twist(1.0, math.pi / 4)
     assert triple(twist) == pytest.approx((math.sqrt(0.5), 0.0, math.sqrt(2.0)))
 
 
 def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
-    """With the centre of rotation 0.5 m to the left, the wheels run on circles of 0.3 and 0.7 m."""
+    """The robot turns about a point 0.5 m to its left.
+
+    The wheels run on circles of 0.3 and 0.7 m.
+    """
     assert ROBOT.wheel_rates(BodyTwist(0.5, 0.0, 1.0)) == pytest.approx((3.0, 7.0))
 
 
 @given(sizes, twists)
 def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """Converting a twist to wheel rates and back loses only the sideways velocity."""
+    """A twist is converted to wheel rates and back. Only the sideways velocity is lost."""
     back = robot.body_twist(robot.wheel_rates(twist))
     assert triple(back) == pytest.approx(triple(robot.feasible(twist)), rel=1e-9, abs=1e-9)
 
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """A twist can be computed from the angle and the signed speed of the steered wheel."""
+    """The twist is computed from the angle and the signed speed of the steered wheel.
+
+    It is the same.
+    """
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)
     speed_mps = math.copysign(speed_mps, wanted.vx_mps) if wanted.vx_mps else speed_mps

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""IMU biases, gyro calibration and figures, tested with a session and a simulated board."""
+"""Tests of IMU biases, gyro calibration and IMU figures with a session and a simulated board."""
 
 import math
 
@@ -41,7 +41,10 @@ def last(bench: Bench) -> ImuEstimate:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -> None:
-    """In nominal and IMU-only mode, the published rates are about zero after a calibration."""
+    """The gyro has a bias, and the user calibrates it in nominal or IMU-only mode.
+
+    The published rates are then about zero.
+    """
     bench = running(gyro_bias_dps=PLANTED_DPS, imu_only=imu_only)
     assert last(bench).angular_velocity == pytest.approx(PLANTED, abs=0.006)
     assert calibrated(bench).success
@@ -50,7 +53,10 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
 
 
 def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
-    """During a reset the board sends nothing; the refusal names the reset, not the cable."""
+    """The user calibrates the gyro during a reset, when the board sends nothing.
+
+    The refusal names the reset, not the cable.
+    """
     bench = running()
     bench.session.request(Request.RESET, "reset", bench.now)
     bench.settle()
@@ -59,7 +65,10 @@ def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
 
 
 def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
-    """Motion commands prevent a calibration, and a motion command that arrives later ends it."""
+    """The driver refuses to calibrate while motion is commanded.
+
+    A motion command that arrives during a calibration ends it.
+    """
     bench = running()
     bench.session.command_twist(BodyTwist(0.3, 0.0, 0.0), bench.now)
     with pytest.raises(RequestRefused, match="commanded by cmd_vel; end these commands"):
@@ -77,7 +86,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
 
 
 def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
-    """A calibration fails if the wheels turn, as when the robot is pushed or rolls out."""
+    """The wheels turn during a calibration, as when the robot rolls out. The calibration fails."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.0, 0.0, 0.5), bench.now)
     bench.run(0.4)
@@ -90,7 +99,7 @@ def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
 
 @pytest.mark.parametrize("state", ["disconnected", "paused"])
 def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> None:
-    """A calibration is refused while the port is closed or the board is paused."""
+    """The port is closed or the board is paused. The driver refuses to calibrate."""
     bench = running()
     if state == "paused":
         bench.ask(Request.PAUSE, 5.0)
@@ -101,7 +110,10 @@ def test_without_measurements_a_calibration_is_refused_at_once(state: str) -> No
 
 
 def test_one_calibration_at_a_time() -> None:
-    """A second request to calibrate is refused, and the first calibration continues."""
+    """A second calibration is requested during the first one.
+
+    It is refused, and the first continues.
+    """
     bench = running()
     bench.session.calibrate_gyro("first", bench.now)
     with pytest.raises(RequestRefused, match="under way"):
@@ -112,7 +124,10 @@ def test_one_calibration_at_a_time() -> None:
 
 @pytest.mark.parametrize("how", ["silence", "loss"])
 def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
-    """A calibration is answered even if the board falls silent or the port is lost."""
+    """The board becomes silent during a calibration, or the port is lost.
+
+    The user gets an answer.
+    """
     bench = running()
     bench.session.calibrate_gyro("token", bench.now)
     bench.run(1.0)
@@ -127,7 +142,10 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
 
 
 def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
-    """The driver wakes up to answer a calibration, although no output is due at that time."""
+    """The board becomes silent during a calibration, and the driver has nothing to send.
+
+    It still wakes up in time to answer the calibration.
+    """
     bench = Bench(BoardSettings(running=True), run=False)
     bench.open()
     bench.run(1.0)
@@ -140,7 +158,10 @@ def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> 
 
 
 def test_a_change_of_settings_does_not_replace_the_bias() -> None:
-    """A change of settings keeps the calibrated gyro bias, but applies a new accelerometer bias."""
+    """The user calibrates the gyro and then changes settings. The calibrated gyro bias stays.
+
+    A new accelerometer bias is applied.
+    """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     calibrated(bench)
     found = bench.session.gyro_bias
@@ -155,7 +176,10 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, 15 s at rest find half of the bias; motion does not change it."""
+    """With ``auto_gyro_bias``, 15 s at rest find half of the gyro bias.
+
+    Motion does not change it.
+    """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)
@@ -170,7 +194,10 @@ def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
 
 
 def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
-    """A sensor that is set to 4 g shows half of gravity if its counts are read as 2 g."""
+    """A sensor that is set to 4 g shows half of gravity if its counts are read as 2 g.
+
+    The driver advises the right range in one notice.
+    """
     bench = running()
     gravity = bench.session.figures(bench.now).imu.gravity_mps2
     assert gravity == pytest.approx(9.80665, rel=0.01)
@@ -185,7 +212,10 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 
 
 def test_the_figures_count_what_happened() -> None:
-    """The figures count losses, restarts, limited commands and equal readings of a stuck sensor."""
+    """The figures count lost frames, restarts and limited commands.
+
+    They also count equal readings of a stuck sensor.
+    """
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)
     assert figures.state == "nominal"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Calibration of the gyro's bias, and motions that must not be mistaken for a bias."""
+"""Tests of the calibration of the gyro's bias, and of motions that must not be taken for a bias."""
 
 import itertools
 import math
@@ -46,7 +46,10 @@ def stand(
     force: Vector3 = GRAVITY,
     rolling: Vector3 | None = NONE,
 ) -> None:
-    """Feed readings at 100 Hz, every fourth with a displacement unless ``rolling`` is None."""
+    """Feed readings at 100 Hz, and with every fourth a displacement.
+
+    If ``rolling`` is None, there are no displacements.
+    """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):
         calibration.hear(rate, force, start_s + number * TICK_S)
@@ -63,7 +66,7 @@ def answer(calibration: GyroCalibration) -> RequestDone:
 
 @given(st.lists(vectors, min_size=1, max_size=30))
 def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
-    """The computed mean and standard deviation agree with the textbook's, axis by axis."""
+    """Mean and standard deviation are those of the textbook's formulas, for each axis."""
     for axis in range(3):
         column = [value[axis] for value in values]
         middle = sum(column) / len(column)
@@ -74,7 +77,10 @@ def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
 
 @given(biases, st.integers(0, 2**16))
 def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
-    """After 2 s of noisy readings, the bias is right within five standard errors of the mean."""
+    """A calibration uses 2 s of noisy readings at rest.
+
+    The bias is right within five standard errors of the mean.
+    """
     calibration = GyroCalibration((0.1, 0.1, 0.1), refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy(bias, NOISE_RADPS, seed), 2.1)
@@ -86,7 +92,10 @@ def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
 
 
 def test_without_wheels_the_gyro_alone_tells() -> None:
-    """Without displacements, as in IMU-only mode, a steady gyro is enough to prove rest."""
+    """The board sends no displacements, as in IMU-only mode.
+
+    A steady gyro is enough to prove rest.
+    """
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     stand(calibration, noisy((0.02, 0.0, 0.0), NOISE_RADPS), 2.1, rolling=None)
@@ -107,7 +116,10 @@ def test_without_wheels_the_gyro_alone_tells() -> None:
 def test_a_robot_that_moves_is_refused_with_what_showed_it(
     rates: Iterator[Vector3], rolling: Vector3, why: str
 ) -> None:
-    """The calibration of a robot that moves fails, and leaves the bias unchanged."""
+    """The robot moves during a calibration. The calibration fails, and the bias stays as it was.
+
+    The message says what showed the motion.
+    """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=True)
     calibration.measure("token", 0.0)
     stand(calibration, rates, 2.1, rolling=rolling)
@@ -119,7 +131,7 @@ def test_a_robot_that_moves_is_refused_with_what_showed_it(
 
 
 def test_a_shaken_accelerometer_is_motion() -> None:
-    """A calibration fails even if only the accelerometer shows that the robot is carried."""
+    """The robot is carried, and only the accelerometer shows it. The calibration fails."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.measure("token", 0.0)
     for number, rate in enumerate(itertools.islice(noisy(NONE, NOISE_RADPS), 210)):
@@ -128,7 +140,10 @@ def test_a_shaken_accelerometer_is_motion() -> None:
 
 
 def test_readings_before_the_request_do_not_count() -> None:
-    """A calibration uses no readings from before the request, whether of motion or of rest."""
+    """The robot moves before a calibration is requested.
+
+    The calibration uses only later readings.
+    """
     calibration = GyroCalibration(NONE, refine=False)
     stand(calibration, noisy((0.0, 0.0, 2.0), 0.5), 0.9, rolling=(0.01, 0.0, 0.0))
     calibration.measure("token", 0.0)
@@ -138,7 +153,10 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A gap in the readings restarts a calibration; with too few readings it fails at its limit."""
+    """A gap in the readings restarts a calibration. After several gaps, its time is over.
+
+    It fails and leaves the bias as it was.
+    """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
     for start_s in (100.0, 102.0, 104.0):
@@ -153,7 +171,7 @@ def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
 
 
 def test_a_measurement_that_is_given_up_says_why_once() -> None:
-    """If a calibration is cancelled, the caller gets one answer, with the reason."""
+    """A calibration is cancelled. The caller gets one answer, with the reason."""
     calibration = GyroCalibration(NONE, refine=False)
     calibration.give_up("not asked")
     assert not calibration.answers
@@ -184,7 +202,10 @@ def test_standstills_refine_the_bias_little_by_little(bias: Vector3) -> None:
 def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_stand(
     refine: bool, rolling: Vector3 | None
 ) -> None:
-    """The bias is refined only if refinement is on and displacements show wheels at rest."""
+    """The bias is refined only if refinement is on.
+
+    Displacements must also show that the robot is at rest.
+    """
     calibration = GyroCalibration(NONE, refine=refine)
     stand(calibration, noisy((0.1, 0.1, 0.1), NOISE_RADPS), 10.0, rolling=rolling)
     assert calibration.bias == NONE
@@ -194,7 +215,10 @@ def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_sta
 def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
     rates: list[Vector3], measure: bool
 ) -> None:
-    """For any gyro readings, the bias is finite and at most as large as a real sensor's."""
+    """The gyro sends any readings.
+
+    The bias is finite and never larger than that of a real sensor.
+    """
     calibration = GyroCalibration(NONE, refine=True)
     if measure:
         calibration.measure("token", 0.0)
@@ -203,7 +227,7 @@ def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
 
 
 def test_gravity_is_measured_at_rest_alone() -> None:
-    """Gravity is unknown before the first rest, and is measured again only at rest."""
+    """Gravity is unknown before the robot first rests. It is measured again only at rest."""
     calibration = GyroCalibration(NONE, refine=False)
     assert calibration.gravity_mps2 is None
     stand(calibration, noisy(NONE, NOISE_RADPS), 1.1, force=(0.0, 6.0, -8.0))

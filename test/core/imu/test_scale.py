@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conversion of the MPU6050's counts to SI units."""
+"""Tests of the conversion of the MPU6050's counts to SI units."""
 
 import math
 
@@ -17,7 +17,7 @@ Triple = tuple[int, int, int]
 
 @pytest.mark.parametrize(("range_g", "counts"), [(2, 16384), (4, 8192), (8, 4096), (16, 2048)])
 def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
-    """At standard gravity, the counts are those of the datasheet's section 6.2."""
+    """At standard gravity, the counts of each range are those of the datasheet's section 6.2."""
     scale = ImuScale(accel_range_g=range_g)
     assert scale.specific_force((counts, -counts, 0)) == pytest.approx((9.80665, -9.80665, 0.0))
 
@@ -28,7 +28,7 @@ def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
 def test_ten_degrees_a_second_are_the_datasheets_counts(
     range_dps: int, counts_per_10_dps: int
 ) -> None:
-    """At 10°/s, the counts are those of the datasheet's section 6.1."""
+    """At 10°/s, the counts of each range are those of the datasheet's section 6.1."""
     scale = ImuScale(gyro_range_dps=range_dps)
     assert scale.angular_velocity((0, counts_per_10_dps, -counts_per_10_dps)) == pytest.approx(
         (0.0, 0.17453292519943295, -0.17453292519943295)
@@ -36,14 +36,14 @@ def test_ten_degrees_a_second_are_the_datasheets_counts(
 
 
 def test_two_g_and_250_degrees_a_second_are_the_default() -> None:
-    """The sensor's ranges at power-up are 2 g and 250 °/s."""
+    """The default ranges are those of the sensor at power-up: 2 g and 250 °/s."""
     assert ImuScale().specific_force((0, 0, 16384))[2] == pytest.approx(9.80665)
     assert ImuScale().angular_velocity((131, 0, 0))[0] == pytest.approx(math.radians(1.0))
 
 
 @given(triples)
 def test_axes_stay_the_sensors_own(counts: Triple) -> None:
-    """Converting counts to SI units does not turn, swap or shift the axes."""
+    """The conversion of counts to SI units does not turn, swap or shift the axes."""
     for measured in (ImuScale().specific_force(counts), ImuScale().angular_velocity(counts)):
         for value, count in zip(measured, counts, strict=True):
             assert math.copysign(1, value) == math.copysign(1, count)
@@ -51,14 +51,14 @@ def test_axes_stay_the_sensors_own(counts: Triple) -> None:
 
 
 def test_full_scale_is_the_range() -> None:
-    """32768 counts are 2 g (19.6 m/s²) in the smallest range and 16 g in the largest."""
+    """32768 counts are 2 g (19.6 m/s²) in the smallest range and 16 g in the largest range."""
     assert ImuScale(accel_range_g=2).specific_force((-32768, 0, 0))[0] == pytest.approx(-19.6133)
     assert ImuScale(accel_range_g=16).specific_force((-32768, 0, 0))[0] == pytest.approx(-156.9064)
 
 
 @pytest.mark.parametrize(("accel", "gyro"), [(3, 250), (2, 300)])
 def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int) -> None:
-    """A range that the MPU6050 does not have raises an error; the driver does not guess."""
+    """The user sets a range that the MPU6050 does not have. This raises an error."""
     scale = ImuScale(accel_range_g=accel, gyro_range_dps=gyro)
     with pytest.raises(KeyError):
         (scale.specific_force((0, 0, 0)), scale.angular_velocity((0, 0, 0)))
@@ -67,7 +67,10 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """The advice names the range in which gravity at rest would be right within a tenth."""
+    """The sensor is set to another range than the driver, so gravity at rest is wrong.
+
+    The advice names the range in which gravity would be right within a tenth.
+    """
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
         assert bool(text) == (actual_g != believed_g)
@@ -76,7 +79,7 @@ def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_
 
 @pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
 def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
-    """If the measured gravity fits no range, the advice is to check range, bias and sensor."""
+    """Gravity at rest fits no range. The advice is to check the range, the bias and the sensor."""
     assert gravity_advice(gravity, 2).endswith(
         "check `accel_range` and `accel_bias`, or the sensor"
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One changed bit in one frame: which wrong values are published, and for how long."""
+"""One bit of one frame is changed: which wrong values are published, and for how long."""
 
 import math
 import struct
@@ -24,11 +24,14 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""Kind of frame, byte of its payload, bit of that byte, ticks to drive before the change."""
+"""Kind of frame, byte of its payload, bit of that byte, and ticks to drive before the change."""
 
 
 class Drive:
-    """A drive in curves, begun away from the origin, in which one bit of one frame is changed."""
+    """A drive in curves in which one bit of one frame is changed.
+
+    It begins away from the origin.
+    """
 
     def __init__(self, frame: str = "earth") -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
@@ -53,7 +56,7 @@ class Drive:
         return Pose(off.x_m, off.y_m, math.remainder(off.yaw_rad, math.tau))
 
     def run(self, seconds: float) -> None:
-        """Drive curves for ``seconds``, and keep the worst error since the bit was changed."""
+        """Drive curves for ``seconds``, and record the worst error since the bit was changed."""
         for _ in range(round(seconds / TICK_S)):
             t, count = self.bench.now, len(self.bench.odometry)
             if self.bench.session.state == "nominal" and round(t / TICK_S) % 5 == 0:
@@ -65,7 +68,7 @@ class Drive:
                 self.worst_rad = max(self.worst_rad, abs(self.last.yaw_rad))
 
     def arm(self, kind: bytes, byte: int, bit: int) -> None:
-        """Change one bit in the next frame of the given kind."""
+        """Let one bit be changed in the next frame of the given kind."""
 
         def flip(data: bytes) -> bytes:
             at = begins(data, kind)
@@ -80,7 +83,7 @@ class Drive:
 
 
 def begins(data: bytes, kind: bytes) -> int:
-    """Return the position of the frame of this kind in a tick's bytes, or -1 if there is none."""
+    """Return the position of the frame of this kind in a tick's bytes, or −1 if it is missing."""
     lengths = {14: (IMU,), 23: (IMU, DELTA), 29: (IMU, POSE), 38: (IMU, DELTA, POSE)}
     at = 0
     for found in lengths.get(len(data), ()):
@@ -101,7 +104,10 @@ def begins(data: bytes, kind: bytes) -> int:
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """After a changed bit, odom is off by up to 17 mm and 0.052 rad, and right after 1.5 s."""
+    """One bit of one frame is changed. Odom is then wrong by at most 17 mm and 0.052 rad.
+
+    It is right again 1.5 s later.
+    """
     kind, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -122,10 +128,10 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """A published IMU reading is wrong by at most 5 m/s² or 0.6 rad/s.
+    """One bit of one IMU frame is changed while the robot drives and shakes.
 
-    A changed bit may pass while the robot shakes if the change is within these limits; a larger
-    change is rejected. All undamaged readings are published.
+    If the reading is wrong by less than 5 m/s² and 0.6 rad/s, it may be published. Otherwise it is
+    rejected. All undamaged readings are published.
     """
     _, byte, bit, ticks = flip
     drive = Drive()
@@ -154,7 +160,7 @@ def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
 
 
 def test_what_is_refused_is_counted_and_told() -> None:
-    """A rejected displacement is counted, and reported in one notice."""
+    """A displacement is damaged and rejected. It is counted and reported in one notice."""
     drive = Drive()
     drive.arm(DELTA, 0, 6)
     drive.run(1.0)
@@ -167,7 +173,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """If the first pose has a wrong heading, the next two poses agree and are accepted."""
+    """The board's first pose has a wrong heading. The next two poses agree, and odom is right."""
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)
     drive.bench = Bench(BoardSettings(running=True, initial_pose=start))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements through a complete session: SI units, stamps, and a continuous pose."""
+"""Measurements through a complete session: SI units, stamps and a continuous pose."""
 
 import itertools
 import math
@@ -20,7 +20,7 @@ def bench() -> Bench:
 
 
 def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
-    """A reading is published for each tick; the sensor is upside down, so z shows -9.8 m/s²."""
+    """An IMU reading is published for each tick. The sensor is upside down, so z is −9.8 m/s²."""
     start = bench.now
     bench.run(1.0)
     imu = [
@@ -32,14 +32,20 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 
 
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
-    """Displacements that waited for the first pose also have the stamps of their own ticks."""
+    """Each odometry estimate has the stamp of the IMU sample of its tick.
+
+    This also holds for displacements that waited for the board's first pose.
+    """
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
     assert {estimate.stamp_s for estimate in bench.odometry} <= stamps
 
 
 def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
-    """After a restart and a reconnect, stamps still increase and are 10 ms apart again."""
+    """The board restarts, and later the port is opened again. The stamps still increase.
+
+    At the end they are 10 ms apart again.
+    """
     bench.board.reboot()
     bench.run_until_state("paused")
     bench.run_until_state("nominal")
@@ -56,7 +62,12 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """After a reset, odom is right except for the displacement under way, at most 20 mm."""
+    """The user resets the odometry while the robot drives.
+
+    Odom then gives the distance since the reset.
+
+    It may miss the displacement under way, which is at most 20 mm.
+    """
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)
@@ -72,7 +83,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 
 
 def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
-    """Thirty losses of frames cause only one or two notices."""
+    """Frames are lost thirty times. The driver writes only one or two notices."""
     for _ in range(30):
         bench.speaks = False
         bench.run(0.08)
@@ -84,7 +95,7 @@ def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench)
 
 
 def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> None:
-    """Frames lost after an overrun of the port are blamed on this computer, not on the line."""
+    """The port overruns, and frames are lost. The notice blames this computer, not the line."""
     bench.run(0.4)
     bench.session.overran(1)
     bench.speaks = False
@@ -96,7 +107,11 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
-    """The robot rolls out in a pause; its twist after the pause is unknown once, then zero."""
+    """The board is paused while the robot drives, so the robot rolls out.
+
+    Odom includes this motion. The first twist after the pause is unknown, and the next ones are
+    about zero.
+    """
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)
@@ -115,7 +130,10 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """A curve to the left is measured as commanded, whatever the board's heading and axis signs."""
+    """The robot is commanded a curve to the left. Odom shows this curve for any axis signs.
+
+    The board's heading at the start does not matter either.
+    """
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
         axis_signs=signs,
@@ -132,7 +150,7 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 
 
 def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
-    """The cable is unplugged for 3 s while the robot drives on; odom then includes this motion."""
+    """The cable is unplugged for 3 s while the robot drives on. Odom then includes this motion."""
     bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
     bench.open()
     bench.run(1.0)

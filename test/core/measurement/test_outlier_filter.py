@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outlier filter, which rejects readings that cannot be true, and no others."""
+"""Tests of the outlier filter, which rejects only readings that cannot be true."""
 
 import math
 from dataclasses import replace
@@ -41,7 +41,7 @@ def gate() -> OutlierFilter:
 
 
 def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Reading]]:
-    """Return one list per reading: what the filter releases when it receives this reading."""
+    """Return one list per reading, with what the filter releases when it receives this reading."""
     return [
         [found for found, _ in through.admit(reading, number * TICK_S)]
         for number, reading in enumerate(readings)
@@ -49,12 +49,12 @@ def admitted(readings: list[Reading], through: OutlierFilter) -> list[list[Readi
 
 
 def trembling(random: Random) -> list[float]:
-    """Return the noise of an IMU at rest: three specific forces and three rates."""
+    """Return the noise of an IMU at rest: three specific forces and three angular rates."""
     return [random.gauss(0.0, 0.03) for _ in range(3)] + [random.gauss(0.0, 9e-4) for _ in range(3)]
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Return noisy readings of 1 g upwards; ``leaps[reading][word]`` is added to that word."""
+    """Return noisy readings of 1 g upward. ``leaps[reading][word]`` is added to that word."""
     random, found = Random(seed), list[Reading]()
     for number in range(count):
         words = trembling(random)
@@ -74,7 +74,12 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """A word jumps once by the value of one of its high bits, in the ranges 2 g and 250 °/s."""
+    """A word of one IMU reading jumps by the value of one of its high bits.
+
+    The reading is rejected.
+
+    The next reading is released at once. The ranges are 2 g and 250 °/s.
+    """
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -84,7 +89,10 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """A lasting jump is delivered one reading late, as when a robot is set down on a slope."""
+    """A word jumps and stays there, as when a robot is set down on a slope.
+
+    The first reading is released one reading late, and none is rejected.
+    """
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -94,7 +102,7 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, words of another frame replace the gyro's words; the reading is rejected."""
+    """In one reading, words of another frame replace the gyro's words. The reading is rejected."""
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
     came = admitted(readings, through)
@@ -107,13 +115,16 @@ def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> 
 def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
     knock: float, across: float
 ) -> None:
-    """A knock in one reading is delivered at once, unless a single changed bit can explain it."""
+    """A knock changes one reading by an amount that no single changed bit can cause.
+
+    The reading is released at once.
+    """
     readings, through = row(60, {50: {1: knock, 0: knock * across}}), gate()
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A reading at the end of the 2 g scale is delivered, since a knock can saturate the sensor."""
+    """A knock saturates the sensor, so a reading is at the end of the 2 g scale. It is released."""
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -121,7 +132,10 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """``full_scale_mps2`` decides which jumps have the size of a changed bit and are rejected."""
+    """A jump of the size of a changed bit is rejected.
+
+    ``full_scale_mps2`` determines these sizes.
+    """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
     assert came[50] == []
@@ -130,7 +144,7 @@ def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float
 
 @pytest.mark.parametrize("ring", [[15, -12, 9, -6, 3], [15, 14, -9, 5], [8, 15, 20, 3], [15, 5]])
 def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) -> None:
-    """All readings of a shock that rings in one axis are delivered."""
+    """A shock rings in one axis for several readings. All of them are released."""
     readings = row(60, {40 + number: {1: value} for number, value in enumerate(ring)})
     through = gate()
     assert list(chain(*admitted(readings, through))) == readings
@@ -140,7 +154,7 @@ def test_a_shock_that_rings_in_one_axis_is_delivered_whole(ring: list[float]) ->
 @pytest.mark.slow
 @pytest.mark.parametrize("g_rms", [0.003, 0.02, 0.1, 0.5])
 def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
-    """For ten minutes the robot shakes at random, and no reading is rejected."""
+    """The robot shakes at random for ten minutes. No reading is rejected."""
     random, through = Random(1), gate()
     for number in range(60_000):
         force = [random.gauss(0.0, g_rms * G) for _ in range(3)]
@@ -156,7 +170,10 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement faster than 2 m/s or 8 rad/s is rejected; the next one counts it as lost."""
+    """A displacement is faster than 2 m/s or 8 rad/s.
+
+    It is rejected, and the next one counts it as lost.
+    """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
     assert came == [[ahead()], [], [ahead(lost=4)], [ahead()]]
@@ -164,14 +181,20 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """The pose reports the rejected displacement as lost; the next displacement does not."""
+    """A displacement is rejected, and a pose comes next. The pose counts the displacement as lost.
+
+    The next displacement does not count it again.
+    """
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
     assert came == [[ahead()], [], [replace(pose, lost=1)], [ahead()]]
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """The filter rejects a jump from 0.25 to 1.5 m/s and back in 80 ms; until then a pose waits."""
+    """The speed jumps from 0.25 to 1.5 m/s for one displacement, which is rejected.
+
+    A pose after it waits until the next displacement shows this.
+    """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
     assert came[3:] == [[], [], [replace(pose, lost=1), ahead(0.011)], [ahead()]]
@@ -179,7 +202,10 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 
 
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
-    """A jump that lasts may be real, so the displacement is delivered, but late."""
+    """The speed jumps and stays high, so the jump may be real.
+
+    The displacement is released late.
+    """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
     assert came[3:] == [[], [], [ahead(0.06), pose, ahead(0.05)], [ahead(0.05)]]
@@ -187,7 +213,7 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """At most ten readings wait for the next displacement; after that, all are released."""
+    """After a jump, readings wait for the next displacement. When ten wait, all are released."""
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
     assert came[3:14] == [[]] * 10 + [[ahead(0.06), *[pose] * 10]]
@@ -195,14 +221,20 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """The restart or unknown duration that a rejected displacement shows is in the next one."""
+    """A rejected displacement shows a restart or an unknown duration.
+
+    The next one then shows it.
+    """
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())
     assert came[2:] == [[replace(ahead(), duration_s=None, restarted=True)], [ahead()]]
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """A displacement may be as large as the distance that the robot can cover during the pause."""
+    """The robot rolls out in a pause, and one displacement contains all of this motion.
+
+    It is accepted if the robot can have driven so far during the pause.
+    """
     through = gate()
     through.admit(ahead(), 1.0)
     rolled_out = replace(ahead(0.5), duration_s=None)
@@ -258,7 +290,7 @@ def bare(reading: Reading) -> Reading:
 
 
 def test_two_displacements_that_came_with_one_read_are_believed() -> None:
-    """Two displacements from one read are zero seconds apart, which causes no division by zero."""
+    """Two displacements from one read are zero seconds apart. This causes no division by zero."""
     through = gate()
     assert through.admit(ahead(), 1.0) == [(ahead(), 1.0)]
     at_once = replace(ahead(), duration_s=0.0)
@@ -267,7 +299,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor that sends text has no bits to flip, so its full scale is set to infinity."""
+    """A sensor sends text, so no bits can change.
+
+    Its full scale is infinity, and a knock is released.
+    """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
     assert admitted(list(given), through) == [[reading] for reading in given]
@@ -275,7 +310,7 @@ def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
 
 @pytest.mark.parametrize("broken", ["pose", "twist", "covariance"])
 def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) -> None:
-    """Odometry with NaN or infinity in its pose, twist or covariance is rejected and counted."""
+    """Odometry has NaN or infinity in its pose, twist or covariance. It is rejected and counted."""
     sound = OdometryReading(
         1.0, Pose(), BodyTwist(0.0, 0.0, 0.0), Covariance(), (0.0, 0.0), Pose(), None
     )
@@ -291,7 +326,7 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """With ``corrected``, a jump is accepted: the board's odometry may correct itself."""
+    """With ``corrected``, a jump is accepted, because the board's odometry may correct itself."""
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
@@ -299,7 +334,7 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 
 
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
-    """A step that no robot can drive is passed on with ``measured`` false.
+    """With ``corrected``, a step that no robot can drive is released with ``measured`` false.
 
     Only a step that is not finite is rejected.
     """

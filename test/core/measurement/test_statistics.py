@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The counts of lost readings, on a simulated OmniBot."""
+"""Tests of the counts of lost readings, with a simulated OmniBot."""
 
 import pytest
 from session_bench import Bench
@@ -16,7 +16,10 @@ def lost(bench: Bench) -> tuple[int, int]:
 
 @pytest.mark.parametrize("silence_s", [0.04, 0.2, 1.0, 5.0])
 def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
-    """IMU frames have no counter, so four of them count as lost with each lost displacement."""
+    """The line is silent for a while. Lost displacements are counted by their counter.
+
+    IMU frames have no counter, so four of them count as lost with each displacement.
+    """
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(2.0)
@@ -29,7 +32,7 @@ def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: f
 
 
 def test_a_pause_loses_nothing() -> None:
-    """A paused board does not measure, so a pause loses no readings."""
+    """The board is paused and does not measure. No readings count as lost."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(2.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Rules by which a robot may move again after the motion monitor has stopped it."""
+"""Tests of when a robot may move again after the motion monitor has stopped it."""
 
 import pytest
 from disobedient_robots import (
@@ -19,7 +19,10 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """To calibrate wrong settings, a user drives with the monitor off; on again, it trips."""
+    """The user switches the motion monitor off to drive a robot with wrong settings. It drives.
+
+    When the monitor is on again, it trips.
+    """
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
     bench.configure(motion_monitor=False)
@@ -31,7 +34,10 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """A motion limit is too low, but is corrected before the motion monitor is on again."""
+    """A motion limit is too low while the motion monitor is off, so displacements are rejected.
+
+    The limit is then corrected and the monitor switched on. It does not trip.
+    """
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
         bench.configure(motion_monitor=False, motion=limits)
@@ -43,7 +49,10 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """A motion limit is still too low, so four more rejected displacements trip the monitor."""
+    """A motion limit is still too low when the motion monitor is on again.
+
+    Four more rejected displacements trip the monitor.
+    """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)
     bench.configure(motion_monitor=False, motion=too_low)
@@ -56,7 +65,7 @@ def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault
 
 
 def test_a_refused_command_says_why() -> None:
-    """The refusal says that the motion monitor has stopped the robot, and what to do."""
+    """After a trip, the refusal of a command names the motion monitor and says what to do."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
@@ -64,7 +73,10 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """A zero command ends the first refusal; after the second trip only ~/start does."""
+    """The sender goes on after a trip, and its commands are refused until a zero command.
+
+    After the second trip, only ~/start helps.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 3.0) == 0
@@ -83,7 +95,7 @@ def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
 
 
 def test_silence_for_the_timeout_lets_it_move_again() -> None:
-    """Motion is allowed again when the sender has been silent for the timeout."""
+    """After a trip, the sender is silent for the timeout. Motion is then allowed again."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 2.0) == 0
@@ -94,7 +106,10 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """The sender's silence is counted from the end of a stall, which loses commands."""
+    """The driver stalls after a trip and loses commands. The sender was not silent.
+
+    Its silence is counted from the end of the stall.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     bench.now += 3.0
@@ -106,7 +121,7 @@ def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
 
 
 def test_the_e_stop_works_while_motion_is_refused() -> None:
-    """During the refusal the e-stop can be latched; its release does not end the refusal."""
+    """After a trip, the user latches and releases the e-stop. Motion is still refused."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert estop(bench, True) == "e-stop latched"

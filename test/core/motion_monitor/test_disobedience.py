@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Robots that do not move as commanded are stopped by a session, and the log says why."""
+"""A session stops robots that do not move as commanded, and the log says why."""
 
 import pytest
 from disobedient_robots import (
@@ -59,7 +59,10 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The robot is stopped within 0.3 s; the log has the measured velocity and what to check."""
+    """The robot has a wrong scale or wiring and does not move as commanded.
+
+    The driver stops it within 0.3 s. The notice gives the fault and what to check.
+    """
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -75,7 +78,10 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """With a displacement every 0.1 s, three that deviate are enough to detect the fault."""
+    """The board sends a displacement only every 0.1 s. Three that deviate show the fault.
+
+    So the robot is still stopped within 0.3 s.
+    """
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
         bench.run(phase * TICK_S)
@@ -87,7 +93,10 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """A robot that reverses within one long displacement must not look like one that is held."""
+    """A robot reverses within one long displacement, so the displacement is about zero.
+
+    The motion monitor does not take it for a robot that is held, and stops it in time.
+    """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)
@@ -103,7 +112,10 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """The robot drives towards the board's origin, 3 m away, and is stopped within 5 cm."""
+    """The board's switch is on position, so the robot drives towards the board's origin, 3 m away.
+
+    The driver stops it within 5 cm.
+    """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
     assert stopped_after_s(bench, SLOWLY) <= WITHIN_S
@@ -116,13 +128,16 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 
 @pytest.mark.parametrize("board", [FAST, A_AND_B])
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
-    """For wheel commands, the monitor compares the twist that all wheels together give."""
+    """The user commands wheel rates. The monitor compares the twist that they give together."""
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
 
 
 def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
-    """No fault is reported when each wheel turns alone, nor when all wheels turn together."""
+    """The user commands each wheel alone, then all wheels.
+
+    The robot obeys, and no fault is reported.
+    """
     bench = started(BoardSettings(running=True))
     for rates in ((10.0, 0.0, 0.0), (0.0, -10.0, 0.0), (0.0, 0.0, 5.0), (17.0, 17.0, -17.0)):
         for _ in range(10):
@@ -132,7 +147,7 @@ def test_wheel_commands_that_are_obeyed_are_not_noticed() -> None:
 
 
 def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
-    """The log states velocities in the robot's axes, although the board's axes differ."""
+    """The board's axes differ from the robot's. The log has velocities in the robot's axes."""
     bench = started(BoardSettings(running=True, **FAST), axis_signs=(-1, 1, -1))  # type: ignore[arg-type]
     stopped_after_s(bench, FORWARD)
     assert "commanded 0.50, 0.00 m/s" in bench.notices[0]
@@ -143,7 +158,10 @@ def test_the_log_gives_the_robots_axes_where_the_boards_are_others() -> None:
     ("heading_mrad", "what"), [(1571.0, "wrong direction"), (700.0, "moves faster")]
 )
 def test_a_wrong_delta_frame_is_among_what_to_check(heading_mrad: float, what: str) -> None:
-    """The robot obeys, but the driver reads its displacements in the wrong frame."""
+    """The robot obeys, but the driver reads its displacements in the wrong frame.
+
+    The notice advises to check ``delta_frame``.
+    """
     bench = Bench(BoardSettings(running=True, initial_pose=BoardPose(0.0, 0.0, heading_mrad)))
     bench.read_deltas_as("body")
     bench.open()
@@ -154,7 +172,10 @@ def test_a_wrong_delta_frame_is_among_what_to_check(heading_mrad: float, what: s
 
 
 def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> None:
-    """If deltas come less often than ``delta_period``, every velocity is computed too large."""
+    """Deltas come less often than ``delta_period`` says, so every velocity is computed too large.
+
+    The notice advises to correct this parameter.
+    """
     bench = Bench(BoardSettings(running=True))
     bench.board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     bench.open()
@@ -165,7 +186,7 @@ def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> N
 
 
 def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
-    """Signs that are wrong both for commands and for displacements cannot be noticed."""
+    """Signs are wrong both for commands and for displacements. The monitor cannot notice this."""
     bench = started(BoardSettings(running=True, axis_signs=(-1, 1, 1)))
     for _ in range(10):
         bench.drive(0.3)
@@ -175,7 +196,10 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """Without a trip, a node that repeats its goal could restart the robot for ever."""
+    """The robot drives away from its goal, and the motion monitor trips.
+
+    Otherwise, a node that repeats its goal could restart the robot again and again.
+    """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)
@@ -185,7 +209,10 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
 
 
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped() -> None:
-    """A robot too fast to be plausible is stopped, although all its displacements are rejected."""
+    """The robot is too fast to be plausible, so all its displacements are rejected.
+
+    The driver still stops it.
+    """
     bench = driving()
     for _ in range(5):
         bench.drive(0.4)

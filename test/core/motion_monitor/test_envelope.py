@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The range of velocities that recent set points explain; older set points lose their weight."""
+"""Tests of the range of velocities that recent set-points explain.
+
+Older set-points lose their weight.
+"""
 
 import math
 
@@ -30,7 +33,7 @@ def plain(twist: BodyTwist) -> tuple[float, float, float]:
 def test_what_lies_between_rest_and_the_set_points_is_inside(
     setpoints: list[tuple[BodyTwist, float]],
 ) -> None:
-    """Any weighted mean of the set points and rest is inside the envelope."""
+    """Any weighted mean of the set-points and rest is inside the envelope."""
     weight = max(1.0, sum(part for _, part in setpoints))
     motion = BodyTwist(
         sum(part * each.vx_mps for each, part in setpoints) / weight,
@@ -51,7 +54,7 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """A twist that the shortcut ``on_the_way`` accepts is inside by the full computation too."""
+    """A twist that the shortcut ``on_the_way`` accepts is also inside by the full computation."""
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
     motion = BodyTwist(
@@ -67,7 +70,7 @@ def test_what_is_on_the_way_is_inside(
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
 def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
-    """The excess of a twist is its distance from the hull of the set points, minus the margin."""
+    """The excess of a twist is its distance from the hull of the set-points, minus the margin."""
     away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
@@ -77,7 +80,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """A replaced set point keeps its full weight for 0.3 s, and has none after 1.1 s."""
+    """A replaced set-point has its full weight for 0.3 s, and none after 1.1 s."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -91,7 +94,7 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """A set point that lasts for a single tick between two displacements is still considered."""
+    """A set-point lasts for a single tick between two displacements. It is still considered."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -102,7 +105,10 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """The envelope is unknown before the first set point, and shortly after it or after a goal."""
+    """The envelope is unknown before the first set-point, and shortly after it.
+
+    It is also unknown shortly after a goal.
+    """
     history = SetpointHistory()
     assert not history.known(0.0)
     history.add(AT_REST, 10.0)
@@ -115,7 +121,7 @@ def test_nothing_is_known_before_the_first_set_point() -> None:
 
 
 def test_the_history_does_not_grow_without_end() -> None:
-    """A long ramp, with a new set point in each tick, does not let the history grow without end."""
+    """A long ramp has a new set-point in each tick. The history stays short."""
     history = SetpointHistory()
     for tick in range(10_000):
         history.add(BodyTwist(1e-6 * tick, 0.0, 0.0), 0.01 * tick)
@@ -140,14 +146,20 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """A robot at rest does not count as held if rest was commanded a moment ago."""
+    """Rest was commanded a moment ago, and the robot is still at rest.
+
+    It does not count as held.
+    """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.04, [FORWARD, AT_REST], heading_known=True)
     assert wind_up.way_m == 0.0
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """In one long displacement the robot may have turned round, so only two prove it is held."""
+    """In one long displacement of zero, the robot may have turned round.
+
+    Only two show that it is held.
+    """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0
@@ -159,7 +171,10 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """Motion that makes up for lost distance is subtracted from the wind-up, down to zero."""
+    """A held robot is released and makes up for the lost distance.
+
+    This distance is subtracted from the wind-up, down to zero.
+    """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)
     assert wind_up.pay(0.5, 0.0, 0.1)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The motion monitor, fed with displacements by hand; board time runs in steps of 40 ms."""
+"""Tests of the motion monitor with displacements given by hand, every 40 ms of board time."""
 
 import math
 from collections import deque
@@ -18,7 +18,7 @@ Triple = tuple[float, float, float]
 
 
 class Drive:
-    """A monitor whose robot has been at rest for two seconds."""
+    """A motion monitor whose robot has been at rest for two seconds."""
 
     def __init__(self) -> None:
         self.monitor, self.now = MotionMonitor(), 100.0
@@ -31,7 +31,10 @@ class Drive:
     def move(
         self, motion: Triple, seconds: float, *, heading_known: bool = True
     ) -> list[tuple[float, Fault]]:
-        """Move with the twist ``motion``; return each fault with its time since the start, in s."""
+        """Move with the twist ``motion`` for ``seconds``.
+
+        Return each fault with its time since the start, in s.
+        """
         begun, found = self.now, []
         for _ in range(round(seconds / PERIOD_S)):
             self.now += PERIOD_S
@@ -66,7 +69,10 @@ DISOBEYING = {
 def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
     commanded: Triple, motion: Triple, fault: Fault
 ) -> None:
-    """The fault is found in a robot that never obeyed, and in one that obeyed for two seconds."""
+    """The robot moves in another way than commanded, at once or after it obeyed for two seconds.
+
+    The monitor finds the fault within 0.3 s.
+    """
     for obeyed_s in (0.0, 2.0):
         drive = Drive()
         drive.command(*commanded)
@@ -83,10 +89,10 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """The monitor detects a robot that moves the wrong way within 0.3 s after it reached 0.05 m/s.
+    """The robot slowly speeds up in the wrong direction.
 
-    Its motion must not be taken for that of a held robot, which is excused for up to 0.4 s while
-    its wound-up controllers unwind.
+    The monitor finds this within 0.3 s after the robot has reached 0.05 m/s. A held robot, in
+    contrast, is excused for up to 0.4 s while its wound-up controllers unwind.
     """
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
@@ -104,7 +110,10 @@ def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
 def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_s(
     motion: Triple,
 ) -> None:
-    """A person pushes the robot, or the board obeys a command that the driver did not send."""
+    """A person pushes a robot at rest, or the board obeys a command that is not from the driver.
+
+    The monitor finds this within 0.3 s.
+    """
     found_s, fault = first(Drive().move(motion, 1.0))
     assert fault is Fault.UNCOMMANDED
     assert found_s <= 0.28
@@ -113,7 +122,7 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot that is 25 % too fast does not trip; one that is too slow is at most "blocked"."""
+    """A robot that is 25 % too fast causes no fault. One that is too slow is at most "blocked"."""
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -122,7 +131,7 @@ def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: 
 
 @given(motions=st.lists(st.tuples(*[st.floats(-2.0, 2.0)] * 3), min_size=2, max_size=2))
 def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -> None:
-    """Two displacements of any size in a row do not trip the motion monitor."""
+    """Two displacements in a row are damaged and have any size. The monitor finds no fault."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -131,7 +140,10 @@ def test_two_damaged_displacements_in_a_row_do_not_trip(motions: list[Triple]) -
 
 
 def test_a_new_command_may_be_followed_late() -> None:
-    """A reversal that begins 0.3 s late, with a time constant of 0.15 s, is accepted."""
+    """A reversal is commanded. The robot begins it 0.3 s late, with a time constant of 0.15 s.
+
+    The monitor finds no fault.
+    """
     drive = Drive()
     drive.command(0.5, 0.0, 0.5)
     drive.move((0.5, 0.0, 0.5), 1.0)
@@ -143,7 +155,10 @@ def test_a_new_command_may_be_followed_late() -> None:
 
 
 def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
-    """A robot is commanded to slow down to a fifth, but keeps its speed: the monitor detects it."""
+    """The robot is commanded to slow down to a fifth, but keeps its speed.
+
+    The monitor finds this.
+    """
     drive = Drive()
     drive.command(0.5, 0.0, 0.0)
     drive.move((0.5, 0.0, 0.0), 1.0)
@@ -154,7 +169,10 @@ def test_a_command_that_is_not_followed_at_all_is_found_out() -> None:
 
 
 def test_two_senders_in_turn_do_not_trip() -> None:
-    """Two senders command motion and rest alternately; the robot moves at a speed in between."""
+    """Two senders command motion and rest in turn. The robot moves at a speed in between.
+
+    The monitor finds no fault.
+    """
     drive = Drive()
     for step in range(100):
         drive.command(*((0.4, 0.0, 0.0) if step % 2 else REST))
@@ -165,7 +183,7 @@ def test_two_senders_in_turn_do_not_trip() -> None:
 
 
 def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None:
-    """Without the heading, forward and backward look alike, so only the speed is compared."""
+    """Without the heading, forward and backward look alike. The monitor compares only the speed."""
     drive = Drive()
     drive.command(0.2, 0.0, 0.0)
     assert drive.move((-0.2, 0.0, 0.0), 2.0, heading_known=False) == []
@@ -173,14 +191,17 @@ def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None
 
 
 def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
-    """On the way to a goal, the board itself chooses the motion, so nothing is judged."""
+    """On the way to a goal, the board itself chooses the motion. The monitor finds no fault."""
     drive = Drive()
     drive.monitor.set_point(None, drive.now)
     assert drive.move((-1.5, 0.0, 3.0), 5.0) == []
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
-    """A robot that does not move causes an event each second; the caller filters repetitions."""
+    """A commanded robot does not move. The monitor returns a fault each second.
+
+    The caller must filter the repetitions.
+    """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
     found = drive.move(REST, 2.4)
@@ -191,7 +212,10 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot held for 1 s at 0.4 m/s may catch up 0.4 m: its wheel controllers integrate."""
+    """A robot is held for 1 s at 0.4 m/s, and its wheel controllers integrate the error.
+
+    It may then be faster until it has caught up 0.4 m.
+    """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -202,7 +226,10 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """A robot pushed at rest may move back at the next command: its controllers have wound up."""
+    """A robot at rest is pushed, and its controllers wind up.
+
+    At the next command it may move back.
+    """
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)
@@ -211,14 +238,17 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A pushed robot was at rest, so it has received Stop, and further Stops become rarer."""
+    """A robot at rest is pushed for long. It has already received Stop, so faults become rarer."""
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot that misses Stop may hear a later Stop, so the Stops do not become rarer."""
+    """A driven robot has missed Stop and goes on. It may receive a later one.
+
+    So faults do not become rarer, and neither do the Stops.
+    """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -231,7 +261,12 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
-    """Motion before the arrival of Stop, and rolling out after it, are not a second fault."""
+    """The robot moves the wrong way and is stopped.
+
+    It moves until Stop arrives, and then rolls out.
+
+    The monitor finds no second fault.
+    """
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY
@@ -242,7 +277,7 @@ def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
 
 
 def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -> None:
-    """Four rejected displacements in a row are a fault; a plausible one in between ends the row."""
+    """Four rejected displacements in a row are a fault. A plausible one in between ends the row."""
     drive = Drive()
     assert [drive.monitor.count_refused(count, drive.now) for count in range(4)] == [None] * 4
     drive.move(REST, PERIOD_S)
@@ -253,7 +288,7 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """A fault is news once, and again only if the robot has obeyed a command in between."""
+    """A fault is news once. It is news again after the robot has obeyed a command."""
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)
@@ -279,7 +314,10 @@ orders = st.lists(
 def test_a_robot_that_obeys_late_and_with_slip_never_trips(
     given_orders: list[tuple[Triple, int]], late_ticks: int, constant_s: float, scale: Triple
 ) -> None:
-    """Commands are random; the robot is up to 0.1 s late, with a time constant of up to 0.2 s."""
+    """Commands are random. The robot is up to 0.1 s late and has a time constant of up to 0.2 s.
+
+    The monitor never trips.
+    """
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0
     way = [0.0, 0.0, 0.0]

@@ -37,9 +37,9 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """For all signs and frames, ``rolled`` is the sum of the tangents in the board's own axes.
+    """For all axis signs and frames, ``rolled`` is the sum of the tangents in the board's own axes.
 
-    A tangent is the constant twist of a period, times the period.
+    A tangent is the constant twist of a period, multiplied by the period.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
@@ -68,7 +68,10 @@ def test_wheels_from_the_bodys_displacements_and_back(
 
 @given(st.lists(st.tuples(*[st.integers(-300, 300)] * 3), min_size=1, max_size=20))
 def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int, int]]) -> None:
-    """Converting wheel counts to body motion and back to wheel angles loses nothing."""
+    """Wheel counts are converted to motions of the body and back to wheel angles.
+
+    Nothing is lost.
+    """
     translation = Translation(OmniBotSettings(delta_frame="wheel_counts"))
     odometry = Odometry(OdometrySettings())
     estimates: list[OdometryEstimate] = []
@@ -88,9 +91,9 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """After a gap of up to 0.4 s, the wheel angles are right within 0.12 rad.
+    """Frames are lost for up to 0.4 s. The wheel angles are then right within 0.12 rad.
 
-    After a gap of 2 s in curves, the error is larger, because only the shortest path is known.
+    After 2 s in curves the error is larger, because only the shortest path is known.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)
@@ -104,7 +107,7 @@ def test_over_a_gap_the_angles_are_those_of_the_encoders(
 
 
 def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_board() -> None:
-    """A reset of the odometry or a restart of the board does not set the wheel angles to zero."""
+    """The odometry is reset, and later the board restarts. The wheel angles continue."""
     line = Line(BoardSettings(running=True))
     line.run(3.0)
     before = angles(line.estimates[-1].rolled)
@@ -122,7 +125,7 @@ def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_boar
 
 
 def test_what_took_an_unknown_time_has_no_rate() -> None:
-    """A displacement of unknown duration, as after a pause, has a distance but no rate."""
+    """A displacement has an unknown duration, as after a pause. It has a distance but no rate."""
     odometry = Odometry(OdometrySettings())
     (estimate,) = odometry.displace(DisplacementReading(0.1, 0.0, 0.0, "body", None, 0), 1.0)
     assert estimate.rolling is None

@@ -20,7 +20,10 @@ def bench() -> Bench:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """A robot that does not move is reported once; in this test its switch is on position."""
+    """The board's switch is on position, so the robot does not obey velocities and does not move.
+
+    The driver reports this once.
+    """
     bench = started(BoardSettings(running=True, control="position"), control="velocity")
     for _ in range(10):
         drive_on(bench)
@@ -34,7 +37,10 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """A released robot may leap, as its wheel controllers have wound up; the monitor allows it."""
+    """A held robot is released. It may leap, because its wheel controllers have wound up.
+
+    The motion monitor does not trip.
+    """
     bench = driving(wheel_gains=gains)
     bench.board.grip()
     for _ in range(round(held_s / PERIOD_S)):
@@ -49,7 +55,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The line to the board is cut twice, and the robot obeys in between, so two notices appear."""
+    """The line to the board is cut twice, and the robot obeys in between. Two notices appear."""
     bench = standing()
     for hears in (False, True, False):
         bench.hears = hears
@@ -63,7 +69,10 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 
 
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
-    """Neither a command within the noise nor a zero command shows whether a robot obeys."""
+    """The user sends commands that are within the noise, then zero commands. No notice appears.
+
+    Neither shows whether a robot obeys.
+    """
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)
         bench.run(0.1)
@@ -74,7 +83,10 @@ def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> No
 
 
 def test_in_imu_only_mode_nothing_is_found() -> None:
-    """IMU-only mode has no displacements to compare with the commands."""
+    """In IMU-only mode, no displacements come that could be compared with the commands.
+
+    The monitor does not trip.
+    """
     bench = Bench(BoardSettings(running=True, imu_only=True, linear_scale=70 / 2.38))
     bench.open()
     bench.run_until_state("imu_only")
@@ -86,7 +98,12 @@ def test_in_imu_only_mode_nothing_is_found() -> None:
 
 
 def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
-    """The first Stops are lost in a cut; later deltas show motion, so Stop is sent again."""
+    """The board receives nothing, so it misses the first Stops.
+
+    Later deltas show that the robot moves.
+
+    The driver sends Stop again, which stops the robot once the board receives again.
+    """
     bench.hears = False
     bench.run(20.0)
     assert not bench.still()
@@ -101,7 +118,7 @@ def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench:
 
 
 def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> None:
-    """A robot that rolls out after Stop, or is bumped for a moment, causes no notice."""
+    """The robot rolls out after Stop, and is later bumped for a moment. No notice appears."""
     bench.run(4.0)
     for _ in range(5):
         push(bench, 0.005, 0.0, 0.0)
@@ -110,7 +127,10 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """For a pushed robot, Stop is sent at once, then ever more rarely; commands are obeyed."""
+    """A robot is pushed for long. The driver sends Stop at once, and then ever more rarely.
+
+    After the push, the robot obeys commands.
+    """
     bench = standing()
     bench.board.grip(0.3, 0.0, 0.2)
     start = len(bench.written)
@@ -131,7 +151,10 @@ def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
 def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_next_one(
     bench: Bench,
 ) -> None:
-    """A new command replaces the repeated Stops for a robot that moves without a command."""
+    """The driver repeats Stop for a robot that moves without a command.
+
+    A new command replaces it.
+    """
     bench.hears = False
     bench.run(4.0)
     bench.hears = True

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The covariance of odometry: its form, its growth, and whether real errors agree with it."""
+"""Tests of the covariance of odometry: its form, its growth, and its agreement with real errors."""
 
 import math
 from random import Random
@@ -28,7 +28,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def minors(c: Covariance) -> Triple:
-    """Return the leading principal minors; all are positive if ``c`` is positive definite."""
+    """Return the leading principal minors, which are positive if ``c`` is positive definite."""
     first = c.xx
     second = c.xx * c.yy - c.xy**2
     third = (
@@ -54,7 +54,10 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """An error of 1 % in one wheel's size gives errors of 0.025 rad and 5 mm per metre."""
+    """The robot has two wheels, and the size of each is uncertain by 1 %.
+
+    Per metre, each adds an uncertainty of 0.025 rad and 5 mm.
+    """
     noise = OdometryNoise(
         wheel_drift=0.0,
         wheel_scale=0.01,
@@ -68,7 +71,7 @@ def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
 
 
 def test_a_robot_at_rest_grows_no_less_sure() -> None:
-    """Wheels at rest do not slip, so the covariance does not grow."""
+    """The robot is at rest, so its wheels do not slip. The covariance does not grow."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         (estimate,) = odometry.displace(body(0.0, 0.0), 0.0)
@@ -76,7 +79,10 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """Wheels A and B roll 0.87 m over 1 m; ten steps or a hundred give the same covariance."""
+    """The robot drives 1 m forward, for which wheels A and B roll 0.87 m each.
+
+    The covariance is the same after ten steps as after a hundred.
+    """
     noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
@@ -88,7 +94,10 @@ def test_the_covariance_is_a_random_walk_over_the_way() -> None:
 
 
 def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
-    """The spread of 2000 simulated robots with random wheel errors agrees with the covariance."""
+    """2000 simulated robots have random wheel errors.
+
+    The spread of their poses fits the covariance.
+    """
     random, deviation, n, steps = Random(1), 0.003, 2000, 25
     noise = OdometryNoise(wheel_drift=deviation, wheel_scale=0.0, wheel_slip=0.0)
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -119,7 +128,10 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """The yaw error from wheel sizes grows tenfold from 1 m to 10 m, and is zero on return."""
+    """Wheel sizes are uncertain. The deviation of the yaw grows tenfold from 1 m to 10 m.
+
+    It is zero when the robot has driven back.
+    """
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -134,11 +146,10 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 
 @pytest.mark.slow
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
-    """In 40 drives, wheels of wrong size (1 %) slip (2 %), and the errors fit the covariance.
+    """In 40 drives, wheels have wrong sizes (1 %) and slip (2 %). The errors fit the covariance.
 
-    For a true covariance, the mean of the normalized squared error is 3, one each for x, y and yaw.
-    Over 40 drives, the mean lies between 2.29 and 3.80 with a probability of 95 % (chi-squared of
-    120).
+    If it is right, the mean of the normalised squared error is 3, one each for x, y and yaw. Over
+    40 drives, the mean is between 2.29 and 3.80 with a probability of 95 % (chi-squared of 120).
     """
     total = 0.0
     for seed in range(40):
@@ -154,7 +165,7 @@ def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None
 
 
 def squared(off: Pose, estimate: OdometryEstimate) -> float:
-    """Return the error squared and divided by its covariance (NEES), computed by elimination."""
+    """Return the normalised squared error (NEES), computed by elimination."""
     c = estimate.covariance
     rows = [
         [c.xx, c.xy, c.x_yaw, off.x_m],
@@ -172,7 +183,10 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """A pose of the board is computed from its wheels, so it cannot correct the wheels' drift."""
+    """The board computes its pose from its wheels.
+
+    So the pose does not reduce the wheels' drift.
+    """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):
@@ -185,7 +199,10 @@ def test_settling_removes_nothing_but_the_gap() -> None:
 
 
 def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
-    """The RMS errors of robots that slip, speed up and brake are below 0.02 m/s and 0.025 rad/s."""
+    """Robots slip, speed up and brake. The RMS errors of the twist fit its default covariance.
+
+    They are below 0.02 m/s and 0.025 rad/s.
+    """
     linear, angular, n = 0.0, 0.0, 0
     for seed in range(8):
         random = Random(seed)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry from the displacements of a synthetic board and of the simulated one."""
+"""Tests of odometry from the displacements of a synthetic board and of the simulated one."""
 
 import math
 from random import Random
@@ -32,7 +32,7 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings, Simulated
 
 
 def test_straight_ahead_is_x() -> None:
-    """The robot drives straight ahead at 0.5 m/s for 1 s."""
+    """The robot drives straight ahead at 0.5 m/s for 1 s. Odom ends at x = 0.5 m."""
     odometry = Odometry(SETTINGS)
     for _ in range(25):
         estimates = odometry.displace(body(0.02, 0.0), 0.0)
@@ -41,7 +41,7 @@ def test_straight_ahead_is_x() -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
-    """A quarter circle with a radius of 1 m, driven in 50 steps, is measured exactly."""
+    """The robot drives a quarter circle with a radius of 1 m in 50 steps. Odom is exact."""
     odometry, trip = Odometry(SETTINGS), Trip()
     attach(odometry, trip.pose)
     step = math.pi / 2 / 50
@@ -51,7 +51,7 @@ def test_a_quarter_circle_to_the_left_ends_at_its_radius(frame: str) -> None:
 
 
 def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
-    """The yaw of a robot that spins is not wrapped."""
+    """The robot spins for several turns. The yaw is not wrapped."""
     odometry = Odometry(SETTINGS)
     for _ in range(100):
         estimates = odometry.displace(body(0.0, 0.0, 0.2), 0.0)
@@ -63,7 +63,7 @@ def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
 def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
     moves: list[Pose], initial: float, signs: tuple[int, int, int]
 ) -> None:
-    """The odometry is the same whatever the board's initial heading and the signs of its axes."""
+    """The board has any initial heading and any axis signs. Odom is the robot's true motion."""
     odometry, trip = Odometry(SETTINGS, signs), Trip(initial, signs)
     attach(odometry, trip.pose)
     for number, move in enumerate(moves):
@@ -75,7 +75,10 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 
 @given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
-    """Deltas in the body's axes need no pose: each is published at once, at the true position."""
+    """The board sends deltas in the body's axes.
+
+    They need no pose, so each is published at once.
+    """
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:
         estimates = odometry.displace(trip.move(*xyyaw(move), "body"), 0.0)
@@ -86,7 +89,7 @@ def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]
 
 @given(small_moves, headings, st.sampled_from(["earth", "body"]))
 def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: str) -> None:
-    """A constant twist is measured exactly, in the body's axes, after any earlier motion."""
+    """The robot moves with a constant twist. The twist is measured exactly, in the body's axes."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     for _ in range(3):
@@ -98,7 +101,7 @@ def test_the_twist_is_the_bodys_over_40_ms(move: Pose, initial: float, frame: st
 
 
 def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
-    """Each estimate has the stamp of its delta, and the order is kept."""
+    """Each delta gives one estimate with the delta's stamp, in order."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.01, 0.0), 1.0) == []
     assert odometry.displace(earth(0.01, 0.0), 1.04) == []
@@ -111,7 +114,7 @@ def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
 
 
 def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odometry]:
-    """Drive curves for 12 s through the protocol, then stop; return estimates and odometry."""
+    """Drive curves for 12 s through the protocol, then stop. Return estimates and odometry."""
     settings_ = board.settings
     bot = OmniBot(OmniBotSettings(delta_frame=settings_.frame))
     odometry, estimates, random = Odometry(SETTINGS), [], Random(seed)
@@ -143,7 +146,10 @@ def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odo
 def test_the_odometry_is_the_truth_of_the_simulated_robot(
     frame: str, initial: BoardPose, seed: int
 ) -> None:
-    """For any initial pose, the error after metres of curves is below 5 mm and 3 mrad."""
+    """The robot drives metres of curves from any initial pose of the board.
+
+    Odom ends within 5 mm and 3 mrad of the truth.
+    """
     board = SimulatedBoard(
         BoardSettings(seed=seed, frame=frame, initial_pose=initial, running=True)
     )
@@ -160,7 +166,7 @@ def test_the_odometry_is_the_truth_of_the_simulated_robot(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_twist_is_the_velocity_of_the_simulated_robot(frame: str) -> None:
-    """The robot drives forward, drives left and turns, all at the same time."""
+    """The robot drives forward, drives left and turns at the same time. The twist is right."""
     board = SimulatedBoard(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 1571.0), running=True)
     )

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion during a gap, estimated from the displacements before and after it."""
+"""Tests of the motion during a gap, estimated from the displacements before and after it."""
 
 import pytest
 from synthetic_board import PERIOD_S, Trip, body, xyyaw
@@ -11,12 +11,15 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
-    """Return a displacement straight ahead, before which ``lost`` displacements are missing."""
+    """Return a displacement straight ahead that comes after ``lost`` missing ones."""
     return DisplacementReading(dx_m, 0.0, 0.0, "body", duration_s, lost)
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements missing between 0.5 and 1 m/s are filled in at the mean, 0.75 m/s."""
+    """Four displacements are missing between one at 0.5 m/s and one at 1 m/s.
+
+    They are filled in at the mean speed, 0.75 m/s.
+    """
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)
@@ -25,7 +28,10 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """At most two seconds are filled in, as the driver stops a robot that is silent for longer."""
+    """Ten seconds of displacements are missing, but only two seconds are filled in.
+
+    The driver stops a robot that is silent for longer.
+    """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)
@@ -34,7 +40,10 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 
 @pytest.mark.parametrize("missing", [0, 1, 7])
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
-    """In an even curve the gap is filled exactly, also for displacements in the earth's axes."""
+    """The robot drives an even curve, and displacements in the earth's axes are missing.
+
+    The gap is filled exactly.
+    """
     bridge, trip = GapInterpolation(), Trip(0.7)
     bridge.tangents(trip.move(0.02, 0.01, 0.1), 0.7)
     before = trip.board
@@ -50,7 +59,10 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 
 def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
-    """A displacement of unknown duration, as after a pause, is not used to fill the next gap."""
+    """A displacement has an unknown duration, as after a pause.
+
+    It is not used to fill the next gap.
+    """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     assert bridge.tangents(after(0, 0.5, None), None) == (Pose(), Pose(0.5))

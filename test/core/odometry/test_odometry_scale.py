@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry scales, which correct a board with wrong sizes of its wheels and base."""
+"""Tests of the odometry scales, which correct a board with wrong wheel and base sizes."""
 
 import math
 
@@ -44,7 +44,10 @@ def drive(on: Bench) -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """With the scales, the error after metres of curves is below 5 mm and 3 mrad."""
+    """The robot has other wheels than its board assumes and drives metres of curves.
+
+    With the scales, odom ends within 5 mm and 3 mrad of the truth.
+    """
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
     truth, pose = on.board.truth, on.odometry[-1].pose
@@ -58,7 +61,7 @@ def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> N
 
 
 def test_the_twist_is_the_true_one() -> None:
-    """With the scales, the twist is right, so a filter can fuse the twist with a gyro."""
+    """With the scales, the twist is right. So a filter can fuse it with a gyro."""
     on = bench(TRUE)
     on.drive(0.2, 0.1, 0.4)
     on.run(3.0)
@@ -73,7 +76,7 @@ def test_the_twist_is_the_true_one() -> None:
 
 
 def test_what_has_rolled_is_the_true_way() -> None:
-    """The rolled distance, from which the joints' angles are computed, is the true distance."""
+    """With the scales, the rolled distance is right. The joint angles are computed from it."""
     on = bench(TRUE)
     on.drive(0.2, 0.0, 0.0)
     on.run(3.0)
@@ -84,7 +87,10 @@ def test_what_has_rolled_is_the_true_way() -> None:
 
 
 def test_a_goal_in_odom_is_reached_in_truth() -> None:
-    """The driver converts a goal in odom to a position in the board's own odometry."""
+    """The user sends a goal in odom, which the driver converts to the board's own odometry.
+
+    With the scales, the robot truly reaches the goal.
+    """
     on = bench(TRUE, control="position")
     on.go_to(0.6, -0.4, 0.0)
     on.run(8.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Diagnostics: each fault raises its own status, says what to do, and is cleared in time."""
+"""Tests of the diagnostics: each fault raises its own status, which returns to OK in time."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -26,7 +26,7 @@ Change = Callable[["Robot"], None]
 
 
 class Robot:
-    """The figures of a healthy robot; the method ``seconds`` makes a diagnosis each second."""
+    """The figures of a healthy robot. The method ``seconds`` makes a diagnosis each second."""
 
     def __init__(self) -> None:
         self.diagnosis = Diagnosis("its power, cable and baudrate")
@@ -88,7 +88,7 @@ class Robot:
 
 
 def test_a_healthy_robot_is_all_ok() -> None:
-    """For a healthy robot all statuses are OK and show rates, skew, delay and gravity."""
+    """The robot is healthy. All statuses are OK and show rates, skew, delay and gravity."""
     robot = Robot()
     assert not robot.troubles
     stream, time = robot.statuses["Stream"].values, robot.statuses["Time"].values
@@ -131,7 +131,7 @@ FAULTS: list[tuple[Change, str, Level, str]] = [
 def test_each_fault_alone_raises_its_own_status(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """Each fault changes only its own status, and the message says what to do."""
+    """One fault occurs. Only its own status changes, and its message says what to do."""
     robot = Robot()
     fault(robot)
     robot.seconds(5)
@@ -140,7 +140,7 @@ def test_each_fault_alone_raises_its_own_status(
 
 
 def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
-    """The status says that a line of the board is missing, and not that the board is silent."""
+    """One line of the board is missing. The status says so, and does not call the board silent."""
     robot = Robot()
     robot.connect(trouble="the line 'front' is missing: unplugged")
     robot.set(state="connecting")
@@ -151,7 +151,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """Values that only some boards have, such as the rate of their own odometry, are shown."""
+    """Some boards have own values, such as the rate of their odometry. The status shows them."""
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -167,7 +167,7 @@ HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 def test_what_happened_is_told_for_a_while_and_then_forgotten(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """Some time after an event its status is OK again."""
+    """An event is reported for some time. Then its status is OK again."""
     robot = Robot()
     fault(robot)
     robot.seconds(round(RECENT_S) - 1)
@@ -177,7 +177,7 @@ def test_what_happened_is_told_for_a_while_and_then_forgotten(
 
 
 def test_a_count_that_begins_anew_has_not_grown() -> None:
-    """After the port is reopened, the overruns of the last connection are not reported again."""
+    """The port is opened again, and the count of overruns begins at 0. No overrun is reported."""
     robot = Robot()
     robot.connect(overruns=5)
     robot.seconds(round(RECENT_S) + 3)
@@ -187,7 +187,10 @@ def test_a_count_that_begins_anew_has_not_grown() -> None:
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """Late reads lose nothing, but they are named as the cause if rates are wrong."""
+    """The reader waits for the processor and reads late. If nothing is lost, the status stays OK.
+
+    If the rates are wrong, the status names the busy computer as the cause.
+    """
     robot = Robot()
     for second in range(12):
         robot.connect(waited_s=0.3 * second)
@@ -203,7 +206,10 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
-    """A large skew is reported after 70 s, because a busy computer may show one for a minute."""
+    """The skew of the clock is larger than a crystal can have. It is reported after more than 70 s.
+
+    A busy computer may show such a skew for a minute.
+    """
     robot = Robot()
     robot.set(skew_ppm=-119.0)
     robot.seconds(70)
@@ -237,7 +243,10 @@ def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     ],
 )
 def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str, Level]) -> None:
-    """A status without data is stale; in IMU-only mode displacements are not expected."""
+    """The board is in some state other than nominal. Statuses without data are stale.
+
+    In IMU-only mode, displacements are not expected.
+    """
     robot = Robot()
     robot.set(state=state)
     if state == "imu_only":
@@ -247,7 +256,10 @@ def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str,
 
 
 def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
-    """Rates are counted within one state, so a board that just started is not called too slow."""
+    """A board has just begun to send data. It is not called too slow.
+
+    Rates are counted only within the present state.
+    """
     robot = Robot()
     robot.set(state="paused")
     robot.per_second.update(imu=0, displacements=0, poses=0)
@@ -261,7 +273,10 @@ def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
 
 
 def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
-    """The status names the source and age of the command; limited commands leave it OK."""
+    """The user commands the robot. The status names the source and the age of the command.
+
+    It is OK even if commands are limited.
+    """
     robot = Robot()
     robot.command(source="cmd_vel", age_s=0.05)
     robot.seconds(1)
@@ -277,7 +292,7 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """A board without IMU and poses has no IMU status, and no rates of IMU readings or poses."""
+    """The board sends no IMU readings and no poses. Their rates and the IMU status are missing."""
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))

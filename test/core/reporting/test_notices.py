@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Messages for users: they name only parts that the board has."""
+"""Tests of messages for users, which name only parts that the board has."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ from omnibot_driver.core.traits import Traits
 @pytest.mark.parametrize("traits", [OmniBot.traits, LineBoard.traits])
 @pytest.mark.parametrize("bytes_came", [True, False])
 def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_came: bool) -> None:
-    """Datagrams and USB have no baud rate, so no advice on one is given."""
+    """Only a board on a serial line has a baud rate. Other boards get no advice on it."""
     text = why_silent(1.5, bytes_came=bytes_came, baudrate=traits.baudrate)
     assert ("`baudrate`" in text) is (bytes_came and traits.baudrate)
     assert " cable" in text
@@ -25,7 +25,10 @@ def test_a_baudrate_is_advice_only_where_it_can_be_set(traits: Traits, bytes_cam
 
 
 def test_an_overrun_of_the_port_is_blamed_only_for_frames_lost_at_about_its_time() -> None:
-    """An overrun of the port is not blamed for frames that are lost an hour later."""
+    """The port overruns, and frames are lost an hour later. The notice does not blame the overrun.
+
+    It does if frames are lost at about the same time.
+    """
     notices, none = Notices(), Refused(0, 0, 0)
     assert notices.counted(0, 0, none, 100.0) == []
     assert notices.counted(0, 1, none, 100.1) == []

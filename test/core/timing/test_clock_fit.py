@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The line fitted through ticks, tested with artificial bounds."""
+"""Tests of the line that is fitted through ticks, with artificial bounds."""
 
 from collections.abc import Callable
 
@@ -15,9 +15,10 @@ NEVER_BELOW = -1.0
 def followed(
     skew: float, above: Callable[[int], float], below: Callable[[int], float], *, ticks: int = 2000
 ) -> tuple[ClockFit, float]:
-    """Fit a line to the ticks; return it, and its error in s at the last tick.
+    """Fit a line to the ticks. Return it, and its error in s at the last tick.
 
-    ``above``, ``below``: distance in s of the bounds of a tick from its true time.
+    ``above``, ``below``: functions from a tick to the distance in s of its bounds from its true
+    time.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))
@@ -30,20 +31,20 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """Without bounds from below, the line follows the least delay and has the right slope."""
+    """Only upper bounds are known. The line follows the least delay and has the right slope."""
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
     assert line.slope_s == pytest.approx(PERIOD_S * (1.0 + skew), rel=1e-6)
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """With bounds 0.8 ms above and 0.1 ms below the truth, the line is about 0.3 ms above."""
+    """The bounds are 0.8 ms above and 0.1 ms below the truth. The line is between, 0.3 ms above."""
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """For 8 s both bounds drift by 0.1 ms per second; the line's error stays below 0.5 ms."""
+    """For 8 s both bounds drift by 0.1 ms per second. The error of the line stays below 0.5 ms."""
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
         start = 0.0 if drift[-1] > 0.0 else 0.87e-3
@@ -57,7 +58,7 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """One read in twenty is late; the bound from a late read does not lift the line."""
+    """One read in twenty is late, so its lower bound is too high. It does not lift the line."""
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
             0.0,
@@ -69,7 +70,10 @@ def test_reads_that_were_late_do_not_lift_the_line() -> None:
 
 @pytest.mark.parametrize("late", [range(401), range(500, 901)])
 def test_bounds_that_contradict_are_given_up_for_those_that_always_hold(late: range) -> None:
-    """Lower bounds from seconds of slightly late reads are given up; upper bounds always hold."""
+    """For seconds, reads are slightly late, so their lower bounds contradict the upper ones.
+
+    The fit discards these lower bounds, because upper bounds always hold.
+    """
     _, late_s = followed(
         0.0,
         lambda tick: 0.9e-3 if tick in late else 0.0,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The clock's shortcut for ticks that arrive when due; the shortcut changes no stamp."""
+"""Tests of the clock's shortcut for ticks that arrive when due. It changes no stamp."""
 
 import random
 
@@ -26,12 +26,15 @@ pytestmark = interpreted_only
 WHOLE = SampleBoundary(0, 0.0, 13 * 10 / 115200)
 SAMPLE = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 SETTLING = 40
-"""Number of ticks after which a calm line is recognized."""
+"""Number of ticks after which the clock recognizes a calm line."""
 Read = tuple[list[Reading], float, SampleBoundary | None]
 
 
 def stamped(reads: list[Read], *, quick: bool) -> tuple[list[list[float]], str]:
-    """Return the stamps of each read, and the final state of the clock."""
+    """Return the stamps of each read and the final state of the clock.
+
+    ``quick``: whether the clock may use its shortcut.
+    """
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(device_clock, "CALM", -1.0)
@@ -52,7 +55,7 @@ def heard(board: Board, chunker: Chunker, seed: int) -> list[Read]:
 @pytest.mark.parametrize("loss", [0.0, 0.01])
 @pytest.mark.parametrize("chunker", [ftdi(latency_s=0.001), bursts, singles, crumbs])
 def test_lines_are_stamped_alike(chunker: Chunker, loss: float) -> None:
-    """With and without the shortcut the stamps are equal, also if frames are lost."""
+    """The stamps are equal with and without the shortcut, even if frames are lost."""
     reads = heard(Board(seconds=12, skew=1e-4, loss=loss), chunker, 1)
     assert stamped(reads, quick=True) == stamped(reads, quick=False)
 
@@ -76,7 +79,11 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Tuples: readings, ticks since the reading before, delay in s, boundary, number of later reads."""
+"""Unusual reads, each as a tuple of five values.
+
+These are the readings, the ticks since the reading before, the delay in s, the boundary, and the
+number of normal reads that follow.
+"""
 
 
 @pytest.mark.slow
@@ -85,7 +92,7 @@ surprises = st.tuples(
 def test_surprises_are_stamped_alike(
     given: list[tuple[list[Reading], int, float, SampleBoundary | None, int]], later_s: float
 ) -> None:
-    """Odd readings after a normal start get the same stamps with the shortcut as without it."""
+    """Unusual readings come after a normal start. Their stamps do not depend on the shortcut."""
     tick, last_s = SETTLING, 0.0
     reads: list[Read] = [([SAMPLE], n * 0.01, WHOLE) for n in range(SETTLING)]
     for readings, ticks, late_s, edge, calm in given:
@@ -101,7 +108,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Calm lines really use the shortcut; otherwise the other tests would prove nothing."""
+    """A calm line really uses the shortcut. Otherwise the other tests would prove nothing."""
     compared = 0
     compare = DeviceClock._compare
 

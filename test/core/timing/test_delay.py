@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The delay of measurements; readings of other kinds must not change it."""
+"""Tests of the delay of measurements, which readings of other kinds must not change."""
 
 import pytest
 from session_bench import TICK_S, Bench
@@ -9,7 +9,10 @@ from omnibot_driver.core.requests import Request
 
 
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
-    """Notices have no sampling time, so notices before the first measurement add no delay."""
+    """The board is paused at first and sends only notices, which have no sampling time.
+
+    They add no delay.
+    """
     bench = Bench()
     bench.open()
     bench.run_until_state("paused")
@@ -21,7 +24,7 @@ def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
 
 
 def test_a_pause_is_not_a_delay() -> None:
-    """The time since the last measurement before a pause is not a delay."""
+    """The board is paused for 20 s. This time does not count as delay."""
     bench = Bench()
     bench.open()
     bench.run_until_state("nominal")

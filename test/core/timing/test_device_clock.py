@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sampling times compared with the true ones of a generated line, in simulated time."""
+"""Stamps are compared with the true sampling times of a generated line, in simulated time."""
 
 import math
 import random
@@ -29,14 +29,20 @@ COUNTS = 16384 / STANDARD_GRAVITY
 
 @dataclass(slots=True)
 class Stamped:
-    """Stamps of a stream's samples and displacements, as (tick, stamp in s, arrival in s)."""
+    """The stamps of a stream's samples and displacements.
+
+    Each is a tuple of tick, stamp in s and arrival in s.
+    """
 
     board: Board
     samples: list[tuple[int, float, float]] = field(default_factory=list)
     displacements: list[tuple[int, float, float]] = field(default_factory=list)
 
     def errors(self, since_s: float = SETTLED_S) -> list[float]:
-        """Return stamp minus true sampling time in s, from ``since_s`` after the board's start."""
+        """Return the stamps minus the true sampling times, in s.
+
+        The samples before ``since_s`` after the board's start are left out.
+        """
         return [
             stamp_s - self.board.sampled_at(tick)
             for tick, stamp_s, _ in self.samples
@@ -44,7 +50,7 @@ class Stamped:
         ]
 
     def unevenness(self, since_s: float = SETTLED_S) -> float:
-        """Return the RMS deviation of the stamps' differences from 10 ms, in s."""
+        """Return the RMS deviation from 10 ms of the time between two stamps, in s."""
         return math.sqrt(
             fmean(
                 (after[1] - before[1] - 0.01) ** 2
@@ -63,7 +69,7 @@ def spread(errors: list[float], part: float = 0.99) -> float:
 
 
 def stamp(clock: DeviceClock, board: Board, reads: Iterable[Read]) -> Stamped:
-    """Decode and stamp the reads; assert that stamps increase and are not in the future."""
+    """Decode and stamp the reads. Check that stamps increase and are not in the future."""
     stamped = Stamped(board)
     omnibot = OmniBot(OmniBotSettings())
     last_s = -math.inf
@@ -106,7 +112,10 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """From 2 s on, the unevenness is below 0.2 ms; 99 % of the errors lie within 1 ms."""
+    """Any adapter splits the stream. From 2 s on, the stamps are uneven by less than 0.2 ms.
+
+    Except for a constant, 99 % of them are right within 0.5 ms.
+    """
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
         assert stamped.unevenness() < 0.2e-3
@@ -119,7 +128,10 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """With a free timer of 16 ms, arrival times may hide a delay of 0.8 ms for several seconds."""
+    """The timer of an adapter runs freely with a period of 16 ms.
+
+    For several seconds, arrival times may then hide a delay of 0.8 ms. The stamps are still right.
+    """
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -128,7 +140,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [bursts, singles], ids=["bursts", "bytes"])
 def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Chunker) -> None:
-    """On an ideal line, the stamps are at least as accurate and as even as the arrival times."""
+    """On an ideal line, the stamps are at least as accurate and even as the arrival times."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=1e-4), chunker, seed)
         arrivals = Stamped(stamped.board, [(tick, at, at) for tick, _, at in stamped.samples])
@@ -137,7 +149,7 @@ def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Ch
 
 
 def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
-    """The ticks in blocks of 240 are stamped evenly, from 20 s after the start."""
+    """Data arrives in blocks of 240 ticks. From 20 s on, the ticks are stamped evenly."""
     for seed in SEEDS:
         stamped = run(Board(seconds=120, skew=1e-4, imu_only=True), blocks, seed)
         assert stamped.unevenness(since_s=20.0) < 0.2e-3
@@ -147,7 +159,7 @@ def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, crumbs])
 def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
-    """After each of ten stalls of 5 to 200 ms, the data that waited is stamped as usual."""
+    """The host stalls ten times for 5 to 200 ms. The data that waited is stamped as usual."""
     for seed in SEEDS:
         rng = random.Random(seed)
         stalls = [(1003 + 1.5 * k, 1003 + 1.5 * k + rng.uniform(0.005, 0.2)) for k in range(10)]
@@ -159,7 +171,7 @@ def test_a_host_that_stalls_does_not_move_the_stamps(chunker: Chunker) -> None:
 
 @pytest.mark.parametrize("imu_only", [False, True])
 def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) -> None:
-    """The first read holds three seconds of frames, which are stamped with their own times."""
+    """The first read contains frames of three seconds. They are stamped with their own times."""
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4, imu_only=imu_only, first_tick=seed * 1234 + 3)
         rng = random.Random(seed)
@@ -173,7 +185,10 @@ def test_a_driver_that_finds_a_backlog_does_not_take_it_for_now(imu_only: bool) 
 @pytest.mark.slow
 @pytest.mark.parametrize("chunker", [ftdi(restarted_by_data=True), bursts, singles])
 def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
-    """One frame in 100 is lost; the counter of displacements shows how many are missing."""
+    """One frame in 100 is lost. The counter of the displacements shows how many are missing.
+
+    Later stamps are not shifted.
+    """
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01), chunker, seed)
         errors = stamped.errors()
@@ -182,14 +197,20 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
 
 
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
-    """On a line that delivers at once, 10 ms of silence is one missing tick."""
+    """Samples are lost on a line that delivers at once, without displacements.
+
+    Each 10 ms of silence then counts as one missing tick.
+    """
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01, imu_only=True), bursts, seed)
         assert spread(stamped.errors()) < 0.5e-3
 
 
 def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
-    """Packets that a network held back and delivers in quick succession get the right stamps."""
+    """A network holds packets back and then delivers them in quick succession.
+
+    The stamps are right.
+    """
     for seed in SEEDS:
         board = Board(seconds=10, skew=1e-4)
         rng = random.Random(seed)
@@ -204,7 +225,10 @@ def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
 
 @pytest.mark.parametrize("skew", [*SKEWS, 0.0])
 def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
-    """The skew is positive if the board's crystal is fast, which makes its ticks shorter."""
+    """The skew is in ppm.
+
+    It is positive if the board's crystal is fast, which makes ticks shorter.
+    """
     clock = DeviceClock(0.01)
     for tick in range(1000):
         clock.stamps([SAMPLE], tick * 0.01 / (1.0 + skew))
@@ -213,7 +237,10 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """After a restart, phase and SEQ are new; stamps increase and keep their constant offset."""
+    """The board restarts with a new phase and a new SEQ. The stamps still increase.
+
+    Their constant offset from the true times stays the same.
+    """
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
     before = run(Board(seconds=10, skew=skew), adapter, 1, clock=clock)
@@ -226,7 +253,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """After five silent seconds, which SEQ does not show, the clock's line is fitted again."""
+    """The board is silent for five seconds, and SEQ does not show it. The clock is fitted again."""
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
     after = run(Board(seconds=10, begins_at=1015.0055), bursts, 2, clock=clock)
@@ -235,7 +262,10 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
 
 
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
-    """A displacement has its sample's stamp, even if an adapter cuts the stream between both."""
+    """An adapter may cut the stream between a displacement and its sample.
+
+    They have the same stamp.
+    """
     for chunker in (ftdi(restarted_by_data=True), bursts, singles):
         stamped = run(Board(seconds=10), chunker, 0)
         stamp_of = {tick: stamp_s for tick, stamp_s, _ in stamped.samples}
@@ -244,7 +274,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """A false restart between two true displacements does not move the stamps."""
+    """A false restart comes between two true displacements. It does not move the stamps."""
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
@@ -276,7 +306,10 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Even if counters and boundaries are wrong, stamps do not decrease or exceed arrival times."""
+    """Counters and boundaries may be wrong.
+
+    Stamps never decrease and never exceed arrival times.
+    """
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
     for passed_s, readings, edge in reads:
@@ -288,7 +321,7 @@ def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
 
 
 def test_displacements_alone_are_stamped_forwards() -> None:
-    """Displacements alone are stamped 40 ms apart, as on a board without samples."""
+    """The board sends no samples, only displacements. They are stamped 40 ms apart."""
     clock = DeviceClock(0.01)
     reading = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     stamps_s = [clock.stamps([reading], 1000.0 + 0.04 * k)[0] for k in range(500)]
@@ -297,7 +330,10 @@ def test_displacements_alone_are_stamped_forwards() -> None:
 
 
 def test_stamps_increase_even_where_arrival_times_do_not() -> None:
-    """If a coarse clock gives all reads the same time, stamps differ by a microsecond each."""
+    """A coarse clock gives all reads the same time.
+
+    The stamps still increase, by a microsecond each.
+    """
     clock = DeviceClock(0.01)
     stamps_s = [clock.stamps([SAMPLE], 5.0)[0] for _ in range(100)]
     assert all(before < after for before, after in pairwise(stamps_s))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An adapter that holds data back for seconds, loses what exceeds its buffer, and recovers."""
+"""An adapter holds data back for seconds, loses what exceeds its buffer, and recovers."""
 
 import math
 from itertools import pairwise
@@ -14,7 +14,7 @@ from omnibot_driver.core.odometry.estimator import OdometryEstimate, OdometrySet
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 HELD = 4095
-"""Size of the adapter's buffer in bytes, 2.4 s of data; later bytes are lost."""
+"""Size of the adapter's buffer in bytes, 2.4 s of data. Later bytes are lost."""
 
 
 def through_a_stall(ticks: int, frame: str, vx: float, yaw_rate: float) -> Bench:
@@ -53,7 +53,10 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """Whatever data a stall loses, no step of odom is too large, and odom is right 2 s later."""
+    """An adapter holds back data and loses some of it. No step of odom is too large.
+
+    Odom is right 2 s later.
+    """
     bench = through_a_stall(ticks, frame, vx, 0.5)
     fastest_mps = OdometrySettings().fastest_mps
     for before, after in pairwise(bench.odometry):
