@@ -79,10 +79,10 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: time at the start of a command, in s, in which the robot does not drive.
+    ``late_s``: time that each command loses at its start, in s.
 
     The controller integrates for 0.5 s before a wheel turns. The wheel then takes another 0.5 s to
-    reach its speed. At 0.3 m/s for 4 s, 1.2 m are commanded. The robot drives 0.97 m with the
+    reach its speed. A command of 0.3 m/s for 4 s would be 1.2 m. The robot drives 0.97 m with the
     "firmware" quirks and 0.96 m with the "documented" ones.
     """
 
@@ -186,7 +186,7 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
-"""Functions by board name; each function makes a new board and its simulated robot."""
+"""Functions by board name. Each makes a new board and its simulated robot."""
 CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()

@@ -28,7 +28,7 @@ def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "ear
 
 
 def lose(on: Line, seconds: float, *headers: bytes) -> None:
-    """Lose the frames with the given headers for ``seconds``; without headers, lose all frames."""
+    """Lose frames for ``seconds``: those with the given headers, or all if no headers are given."""
     on.loses = lambda data, _now: not headers or data[:2] in headers
     on.run(seconds)
     on.loses = loses_nothing

@@ -100,7 +100,7 @@ class Line:
 
     @property
     def error(self) -> Pose:
-        """Difference of the newest odom pose from the board's own pose."""
+        """Difference between the newest odom pose and the board's own pose."""
         wanted = self.attached.way_to(self.told)
         got = self.estimates[-1].pose
         off = got - wanted

@@ -80,13 +80,11 @@ def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 
 
 def singles(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Split the stream into single bytes."""
     for at, byte in line:
         yield at, bytes([byte])
 
 
 def crumbs(line: list[Byte], rng: random.Random) -> Iterator[Read]:
-    """Split the stream into pieces of one to eight bytes."""
     start = 0
     while start < len(line):
         piece = line[start : start + rng.randint(1, 8)]
@@ -95,7 +93,6 @@ def crumbs(line: list[Byte], rng: random.Random) -> Iterator[Read]:
 
 
 def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Split the stream into blocks of 4096 bytes."""
     for start in range(0, len(line), 4096):
         piece = line[start : start + 4096]
         yield piece[-1][0], bytes(byte for _, byte in piece)

@@ -112,7 +112,6 @@ class Bench:
         self.settle()
 
     def ask(self, request: Request, limit_s: float) -> RequestDone:
-        """Make a request and wait for its answer."""
         token = object()
         self.session.request(request, token, self.now)
         self.settle()

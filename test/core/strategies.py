@@ -22,7 +22,6 @@ small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.flo
 
 
 def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
-    """Draw displacement readings in ``frame``."""
     return st.builds(
         DisplacementReading,
         dx_m=st.floats(-0.1, 0.1),

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A synthetic board for odometry tests: it moves with body twists and returns readings.
+"""A synthetic board for odometry tests. It moves with given body twists and returns readings.
 
-The readings are those of the firmware in the manual. The board uses rotation matrices and shares no
-code with the code under test.
+The readings are like those of the firmware in the manual. The board uses rotation matrices and
+shares no code with the code under test.
 """
 
 import math

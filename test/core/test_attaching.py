@@ -45,7 +45,7 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 
 
 def test_the_first_pose_must_be_confirmed_too() -> None:
-    """A single damaged pose must not rotate the odometry, so two poses must agree."""
+    """The board's first pose is damaged. It sets no heading, because two poses must agree."""
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.0, 0.1), 0.0) == []
     assert odometry.settle(heading(-1.0)) == []
@@ -61,7 +61,7 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
     """The first displacement after a pause has an unknown duration.
 
-    The first estimate is still certain.
+    The first estimate still has a covariance of zero.
     """
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
@@ -112,9 +112,9 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """A single pose with a wrong heading does not rotate the odometry.
+    """A single pose with a wrong heading does not change the heading of the odometry.
 
-    If two such poses agree, the board has a new earth frame.
+    Two such poses that agree show that the board has a new earth frame.
     """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
@@ -149,7 +149,7 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """A pose differs a little from the sum of the displacements, as these are rounded.
+    """The displacements are rounded, so their sum differs a little from the board's pose.
 
     The odometry corrects the difference in five steps, one with each displacement.
     """

@@ -87,9 +87,9 @@ def tell(bench: AnyBench, *readings: Reading) -> None:
 
 
 def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: AnyBench) -> None:
-    """A board has odometry of its own.
+    """The board computes odometry itself. The driver publishes it at the board's rate.
 
-    It is published at the board's rate, with its twist variances.
+    It also publishes the board's variances of the twist.
     """
     before = len(bench.odometry)
     bench.drive_on(0.3, 2.0)
@@ -100,7 +100,7 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 
 
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
-    """The board sends nothing, and its odometry is only predicted. The driver refuses commands."""
+    """The board sends nothing, and the driver only predicts odometry. It refuses commands."""
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from the board|connecting"):

@@ -37,9 +37,10 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The robot is commanded 0.3 m/s for 4 s. It drives this distance, minus the loss at the start.
+    """The robot is commanded 0.3 m/s for 4 s.
 
-    The odometry gives the same distance as the robot's true motion.
+    It drives this distance, minus what it loses at the start. The odometry gives the same distance
+    as the robot's true motion.
     """
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
@@ -134,7 +135,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """The robot drives when the connection or the driver is interrupted, or the e-stop is used.
+    """An interruption, such as a stall or an e-stop, comes while the robot drives.
 
     The command from before has no effect afterwards. A new command moves the robot.
     """
@@ -147,9 +148,9 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None:
-    """A driving robot sends nothing more, but still receives.
+    """A driving robot sends nothing any more, but still receives. The driver stops it.
 
-    It is stopped, and commands are refused.
+    Commands are refused until the robot sends data again.
     """
     bench.drive_on()
     bench.speaks = False
@@ -190,7 +191,7 @@ def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> N
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
     """The user commands 100 m/s.
 
-    The robot drives at 0.5 m/s, or 5 % more with measurement errors.
+    The robot drives at 0.5 m/s at most, plus 5 % for the measurement.
     """
     bench.drive_on(100.0, 2.0)
     before = bench.robot.way_m

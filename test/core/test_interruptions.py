@@ -98,7 +98,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
     """Frames are lost, and the odometry is reset before the next pose arrives.
 
-    Odom begins at zero, and the pose does not correct the motion in the gap any more.
+    Odom begins at zero. The pose no longer corrects it for the motion that was lost.
     """
     for seed in range(4):
         on = line(seed)
@@ -162,7 +162,7 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """All three wheels turn by −1/8, and the robot rotates by 2πr/8L.
+    """All three wheels make −1/8 of a turn, and the robot rotates by 2πr/8L.
 
     Then wheel B turns forward and wheel A equally far backward, and the robot drives forward.
     """

@@ -14,7 +14,6 @@ UNHEARD_S, SILENCE_S = 0.5, 2.0
 
 @pytest.fixture
 def liveness() -> Liveness:
-    """Return the liveness of a line that was opened at 10 s."""
     made = Liveness(
         Traits(
             imu_period_s=None,
@@ -42,9 +41,9 @@ def test_a_silence_is_found_once(liveness: Liveness) -> None:
 
 
 def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
-    """After a reported silence a reading arrives.
+    """A silence is reported, and then a reading arrives.
 
-    If 2 s pass again, the new silence is reported too.
+    After another 2 s, a new silence is reported.
     """
     assert liveness.fell_silent(12.0)
     liveness.heard_at = 20.0
@@ -53,10 +52,7 @@ def test_a_silence_after_a_reading_is_another_one(liveness: Liveness) -> None:
 
 
 def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
-    """The line is opened again after a silence.
-
-    The board has 2 s to send data, as at the beginning.
-    """
+    """The line is opened again after a silence. The board has 2 s again to send data."""
     assert liveness.fell_silent(12.0)
     liveness.begin(12.0)
     assert liveness.wake_at(driven=False) == 14.0

@@ -15,7 +15,7 @@ NAME = next(name for name in BOARDS if name == "two lines")
 
 
 def test_it_is_answered_once() -> None:
-    """A task has one result. After its end, a second end is not reported to the client."""
+    """A task has one result. If it is ended again afterwards, the client gets no second result."""
     task = LongTask()
     task.begin("record", "token", 120.0, 5.0)
     assert task.is_current("token")

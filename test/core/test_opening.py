@@ -79,7 +79,7 @@ def test_garbage_is_not_an_understood_board() -> None:
 def test_a_silent_board_is_told_once() -> None:
     """The driver reports a silence of the board once.
 
-    It reports the next one if data came in between.
+    After new data, it reports the next silence.
     """
     bench = Bench()
     bench.speaks = False
@@ -96,7 +96,7 @@ def test_a_silent_board_is_told_once() -> None:
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
     """A brown-out restarts the board while the robot drives, and the driver starts the board again.
 
-    It does not send the command from before the restart again.
+    The robot stands until a new command, because the old command is not sent again.
     """
     bench.drive(0.5)
     bench.run(0.2)

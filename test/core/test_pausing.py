@@ -48,7 +48,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board just before the request to pause.
+    """Another program pauses the board just before the user requests a pause.
 
     The driver sends P only after data that is newer than the request, so it does not resume the
     board.
@@ -125,7 +125,7 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """The host sleeps for 3 s after P, then reads data that the board sent before P.
+    """The host sleeps for 3 s after it sent P. Then it reads data that the board sent before P.
 
     This data does not mean that P was lost, so the driver does not repeat P.
     """

@@ -78,9 +78,9 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """The port is lost before Stop and R of a reset are written.
+    """The port is lost before the Stop and the R of a reset are written.
 
-    The next port does not get them.
+    The driver does not write them to the next port.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -138,7 +138,7 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
-    """A board that was paused before a reset stays paused, and the answer says so."""
+    """The board is paused before a reset. It is paused afterwards too, and the answer says so."""
     bench = standing() if asked else paused()
     if asked:
         assert bench.ask(Request.PAUSE, 5.0).success

@@ -25,7 +25,7 @@ GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
 
 
 def running(**options: object) -> Bench:
-    """Return a bench with a running board at rest, after the driver's last Stop."""
+    """Return a bench with a running board at rest, to which the driver no longer sends Stop."""
     bench = Bench(BoardSettings(running=True), **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -39,7 +39,7 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return time and words of each base velocity (mode 1) and each Stop since ``mark``."""
+    """Return time and words of each Stop and each base velocity (mode 1) since ``mark``."""
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -51,7 +51,7 @@ def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
 def test_wheels_after_the_base_are_stopped_in_between(bench: Bench) -> None:
     """The user commands the base, then the wheels, then the base.
 
-    The driver sends Stop in between.
+    Each change begins with a Stop.
     """
     bench.drive(0.3)
     bench.run(0.1)
@@ -123,7 +123,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
     """The user commands (0.3, 0.4) m/s from rest. At a limit of 1 m/s², the ramp takes 0.5 s.
 
-    The direction stays the same during the ramp. A speed of 1 m/s is sent as 70 LSB.
+    The direction stays the same during the ramp. On the line, 1 m/s is 70 LSB.
     """
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
@@ -227,10 +227,7 @@ def test_wheels_are_not_ramped() -> None:
 
 
 def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
-    """The stamp of a command is 0.3 s old on arrival.
-
-    At a timeout of 0.5 s, it expires 0.2 s later.
-    """
+    """The stamp of a command is 0.3 s old on arrival. At a timeout of 0.5 s, 0.2 s are left."""
     bench.drive(0.3, age_s=0.3)
     bench.run(0.19)
     assert bench.written[-1][1] != STOP
@@ -251,7 +248,10 @@ def test_a_stamp_from_the_near_future_gains_no_time(bench: Bench) -> None:
 def test_a_command_too_old_or_from_the_future_is_refused_and_keeps_nothing_alive(
     bench: Bench, age_s: float
 ) -> None:
-    """A command is refused because of its stamp. The command before it expires as usual."""
+    """A command is refused because its stamp is too old or in the future.
+
+    The command before it expires as usual.
+    """
     bench.drive(0.3)
     bench.run(0.4)
     with pytest.raises(CommandRefused, match=r"0\.60 s"):

@@ -23,9 +23,8 @@ def bench() -> Bench:
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
     """The user latches the e-stop while the robot drives.
 
-    The robot stops, and commands are refused.
-
-    The driver then sends only ES and Stop, always together.
+    The robot stops, and commands are refused. The driver then sends only ES and Stop, always
+    together.
     """
     bench.drive(0.5)
     bench.run(0.1)
@@ -84,7 +83,7 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
     bench: Bench,
 ) -> None:
-    """While the e-stop is latched, commands are refused; its release does not move the robot."""
+    """While the e-stop is latched, commands are refused. Its release does not move the robot."""
     estop(bench, True)
     for _ in range(100):
         with pytest.raises(CommandRefused, match="e-stop"):
@@ -98,7 +97,7 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """The board ignores all commands after the release of the e-stop, until it is reset.
+    """After the release of the e-stop, the board ignores all commands until it is reset.
 
     The driver advises ~/reset in one notice.
     """

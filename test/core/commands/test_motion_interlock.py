@@ -66,7 +66,10 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip counts as the first one if the last trip was over a minute ago, or before ~/start."""
+    """After over a minute without a trip, the next trip counts as the first one.
+
+    So it does after ~/start.
+    """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
         interlock.trip(now)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion rule: only a fresh command moves the robot, while the board sends data."""
+"""Tests of the motion rule: only a fresh command moves the robot.
+
+The board must send data as well.
+"""
 
 import contextlib
 from collections.abc import Callable
@@ -20,7 +23,7 @@ def bench() -> Bench:
 
 
 def unpause(bench: Bench) -> None:
-    """Pause and resume the board, as another program does, before the driver notices."""
+    """Pause the board and resume it before the driver notices, as another program might do."""
     bench.board.receive(b"P")
     bench.run(0.02)
     bench.board.receive(b"P")
@@ -43,9 +46,9 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The board or the driver's command is interrupted while the robot drives.
+    """An interruption, such as a pause, a reset or an e-stop, comes while the robot drives.
 
-    The command from before never moves the robot again, but a new command does.
+    The command from before never moves the robot again. A new command does.
     """
     bench.drive(0.4)
     event(bench)
@@ -85,9 +88,8 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
     """The board restarts while the robot drives.
 
-    The driver stops sending motion before it has booted.
-
-    A booted board would take a byte of a motion frame for the letter S and start.
+    The driver's last motion frame comes during the boot. After the boot, the board would take a
+    byte of a motion frame for the letter S and start.
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()

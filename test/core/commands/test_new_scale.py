@@ -12,7 +12,6 @@ RAMP = SpeedLimits(linear_mps2=0.5)
 
 
 def last(bench: Bench) -> bytes:
-    """Return the last written frame."""
     return bare(bench.written[-1][1])
 
 

@@ -41,7 +41,6 @@ def where(bench: Bench) -> tuple[float, float, float]:
 
 
 def words(bench: Bench) -> list[int]:
-    """Return the words of the last written frame."""
     data = bare(bench.written[-1][1])
     assert data[:3] == b"\xff\xfe\x01"
     return [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)]
@@ -189,7 +188,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """An event discards commands while the robot drives to a goal. The robot rests afterwards.
+    """An event, such as a reset, discards the goal to which the robot drives. The robot rests.
 
     A newer goal is reached, even if the board has a new frame.
     """

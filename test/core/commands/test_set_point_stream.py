@@ -124,7 +124,8 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 ) -> None:
     """The driver writes a letter while the robot drives, with zeros before the letter.
 
-    The zeros may complete a cut frame to a wrong one, so the current command is sent again.
+    The zeros may turn an incomplete frame into a wrong command, so the driver repeats the current
+    one.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -148,7 +149,10 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """The frames of a motion still change. The driver sends each 18 ms after the one before."""
+    """A motion has a new frame each time.
+
+    The driver sends each frame 18 ms after the previous one.
+    """
     stream.command(Climbing(4), 1.0, expires_at=1.5)
     written = run(stream, 1.0, 1.1)
     assert [frame[-1] for _, frame in written] == [3, 2, 1, 0]
@@ -156,9 +160,9 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
 
 
 def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
-    """The authority changes.
+    """The authority changes. The driver sends Stop at once.
 
-    The driver sends Stop at once, and the new command a control tick later.
+    The new command follows one control tick later.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

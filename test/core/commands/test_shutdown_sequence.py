@@ -77,9 +77,8 @@ def left(bench: Bench) -> None:
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
     """At shutdown, the driver stops the robot, then checks that it rests.
 
-    It writes nothing meanwhile.
-
-    A damaged line could turn any frame into a motion, so the check needs silence.
+    It writes nothing meanwhile. A damaged line could turn any frame into a motion, so the check
+    needs silence.
     """
     bench = driving()
     left(bench)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the proof that a robot is at rest, made of the displacements that its board reports."""
+"""Tests of the proof that a robot is at rest, by the displacements that its board reports."""
 
 import pytest
 from hypothesis import given
@@ -99,7 +99,10 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """After a motion, a proof of rest is owed. Neither a new connection nor a Stop replaces it."""
+    """A robot was driven, so rest must be proved.
+
+    A new connection or a Stop does not replace the proof.
+    """
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -114,7 +117,10 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """Rest is proved, and then a displacement exceeds the thresholds of rest. The proof ends."""
+    """Rest is proved, and then a displacement is larger than a robot at rest can have.
+
+    Rest is not proved any more.
+    """
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved

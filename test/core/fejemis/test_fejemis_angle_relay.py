@@ -33,9 +33,9 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """The driver sends most angles in steps of 0.1°.
+    """The driver sends most angles in steps of 0.1°, and the others in larger steps.
 
-    It rounds some more, so that damage is noticed.
+    The larger steps serve to avoid texts in which damage would not be noticed.
     """
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
@@ -87,9 +87,9 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """Three characters of a line are lost.
+    """Three characters of a line are lost. The board accepts less than 1 % of such lines.
 
-    Less than 1 % of such lines pass (docs/boards/fejemis.md).
+    The numbers are in docs/boards/fejemis.md.
     """
     chance = random.Random(seed)
     passed = total = 0

@@ -164,9 +164,9 @@ def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() ->
 
 
 def test_a_small_difference_is_written_after_a_start() -> None:
-    """After a start, the board's values differ only slightly from the user's.
+    """When the driver starts, the board's values differ only slightly from the user's settings.
 
-    The driver writes them.
+    The driver writes the settings.
     """
     configuration = Configuration("front", {Written.STEERING: (0.4, 0.4205)})
     for _ in range(2):
@@ -218,9 +218,9 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """A line that writes a setting may be lost, and is not repeated while the robot is driven.
+    """Motion is refused until the board has the user's setting. The user may change it meanwhile.
 
-    So motion is refused until the board has the setting, even if the user changes it meanwhile.
+    The line that writes the setting may be lost, and is not repeated while the robot is driven.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

@@ -92,9 +92,7 @@ def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
     """One board restarts while the robot drives.
 
-    The robot stops, and the board is subscribed again.
-
-    A new command then moves the robot.
+    The robot stops, and the board is subscribed again. A new command then moves the robot.
     """
     bench = nominal()
     bench.drive_on()
@@ -171,7 +169,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
     """One port leads to a board of another robot. The driver sends only stops and queries to it.
 
-    A ``start`` could release a robot that another user stopped.
+    It sends no ``start``, which could release a robot that another user stopped.
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
@@ -218,7 +216,7 @@ def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
 
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
-    """The boards begin or stop to send checksums while the robot drives. The robot stops once.
+    """While the robot drives, its boards start or stop sending checksums. The robot stops once.
 
     A new command then moves it as before.
     """
@@ -397,8 +395,8 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
     """The boards change ports but keep running. The front board's clock is ``ahead_s`` ahead.
 
-    With the front board's clock, the drive board's times would give wrong stamps of the odometry.
-    The drive board could also seem to have restarted.
+    The driver must not use this clock for the times of the drive board. The stamps of the odometry
+    would be wrong, or the drive board would seem to have restarted.
     """
     bench = Bench()
     bench.robot.front._clock_s += ahead_s

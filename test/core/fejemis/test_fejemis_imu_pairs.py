@@ -17,8 +17,7 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 
 LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
-"""Time in s after which the order of the two lines is known. It holds for reads up to 100 ms apart.
-"""
+"""Time in s after which the order of the two lines is known, if reads are at most 100 ms apart."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: whether the other lines come with odd samples. They come in every second cycle.
+    ``odd``: whether the other lines come with every odd sample, not with every even one.
     """
 
     order: str
@@ -49,7 +48,6 @@ class Layout:
     odd: bool = False
 
     def lines(self, seconds: float) -> list[Line]:
-        """Return the lines that the board sends in ``seconds``."""
         kinds = {kind[0]: kind for kind in LENGTHS}
         lines = []
         for number in range(round(seconds * 100)):

@@ -2,7 +2,7 @@
 
 """Tests of the lines of both Teensy boards: checksums, messages and damage.
 
-The golden lines are copied from the manual.
+The lines in the ``GOLDEN`` tables are copied from the manual.
 """
 
 import random
@@ -132,7 +132,7 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """Every example line of the manual, and a line for each of its lists of fields, is decoded."""
+    """Every example line of the manual is decoded. So is a line for each list of fields."""
     assert parse(text) == GOLDEN[text]
 
 
@@ -290,7 +290,7 @@ def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
 
 @given(st.text(alphabet="0123456789.-+eExX hbtfwlposevgyrac;#\r", max_size=60))
 def test_no_line_raises(text: str) -> None:
-    """A random text of characters that real lines have raises no error."""
+    """A random text, made of characters that occur in real lines, raises no error."""
     parse(text)
     feed(FejemisDecoder(), b";07" + text.encode() + b"\n")
 

@@ -27,8 +27,8 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
     """Return the motions that a board with checksums reads from these bytes.
 
-    The board reads numbers as C does, and is as lenient as possible: missing numbers are 0, further
-    text is ignored, and a checksum may have one digit.
+    The board reads numbers as C does, and is as lenient as possible. Missing numbers are 0. Further
+    text is ignored. A checksum may have one digit.
 
     ``keyword``: first word of the lines to read.
 
@@ -71,7 +71,7 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
     """One or two characters are lost from any motion line. The board never reads another motion.
 
-    The line after it is included, because a line end may be lost.
+    The next line is part of the test, because a line end may be lost.
     """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
@@ -106,11 +106,11 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A line end after ``rc 2 0 0`` and the ``;`` of the next line are lost.
+    """The line end after ``rc 2 0 0`` and the semicolon of the next line are lost.
 
-    The checksum of the next line then extends the last 0. With 92, the result ``rc 2 0 092`` means
-    92 degrees/s. A checksum of 02 or 92 leaves the sum of the line unchanged, so the driver avoids
-    this.
+    The checksum of the next line then extends the last 0. A checksum of 92 gives ``rc 2 0 092``,
+    which means 92 degrees/s. With 02 or 92, the sum of the longer line is still right. So the
+    driver puts an empty line before a line with such a sum.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -122,9 +122,7 @@ def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) 
 def test_what_three_lost_characters_leave() -> None:
     """Three characters of a motion line are lost.
 
-    Less than 1 % of such lines command another motion.
-
-    The numbers are in docs/boards/fejemis.md.
+    Less than 1 % of such lines command another motion. The numbers are in docs/boards/fejemis.md.
     """
     passed = total = 0
     for v, w in ((0.25, 0.2), (0.5, -0.5), (0.15, 0.0)):
@@ -158,9 +156,8 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     """The two numbers in the drive line avoid certain digits.
 
-    Together they still reach every wheel speed.
-
-    Negative numbers have fewer digits, so the speed is only right within 1.8 %.
+    Together they still reach every wheel speed. Negative numbers have fewer digits, so the speed is
+    only right within 1.8 %.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.03**n for n in range(240))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -171,7 +168,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """The lift line has 60 to 100 % of the requested voltage, and at most the requested time.
 
-    Two characters of it are lost. The voltage is then at most 12 V, and the time no longer.
+    If one or two characters are lost, the board reads at most 12 V, and no longer time.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every command in the boards' help has a golden line, and a use or the reason why it has none."""
+"""Every command in the boards' help has an example line here, the golden line.
+
+It also has a use, or a reason why the driver does not use it.
+"""
 
 import math
 import re
@@ -213,9 +216,9 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """The driver sends each used command as in its golden line.
+    """The driver sends each command that it uses as in the command's golden line.
 
-    It never sends the others, such as ``setid``, which can erase the board.
+    It never sends the other commands, such as ``setid``, which can erase the board.
     """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden

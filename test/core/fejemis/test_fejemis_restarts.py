@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board restarts: short and long boots, lost start lines, and reads of several lengths."""
+"""Tests of boards that restart, with short and long boots and with lost start lines.
+
+The host reads at several intervals.
+"""
 
 import contextlib
 import itertools
@@ -142,9 +145,9 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """After a silence of the front board, a heartbeat from before the silence is read late.
+    """The front board is silent for a while. Then a heartbeat from before the silence is read.
 
-    It does not show that the board has not restarted. A new heartbeat shows it.
+    It does not prove that the board has not restarted. Only a newer heartbeat does.
     """
     bench = nominal()
     bench.run(2.0)
@@ -181,10 +184,10 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """While a board is silent, the driver requests heartbeats ten times a second.
+    """While a board is silent, the driver requests a heartbeat ten times a second.
 
-    They show sooner than the periodic ones, which come every 0.4 s, whether the board has
-    restarted.
+    A requested heartbeat shows at once whether the board has restarted. Periodic ones come only
+    every 0.4 s.
     """
     bench = nominal()
     bench.speaks = {DRIVE}

@@ -62,7 +62,7 @@ def test_a_calibration_is_done_when_its_offsets_were_read_twice_alike() -> None:
 
 
 def lose(bench: Bench, word: bytes, times: int) -> None:
-    """Lose the first ``times`` packets to the boards that contain ``word``."""
+    """Lose the first ``times`` packets that contain ``word`` on their way to the boards."""
     receive, left = bench.robot.receive, [times]
 
     def lossy(data: bytes, now: float, channel: int) -> None:
@@ -89,7 +89,7 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
     """Every command to calibrate is lost, so the offsets do not change. The request fails.
 
-    After a real calibration, sensor noise alone would make the offsets differ.
+    A real calibration always changes the offsets a little, because of sensor noise.
     """
     bench = nominal()
     lose(bench, word.encode(), 99)
@@ -347,8 +347,6 @@ def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
 ) -> None:
     """The line ``off 300`` may lose its 3 and a 0, and its checksum still fits.
 
-    The power is cut at once.
-
-    So the driver increases the delay to a number without two such digits.
+    The power is cut at once. So the driver increases the delay to a number without two such digits.
     """
     assert whole_seconds(wanted_s) == seconds

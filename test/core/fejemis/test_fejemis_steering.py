@@ -54,7 +54,10 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """By the manual's equations, ``rc`` with a speed and a turn rate gives a different motion."""
+    """The command ``rc`` contains a speed and a turn rate. In a curve, the robot moves at others.
+
+    The expected values come from the manual's equations.
+    """
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
@@ -82,9 +85,9 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The front wheel still turns to its angle. The robot is not faster than commanded meanwhile.
+    """The front wheel still turns to its angle. Meanwhile, the robot is not faster than commanded.
 
-    An error of 5° in the wheel's angle is allowed for.
+    It may only be faster by as much as an error of 5° in the wheel's angle explains.
     """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
@@ -99,7 +102,10 @@ def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
 
 @given(rates, angles)
 def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> None:
-    """At a turn on the spot, the drive board is stopped until the wheel is within 5° of ±90°."""
+    """A turn on the spot is commanded.
+
+    The drive board stops until the wheel is within 5° of ±90°.
+    """
     assume(abs(w) > 0.01)
     told = steer(BodyTwist(0.0, 0.0, w), ROBOT, angle_rad, turning=False)
     stands = abs(angle_rad - math.copysign(math.pi / 2, w)) <= ALIGNED_RAD

@@ -82,9 +82,9 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The heartbeat names the source of the board's commands, which proves a pause.
+    """The heartbeat names the source of the command that the board obeys, which proves a pause.
 
-    An e-stop and its release during the pause do not end the pause.
+    The pause lasts if the user latches and releases the e-stop meanwhile.
     """
     bench = nominal()
     bench.drive_on()
@@ -269,9 +269,9 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The lines of the guard, with or without an e-stop, stop all motors.
+    """The guard's lines stop all motors, whether the e-stop is latched or not.
 
-    So do the driver's last lines.
+    So do the lines that the driver sends at the exit.
     """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()
@@ -292,9 +292,9 @@ def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
 
 @pytest.mark.parametrize("again", ["e-stop", "pause"])
 def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> None:
-    """The driver still repeats ``start`` when the user stops the robot again.
+    """The user stops the robot again while the driver still repeats ``start``.
 
-    It sends no more ``start``.
+    The driver sends no more ``start``.
     """
     bench = nominal()
     bench.estop(True)
@@ -314,9 +314,10 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 
 
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
-    """The driver stalls, and the guard switches the brush off.
+    """The driver repeats ``brush 1`` every second.
 
-    The driver must not repeat ``brush 1`` after the stall, as it does every second otherwise.
+    Then it stalls, and the guard switches the brush off. After the stall, the driver does not
+    repeat ``brush 1`` any more.
     """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)

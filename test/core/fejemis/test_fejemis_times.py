@@ -101,9 +101,9 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """One stamp goes back, and another one is in the future.
+    """A reading has a stamp before that of the last reading. Its stamp is increased.
 
-    The first is increased, and the second is set to the present time.
+    A stamp in the future is set to the present time.
     """
     stamped = StampedReadings()
     stamped.begin()
@@ -145,7 +145,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
     """The drive board's lines of 0.3 s arrive in one read.
 
-    Orientations have their samples' stamps.
+    Each orientation has the stamp of its IMU sample.
     """
     bench = nominal()
     bench.run(3.0)

@@ -40,8 +40,8 @@ def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
     """The robot turns at 0.5 rad/s about a point 1 m to its left.
 
-    The left wheel moves at 0.4 m/s on a circle with a radius of 0.8 m, and the right wheel at 0.6
-    m/s on one of 1.2 m. The middle between the wheels moves at 0.5 m/s.
+    The left wheel moves at 0.4 m/s on a circle with a radius of 0.8 m. The right wheel moves at 0.6
+    m/s on a circle of 1.2 m. The middle between the wheels moves at 0.5 m/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 

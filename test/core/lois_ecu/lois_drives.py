@@ -191,7 +191,6 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated time in s."""
         return self.board.now_s
 
     @property
@@ -234,7 +233,6 @@ class Rig:
             self.run(REPEAT_S)
 
     def drive(self, program: Program) -> Drive:
-        """Drive a program, stop, and return the outcome."""
         self.run(4.0)
         for seconds, (left, right) in [*program, (2.0, STOP)]:
             self.order(left, right, seconds)

@@ -24,7 +24,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
     """The robot drives backward. The public firmware counts no ticks then and reports integer RPM.
 
     So the estimated heading drifts. In eight drives the mean error of the position is 4.9 % of the
-    way, and in the worst of them 13 %.
+    way. The worst of them has 13 %.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -53,11 +53,10 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> Non
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again(
     seed: int,
 ) -> None:
-    """A wheel with set-point −19 RPM slows from 41 to 20 RPM and stops.
+    """A wheel is commanded 19 RPM backward. It slows from 41 to 20 RPM and then stops.
 
-    The board still reports 20 RPM.
-
-    An odometry that believed the report would turn by 600° in 15 s.
+    The board still reports 20 RPM. An odometry that believed this report would turn by 600° in 15
+    s.
     """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -65,11 +64,9 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """A wheel has the set-point −7 RPM, and the board keeps reporting 12 RPM.
+    """A wheel is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
 
-    So the wheel is at rest.
-
-    A wheel that rolled would become slower.
+    The wheel is at rest. If it rolled, it would become slower.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -80,9 +77,9 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """The robot drives backward with the user's gains. Some wheels overshoot or roll much too fast.
+    """The robot drives backward with the user's gains. In some drives a wheel overshoots at first.
 
-    One rolls at 46 RPM instead of 34. The odometry is still right within 10 % of the way.
+    In others, it rolls at 46 RPM instead of 34. The odometry is still right within 10 % of the way.
     """
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
@@ -93,9 +90,7 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
     """Too much feed-forward makes the wheels too fast backward.
 
-    Report 0x20 shows it, but no ticks do.
-
-    The estimated distance is still right within 3 %.
+    Report 0x20 shows it, but no ticks do. The estimated distance is still right within 3 %.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)

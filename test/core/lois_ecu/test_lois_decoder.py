@@ -101,12 +101,10 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     ],
 )
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """One line of a group is damaged, and the decoder discards the group.
+    """One line of a group is damaged. The decoder discards this group and returns the next one.
 
-    The next group is returned.
-
-    A group whose last line arrives twice is returned, except a GPS fix, which waits for the next
-    line.
+    If the last line of a group arrives twice, the group is returned. A GPS fix is discarded even
+    then, because it waits for the next line.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -150,9 +148,9 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """Odometry follows a group of ticks, and a line of one of the two is lost.
+    """A group of odometry lines follows a group of tick lines. One line is lost.
 
-    The other is decoded.
+    The group with all its lines is still decoded.
     """
     decoder = LoisDecoder()
     found: list[Report] = []

@@ -14,7 +14,6 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def opened(settings: LoisEcuSettings) -> AnyBench:
-    """Return a bench whose session was opened ten seconds ago."""
     bench = AnyBench(LoisEcuBoard(settings), LoisRobot("firmware"))
     bench.open()
     bench.run(10.0)

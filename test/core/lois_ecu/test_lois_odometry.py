@@ -49,9 +49,9 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The odometry names its source. Forward it is the ticks.
+    """The odometry names its source. In a forward drive, the source is the ticks.
 
-    The public firmware counts no ticks backward, so commands and heading are used then.
+    The public firmware counts no ticks backward. The source is then the commands and the heading.
     """
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
@@ -115,7 +115,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
     """The displacements of the wheels add up to the driven distance.
 
-    No step is longer than 3 cm plus what 1 m/s would cover.
+    No step is more than 3 cm longer than a step at 1 m/s.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
@@ -130,7 +130,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
     """The board restarts, which sets its counters to zero and stops the robot.
 
-    The odometry adds at most 5 cm, for the way in which the robot stops.
+    The odometry adds at most 5 cm, which the robot needs to stop.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)

@@ -97,7 +97,6 @@ def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     driver, now, place_m = LoisConversation(ours), 0.0, []
 
     def hear(board_s: float, ticks: int) -> None:
-        """Process a group of a board with the manual's firmware."""
         counts = round(board_s * 1e9) % (1 << 32)
         driver.receive(encode_report(Ticks(counts, ticks, ticks)), now)
         driver.receive(b"", now + 0.1)

@@ -41,9 +41,8 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
     """The user has set the gains.
 
-    Wheels then overshoot and roll steadily, and few stop by themselves.
-
-    So even twenty repetitions do not show for certain that the wheel is at rest.
+    Wheels then overshoot and roll steadily, and few stop by themselves. So even twenty repetitions
+    do not show for certain that the wheel is at rest.
     """
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 

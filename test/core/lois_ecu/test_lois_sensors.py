@@ -112,8 +112,8 @@ def test_false_headings_at_north_are_refused() -> None:
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
     """The odometry is reset, and later headings are compared with the new yaw.
 
-    Otherwise, after a turn of 120°, all headings would be refused once the firmware had sent a
-    wrong heading of 120° at north.
+    The firmware may send a wrong heading of 120° at north. After a turn of 120°, all headings would
+    otherwise be refused for good.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

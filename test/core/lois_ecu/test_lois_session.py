@@ -64,9 +64,10 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """The user resets the board, and its tick counters jump to zero. This proves the reset.
+    """The user resets the board after a drive.
 
-    A drive of 1.2 s before it gives enough ticks.
+    The tick counters jump to zero, which proves the reset. A drive of 1.2 s is long enough for
+    this.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
@@ -80,7 +81,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 
 @FIRMWARE
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
-    """The tick counters are zero before a reset, so no report can prove it.
+    """The user resets the board while its tick counters are zero. No report can prove this reset.
 
     The answer says that the reset is unconfirmed.
     """

@@ -83,7 +83,6 @@ def test_duty_is_limited() -> None:
 
 
 def encode_command_duty(left: int, right: int) -> bytes:
-    """Return the line of a duty command, made by the codec. The codec has tests of its own."""
     return encode_command(SetDuty(left, right))
 
 

@@ -2,7 +2,7 @@
 
 """The connection is lost while a LOIS robot drives.
 
-It has no watchdog, so the wheels keep turning.
+The board has no watchdog, so the wheels keep turning.
 """
 
 import math

@@ -90,9 +90,10 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The left wheel's reported speed never changes, while the other wheel ticks. It is at rest.
+    """The left wheel's reported speed never changes, while the other wheel ticks.
 
-    The reported pose moves all the same time, because the firmware computes it from the last speed.
+    So the left wheel is at rest. The reported pose still moves, because the firmware computes it
+    from the last speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
@@ -136,9 +137,9 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """Odometry takes a wheel to be at rest whose reported speed is near its set-point.
+    """By the odometry, a wheel is at rest whose reported speed is near its set-point.
 
-    The wheel gets no power, so it looks stalled.
+    Such a wheel gets no power, so it looks stalled.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -172,7 +173,7 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
     """A saturated controller keeps a wheel at −68 RPM instead of −31. The driver sends RPM 0/0.
 
-    The motion of the wheel before that stays in the odometry.
+    The odometry keeps the motion of the wheel before that.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

@@ -48,9 +48,8 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 ) -> None:
     """The user ends a terminal mode.
 
-    Its end is reported once, even if the first lines to end it are lost.
-
-    The driver restores the "short correction" that the mode overwrote.
+    Its end is reported once, even if the first lines to end it are lost. The driver restores the
+    "short correction" that the mode overwrote.
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -90,9 +89,9 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
 def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
     firmware: str, settings: LoisEcuSettings
 ) -> None:
-    """In a terminal mode the board reports no motion, so no odometry is published.
+    """In a terminal mode the board reports no motion.
 
-    It continues when the mode ends.
+    No odometry is published until the mode ends.
     """
     bench = Bench(firmware)
     configure(bench, settings)
@@ -127,9 +126,7 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 def test_another_drive_mode_stops_first(firmware: str) -> None:
     """The user sets another drive mode while the robot drives.
 
-    Motion is refused until it is at rest.
-
-    Then the new drive mode is used.
+    Motion is refused until it is at rest. Then the new drive mode is used.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)

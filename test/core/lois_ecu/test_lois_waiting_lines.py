@@ -20,7 +20,10 @@ def switch_led(bench: Bench, on: bool) -> None:
 
 
 def drive_and_require_sleep(bench: Bench, seconds: float) -> None:
-    """Drive for ``seconds``, and check at each step that the session is not due again at once."""
+    """Drive for ``seconds``.
+
+    Check at each step that the session's next wake-up is in the future.
+    """
     for step in range(round(seconds / 0.01)):
         if step % 10 == 0:
             bench.drive()
@@ -42,9 +45,9 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The settings are not confirmed by a date, so they wait to be written again after the drive.
+    """No date confirms the settings, so they wait until the robot is not driven.
 
-    The session is not due all the time meanwhile.
+    Meanwhile, the session's next wake-up is always in the future.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)

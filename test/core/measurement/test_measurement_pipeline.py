@@ -64,9 +64,8 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
     """The user resets the odometry while the robot drives.
 
-    Odom then gives the distance since the reset.
-
-    It may miss the displacement under way, which is at most 20 mm.
+    Odom then gives the distance since the reset. It may miss the displacement under way, which is
+    at most 20 mm.
     """
     for _ in range(10):
         bench.drive(0.5)

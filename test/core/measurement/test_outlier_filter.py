@@ -76,9 +76,7 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 ) -> None:
     """A word of one IMU reading jumps by the value of one of its high bits.
 
-    The reading is rejected.
-
-    The next reading is released at once. The ranges are 2 g and 250 °/s.
+    The reading is rejected. The next reading is released at once. The ranges are 2 g and 250 °/s.
     """
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)

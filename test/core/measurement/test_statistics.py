@@ -16,9 +16,10 @@ def lost(bench: Bench) -> tuple[int, int]:
 
 @pytest.mark.parametrize("silence_s", [0.04, 0.2, 1.0, 5.0])
 def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
-    """The line is silent for a while. Lost displacements are counted by their counter.
+    """The line is silent for a while.
 
-    IMU frames have no counter, so four of them count as lost with each displacement.
+    A counter in the frames shows how many displacements are lost. IMU frames have no counter, so
+    four of them count as lost with each displacement.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

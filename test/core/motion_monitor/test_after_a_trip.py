@@ -106,9 +106,9 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """The driver stalls after a trip and loses commands. The sender was not silent.
+    """The driver stalls after a trip, so commands of the sender are lost.
 
-    Its silence is counted from the end of the stall.
+    The stall does not count as silence of the sender. Only the time after the stall does.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

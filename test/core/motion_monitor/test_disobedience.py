@@ -196,9 +196,9 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """The robot drives away from its goal, and the motion monitor trips.
+    """The robot drives away from its goal. The motion monitor trips and refuses motion.
 
-    Otherwise, a node that repeats its goal could restart the robot again and again.
+    Without this, a node that repeats its goal could restart the robot again and again.
     """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)

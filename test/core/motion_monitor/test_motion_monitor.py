@@ -122,7 +122,10 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot that is 25 % too fast causes no fault. One that is too slow is at most "blocked"."""
+    """A robot that is 25 % too fast causes no fault.
+
+    One that is too slow causes at most "blocked".
+    """
     drive = Drive()
     drive.command(*commanded)
     x, y, yaw = (scale * value for value in commanded)
@@ -238,16 +241,19 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot at rest is pushed for long. It has already received Stop, so faults become rarer."""
+    """A robot at rest is pushed for long. It has already received Stop.
+
+    So the faults, and with them the Stops, become rarer.
+    """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot has missed Stop and goes on. It may receive a later one.
+    """A driven robot has missed Stop and goes on, but may receive a later Stop.
 
-    So faults do not become rarer, and neither do the Stops.
+    So the faults, and with them the Stops, do not become rarer.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -263,9 +269,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
     """The robot moves the wrong way and is stopped.
 
-    It moves until Stop arrives, and then rolls out.
-
-    The monitor finds no second fault.
+    It moves until Stop arrives, and then rolls out. The monitor finds no second fault.
     """
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)

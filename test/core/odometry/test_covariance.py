@@ -54,9 +54,9 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """The robot has two wheels, and the size of each is uncertain by 1 %.
+    """The robot has two wheels, and each has a size that is uncertain by 1 %.
 
-    Per metre, each adds an uncertainty of 0.025 rad and 5 mm.
+    After a metre straight ahead, each adds an uncertainty of 0.025 rad and 5 mm.
     """
     noise = OdometryNoise(
         wheel_drift=0.0,

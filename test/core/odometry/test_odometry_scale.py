@@ -33,7 +33,6 @@ def bench(odometry: OdometrySettings, **settings: object) -> Bench:
 
 
 def drive(on: Bench) -> None:
-    """Drive curves for ten seconds, then stop."""
     for tick in range(200):
         t = tick / 20
         on.drive(0.3 * math.cos(t), 0.25 * math.sin(1.4 * t), 0.5 * math.cos(0.4 * t))

@@ -151,7 +151,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """Some boards have own values, such as the rate of their odometry. The status shows them."""
+    """Some boards have values of their own, such as an odometry rate. The diagnostics show them."""
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -292,7 +292,10 @@ def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
 
 
 def test_what_a_board_does_not_send_has_no_figures() -> None:
-    """The board sends no IMU readings and no poses. Their rates and the IMU status are missing."""
+    """The board sends no IMU readings and no poses. The diagnostics have no rates of these.
+
+    They also have no status "IMU".
+    """
     robot = Robot()
     rates_hz: dict[RateName, float] = {"Odometry": 2.5}
     robot.set(board=BoardFigures(rates_hz=rates_hz))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the clock's shortcut for ticks that arrive when due. It changes no stamp."""
+"""Tests of the clock's shortcut for ticks that arrive when due. The shortcut changes no stamp."""
 
 import random
 
@@ -82,7 +82,7 @@ surprises = st.tuples(
 """Unusual reads, each as a tuple of five values.
 
 These are the readings, the ticks since the reading before, the delay in s, the boundary, and the
-number of normal reads that follow.
+number of normal reads after it.
 """
 
 

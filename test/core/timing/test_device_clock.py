@@ -112,9 +112,9 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """Any adapter splits the stream. From 2 s on, the stamps are uneven by less than 0.2 ms.
+    """An adapter or another line splits the stream. The stamps are compared from 2 s on.
 
-    Except for a constant, 99 % of them are right within 0.5 ms.
+    They are uneven by less than 0.2 ms. Except for a constant error, 99 % are right within 0.5 ms.
     """
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
