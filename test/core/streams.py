@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Byte streams of the simulated board, their division into frames by the manual, and decoding."""
+"""Byte streams of the simulated board, divided into frames by the manual's tables, and decoded."""
 
 import struct
 from collections.abc import Callable, Iterable, Sequence

@@ -59,7 +59,10 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """After a stall of the driver, the board has 2 s again. Its data may still wait to be read."""
+    """After a stall of the driver, the board has 2 s again to send data.
+
+    Its earlier data may still wait to be read.
+    """
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
     assert not liveness.fell_silent(51.9)

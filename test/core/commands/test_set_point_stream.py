@@ -75,7 +75,7 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """After the timeout, the driver sends Stop at 20 Hz, also at a lower command rate.
+    """After the timeout, the driver sends Stop at 20 Hz, even if the command rate is lower.
 
     It does so for 1 s if the robot is seen at rest, and otherwise for 5 s.
     """

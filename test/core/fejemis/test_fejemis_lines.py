@@ -132,7 +132,7 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """Every example line of the manual is decoded. So is a line for each list of fields."""
+    """The manual's example lines are decoded, and a line for each of its lists of fields."""
     assert parse(text) == GOLDEN[text]
 
 

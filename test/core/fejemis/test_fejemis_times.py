@@ -187,7 +187,7 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
     """Lines that waited before the port was opened arrive first. Then the board's time jumps ahead.
 
-    This is not a restart, which would set the board's time back.
+    The clock reports no restart, because a restart would set the board's time back.
     """
     clock = TeensyClock()
     for n in range(20):
@@ -204,7 +204,7 @@ def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> Non
 def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
     """The host stalls, and then many lines arrive at once. Their times still increase.
 
-    This is not a restart.
+    So the clock does not report a restart.
     """
     clock = TeensyClock()
     for n in range(100):

@@ -196,7 +196,10 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 
 
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
-    """Two values of 362° end a record of headings. A third makes the number of values even."""
+    """A record of headings ends with two values of 362°.
+
+    If the number of values would be odd, it ends with three.
+    """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)
     data = b":0c0005fffb68\n:0c0003016a3c\n:0c016a016a69\n"

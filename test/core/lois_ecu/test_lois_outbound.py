@@ -90,9 +90,10 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """Exactly one line's length is lost across two set-points, and the rest is another valid line.
+    """Exactly one line's length is lost across two set-points.
 
-    The board may be deaf for 13 ms at a time, so the driver sends set-points 18 ms apart.
+    The remaining characters are another valid line. The board may be deaf for 13 ms at a time, so
+    the driver sends set-points 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -103,10 +104,11 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """One line's length is lost across a motion line and the LED's line after it.
+    """Exactly one line's length is lost across a motion line and the LED's line after it.
 
-    The rest may be a wrong motion, so the LED's line is sent 15 ms after a motion line. A motion
-    line may follow the LED's line at once, because the rest is then never a wrong motion.
+    The remaining characters may be a wrong motion, so the LED's line is sent 15 ms after a motion
+    line. A motion line may follow the LED's line at once, because the remaining characters are then
+    never a wrong motion.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

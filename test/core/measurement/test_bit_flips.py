@@ -106,7 +106,7 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 ) -> None:
     """One bit of one frame is changed. Odom is then wrong by at most 17 mm and 0.052 rad.
 
-    It is right again 1.5 s later.
+    After 1.5 s, it is right again.
     """
     kind, byte, bit, ticks = flip
     drive = Drive()

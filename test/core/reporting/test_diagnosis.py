@@ -208,7 +208,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     """The skew of the clock is larger than a crystal can have. It is reported after more than 70 s.
 
-    A busy computer may show such a skew for a minute.
+    A busy computer may show such a skew for a minute, which must not be reported.
     """
     robot = Robot()
     robot.set(skew_ppm=-119.0)
