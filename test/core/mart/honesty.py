@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The normalised error squared (NEES) of odometry, by its covariance, on networks of all kinds.
+"""Measure whether the odometry's covariance covers its error, on networks of all kinds.
+
+The measure is the normalised squared error (NEES). With an honest covariance its mean is 3, and
+0.1 % of the values exceed 16.3. A mean below 3 shows a covariance that is larger than necessary.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50`` makes 50 drives for each
-network; docs/boards/mart.md has the figures. With an honest covariance the mean is 3, and 0.1 % of
-the values exceed 16.3. A mean below 3 shows a covariance that is larger than necessary.
+network. The results are in docs/boards/mart.md.
 """
 
 import math
@@ -35,7 +37,7 @@ MOTIONS = 6
 
 
 def nees(bench: MartBench) -> float:
-    """Return the normalised error squared of the last published pose, against the true pose."""
+    """Return the normalised squared error of the last published pose, relative to the true pose."""
     told, truth = bench.odometry[-1], bench.truth
     yaw_rad = math.remainder(told.pose.yaw_rad - truth.yaw_rad, math.tau)
     error = np.array([told.pose.x_m - truth.x_m, told.pose.y_m - truth.y_m, yaw_rad])
@@ -45,7 +47,7 @@ def nees(bench: MartBench) -> float:
 
 
 def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[float]:
-    """Yield the normalised error squared again and again during a random drive, and at its end."""
+    """Make a random drive; yield the normalised squared error many times, and at the end."""
     random = Random(seed)
     unequal = random.uniform(-0.04, 0.04)
     bench = MartBench(FIRMWARES[seed % 3], faults, seed=seed, motor_inequality=unequal).ready()
@@ -73,7 +75,7 @@ def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[
 
 
 def main() -> None:
-    """Print a row of figures for each kind of network, without and with goals."""
+    """Print a row of results for each kind of network, without and with goals."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print(
         "| Network | Motions | Mean at the end | Mean | Median | Beyond 16.3 |\n" + "|---" * 6 + "|"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A session and a simulated MART controller in simulated time, with a bad network between them."""
+"""A driver session and a simulated MART, in simulated time, with a bad network between them."""
 
 import math
 from typing import Any
@@ -55,7 +55,7 @@ class NetworkRobot(MartRobot):
 
 
 def sleeps(board: SimulatedMart) -> bool:
-    """Return whether nothing is due in the next five ticks; if so, skip these ticks."""
+    """Return whether nothing is due in the next five ticks; if so, advance the board over them."""
     if board.server.wake_at <= (board.ticks + 5) * TICK_S:
         return False
     board.ticks += 5
@@ -63,7 +63,10 @@ def sleeps(board: SimulatedMart) -> bool:
 
 
 class MartBench(AnyBench):
-    """A session with a simulated controller; ``server`` is the simulated MART server."""
+    """A driver session with a simulated controller.
+
+    ``server``: the simulated MART server, a part of that controller.
+    """
 
     def __init__(
         self,
@@ -101,7 +104,10 @@ class MartBench(AnyBench):
         self._wake_s = self.session.wake_at
 
     def run(self, seconds: float) -> None:
-        """Advance by ``seconds``; the session is called only when it has something to do."""
+        """Advance the simulated time by ``seconds``.
+
+        The session is called only when it has something to do, which saves computing time.
+        """
         for _ in range(round(seconds / BENCH_TICK_S)):
             self.now += BENCH_TICK_S
             packets = self.robot.advance()
@@ -154,11 +160,11 @@ class MartBench(AnyBench):
 
     @property
     def error(self) -> Pose:
-        """Error of the odometry: its last pose relative to the true one."""
+        """Return the error of the odometry: its last pose minus the true pose."""
         return self.odometry[-1].pose - self.truth
 
     def said(self, since: int = 0) -> list[bytes]:
-        """Return the datagrams of ``written`` from index ``since`` on, without polls."""
+        """Return the driver's datagrams from number ``since`` on, without its regular queries."""
         return [data for _, data in self.written[since:] if data not in POLLS]
 
     def job(self, job: Job, *arguments: object, limit_s: float = 95.0) -> JobDone:
@@ -181,7 +187,7 @@ class MartBench(AnyBench):
 
 
 def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: float = 0.04) -> None:
-    """Steer from corner to corner by odometry, as a ROS program would, and turn at each corner."""
+    """Drive from corner to corner by odometry, as a ROS program would; turn on the spot at each."""
     for x_m, y_m in corners:
         for _ in range(600):
             way = bench.odometry[-1].pose.way_to(Pose(x_m, y_m, 0.0))

@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds, in simulated time; the robot must be at rest at the end.
+"""Random drives on networks of all kinds, in simulated time.
+
+At the end of each drive the robot must be at rest, and the server must still answer.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60`` makes 60 drives for each
-network; docs/boards/mart.md has the figures.
+network. The results are in docs/boards/mart.md.
 """
 
 import sys
@@ -34,8 +36,11 @@ FIRMWARES: tuple[Firmware, ...] = ("documented", "firmware", "source")
 class Outcome(NamedTuple):
     """The result of one drive.
 
-    ``ended``: whether the robot stands still and the server still answers; ``stop_s``: longest time
-    from a stop to standstill, in s; ``way_m``: driven distance in m.
+    ``ended``: whether the robot is at rest at the end, and the server still answers.
+
+    ``stop_s``: the longest time from a stop to standstill in this drive, in s.
+
+    ``way_m``: the driven distance in m.
     """
 
     ended: bool
@@ -44,7 +49,7 @@ class Outcome(NamedTuple):
 
 
 def drive(faults: NetworkFaults, seed: int) -> Outcome:
-    """Make a random drive with goals, e-stops and stalls of the driver, then shut it down."""
+    """Make a random drive with goals, e-stops and stalls of the driver, which then shuts down."""
     random = Random(seed)
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     longest_s = 0.0
@@ -75,7 +80,7 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
 
 
 def main() -> None:
-    """Print a row of figures for each kind of network."""
+    """Print a row of results for each kind of network."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
     print("| Network | Robot stood, server answers | Longest stop | Mean way |\n|---|---|---|---|")
     for name, faults in NETWORKS.items():

@@ -1,12 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A search model of a MART server, and of any driver that obeys the tables of ``states``.
+"""A model of a MART server, its network and its driver, for a search of all reachable states.
 
-The modelled driver sends whatever the tables allow, in any order, so it does more than the real
-driver. Each datagram may arrive, be lost, be late, or come twice; the IMU may die at any step. All
-reachable states are searched, so the number of commands from the user is unlimited. Time is
-abstract: a late copy arrives at some later step or is lost. A command that the real driver sends
-only after the network delay is allowed only when no such copy is on its way.
+The modelled driver may send any command that the tables of ``states`` allow, in any order. So it
+does more than the real driver.
+
+At each step a datagram may arrive, be lost, be late, or come twice, and the IMU may die. The number
+of commands from the user is not limited.
+
+The model has no clock. A late copy of a command arrives at any later step, or is lost. If the real
+driver waits for the network delay before a command, the modelled driver sends that command only
+when no late copy is left.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,7 +32,7 @@ from omnibot_driver.core.mart.words import WORDS, Kind
 
 BY_TEXT: Final = {("CHECK" if word.kind is Kind.CHECK else word.text): word for word in WORDS}
 COPIED: Final = frozenset(SAID)
-"""Commands whose late copies are modelled; copies of other commands do not change the server."""
+"""Commands whose late copies are modelled. Copies of other commands do not change the server."""
 MOVES: Final = ("TF", "MCR")
 MOST_COPIES: Final = 2
 UNANSWERED: Final = 3
@@ -36,12 +40,20 @@ UNANSWERED: Final = 3
 
 
 class Driver(NamedTuple):
-    """The modelled driver.
+    """The state of the modelled driver.
 
-    ``proved``: whether the IMU was just proved alive. ``pending``: the command that awaits a reply.
-    ``unanswered``: number of stops without an answer. ``moved``: whether the last motion was a
-    controlled move. ``counted``: whether the encoder was read after the robot stopped, and after
-    the last harmful copy could arrive. ``greeted``: whether the server has been stopped once.
+    ``proved``: whether a check has just shown that the IMU works.
+
+    ``pending``: the command that awaits a reply.
+
+    ``unanswered``: the number of stops that got no answer.
+
+    ``moved``: whether the last motion was a controlled move.
+
+    ``counted``: whether the encoder was read after the robot stopped, when no late copy that could
+    do harm was left.
+
+    ``greeted``: whether the driver has already stopped the server once.
     """
 
     state: State = State.UNKNOWN
@@ -55,10 +67,11 @@ class Driver(NamedTuple):
 
 
 class World(NamedTuple):
-    """One state of server, driver and network.
+    """The state of the server, the driver and the network together.
 
-    ``copies``: late commands that have not arrived yet. ``replies``: late replies that have not
-    arrived yet.
+    ``copies``: late commands that are still on their way to the server.
+
+    ``replies``: late replies that are still on their way to the driver.
     """
 
     server: Server = Server()
@@ -102,7 +115,7 @@ def table(state: State, word: str, motion: Motion) -> bool:
 
 
 def steps(world: World, rules: Rules = table) -> Iterator[Step]:
-    """Yield every step that is possible in this world, each with the world after it."""
+    """Yield every step that can follow this world: its name, and the world after it."""
     server, driver = world.server, world.driver
     if server.imu:
         yield "the IMU dies", world._replace(server=server._replace(imu=False))
@@ -133,8 +146,8 @@ def steps(world: World, rules: Rules = table) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    The move takes longer than a copy of its command can be late. So when the move ends, such a copy
-    has been lost, or it is in the server's queue and begins at once.
+    A late copy of the move's command arrives before the move ends, or is lost. A copy that has
+    arrived waits in the server's queue, and begins as soon as the move ends.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -148,7 +161,7 @@ def _ends(world: World) -> Iterator[Step]:
 
 
 def _waits(world: World) -> Iterator[Step]:
-    """Yield steps without a command to the server: a requested stop, an ended wait, a poll."""
+    """Yield the steps without a command: a requested stop, an ended wait, an answered query."""
     server, driver = world.server, world.driver
     state = driver.state
     if state in (State.STARTING, State.DRIVING, State.REVERSING, State.TURNING, State.MOVING):
@@ -180,17 +193,17 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether the driver used the stop port before it ever knew the server's motion."""
+    """Return whether the driver had to use the stop port before it had ever stopped the server."""
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which the driver, after it used the stop port, asks the server what moves.
+    """Return the step in which the driver, after it has used the stop port, asks what still moves.
 
-    The server first returns its name, so earlier datagrams have arrived or are lost. Then the
-    driver asks whether a motion is in progress, and reads the encoder to see whether the robot
-    moves. If a reply is lost, nothing changes.
+    First the driver asks for the server's name. The answer shows that all earlier datagrams have
+    arrived or are lost. Then the driver asks whether a motion is in progress, and reads the encoder
+    to see whether the robot moves. If a reply is lost, nothing changes.
     """
     _, reply = execute(world.server, "CHECK")
     driver = Driver(State.STOPPING, Motion.UNKNOWN)
@@ -202,7 +215,7 @@ def _asked(world: World) -> Step:
 
 
 def _said(word: str, world: World) -> Iterator[Step]:
-    """Yield what may happen to a datagram that the driver sends."""
+    """Yield the steps that may follow when the driver sends this command."""
     driver = world.driver
     row = BY_TEXT[word]
     if row in STARTS:
@@ -234,7 +247,7 @@ def _said(word: str, world: World) -> Iterator[Step]:
 
 
 def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
-    """Yield what may happen to a reply: it is lost, late or received."""
+    """Yield the steps that may follow a reply: it is lost, late or received."""
     if reply is None:
         yield what, world
         return
@@ -245,9 +258,10 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 
 
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
-    """Yield what the driver concludes from a reply that it receives.
+    """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    Checks and controlled moves take so long that no late reply can be taken for theirs.
+    A check or a controlled move takes so long that a late reply to an earlier command cannot be
+    taken for its reply.
     """
     driver = world.driver
     state = driver.state

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The search of all reachable worlds of ``mart_model`` for a state that must not occur.
+"""A search through all reachable worlds of ``mart_model`` for one that must not occur.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3`` searches with up to 3
-copies on their way; docs/boards/mart.md has the figures.
+late copies at a time. The results are in docs/boards/mart.md.
 """
 
 import sys
@@ -18,9 +18,9 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 
 
 def trouble(world: World) -> str:
-    """Return what is wrong in this world and must never occur; the text is empty if nothing is.
+    """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    With a dead IMU, or a driver that has given up, only a crash of the server is wrong.
+    If the IMU is dead, or the driver has given up, only a crash of the server is wrong.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -41,7 +41,7 @@ def trouble(world: World) -> str:
 
 
 def _can_stop(world: World) -> bool:
-    """Return whether the robot stops if all stops that the driver would send arrive."""
+    """Return whether the robot would stop if all further stops of the driver arrived."""
     server, driver = world.server, world.driver
     if driver.state is State.STILL:
         motion = Motion.UNKNOWN
@@ -65,8 +65,12 @@ def _can_stop(world: World) -> bool:
 class Found(NamedTuple):
     """The result of a search.
 
-    ``worlds``: number of reachable worlds. ``steps``: number of steps between them. ``bad``: the
-    steps to the first world that must not occur, and the reason; empty if no such world was found.
+    ``worlds``: the number of reachable worlds.
+
+    ``steps``: the number of steps between these worlds.
+
+    ``bad``: the steps to the first world that must not occur, and then what is wrong in it. It is
+    empty if no such world was found.
     """
 
     worlds: int
@@ -83,7 +87,7 @@ FOUND_MOVING: Final = (
 
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Search all reachable worlds, breadth first, up to the first that must not occur."""
+    """Search all reachable worlds, breadth first; end at the first one that must not occur."""
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A small model of the MART server: the effect of each command in each state of motion.
+"""A small model of the MART server: the effect of each command in each state of the server.
 
-``test_mart_search`` compares each transition with the simulated firmware.
+``test_mart_search`` compares the model with the simulated firmware, command by command.
 """
 
 from typing import Final, NamedTuple
@@ -23,11 +23,13 @@ KIND: Final = {
 
 
 class Server(NamedTuple):
-    """The state of the server.
+    """The state of the modelled server.
 
-    ``port``: the command port is free, busy (with a controlled move), waiting (for a dead IMU) or
-    hung. ``released``: whether the stop port has stopped an uncontrolled motion that the server
-    still regards as in progress.
+    ``port``: the state of the command port: "free", "busy" with a controlled move, "waits" for a
+    dead IMU, or "hung".
+
+    ``released``: whether a command on the stop port has stopped the motors in a motion without
+    control. The server then still regards that motion as in progress.
     """
 
     motion: Motion = Motion.NONE
@@ -42,7 +44,7 @@ Reply = str | None
 
 
 def execute(server: Server, word: str) -> tuple[Server, Reply]:
-    """Execute one datagram; return the new state of the server and its reply."""
+    """Execute one datagram; return the new state of the server, and its reply or None."""
     if server.crashed:
         return server, None
     if word in ("SL", "SS"):
@@ -101,7 +103,7 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 
 
 def servers() -> dict[Server, tuple[str, ...]]:
-    """Return all reachable states of a server, each with the steps to it; no datagram is lost."""
+    """Return all states that the server can reach if no datagram is lost, each with its steps."""
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}
     while row:

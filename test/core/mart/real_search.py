@@ -2,14 +2,20 @@
 
 """A bounded search that runs the real driver against the simulated firmware.
 
-``mart_model`` searches without a bound, but its driver is a model. There are three sets of trials.
-``pairs``: every pair of wishes (what a user may want, such as "forward"). ``eights``: sequences of
-eight wishes, in which each wish follows every other wish. In both sets, one datagram of either
-direction is lost, late or duplicated, or the IMU is dead from that datagram on; there is a trial
-for each datagram. ``beginnings``: a driver starts while the robot may already be in a motion, and
-the network is away for various times.
+``mart_model`` searches without a bound, but its driver is a model. A *wish* is what a user may
+want, such as "forward". There are three sets of trials:
 
-``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all of them.
+``pairs``: every pair of wishes.
+
+``eights``: sequences of eight wishes. Over all sequences, each wish follows every other wish.
+
+``beginnings``: a driver starts while the robot may already be moving. The network is interrupted
+for various times.
+
+In each trial of ``pairs`` and ``eights``, one datagram is lost, late or doubled, or the IMU dies
+when it is sent. There is such a trial for each datagram, in both directions.
+
+``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets.
 """
 
 import copy
@@ -32,7 +38,7 @@ from omnibot_driver.core.packets import Packet
 Fate = Literal["lost", "late", "twice", "the IMU dies"]
 FATES: Final[tuple[Fate, ...]] = ("lost", "late", "twice", "the IMU dies")
 LATE_S: Final = 0.29
-"""Delay of a late datagram in s: the delay that the driver assumes, less a tick."""
+"""Delay of a late datagram, in s: one tick less than the longest delay that the driver assumes."""
 WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "forward": lambda bench: bench.command(0.3, 0.1, 0.7),
     "backward": lambda bench: bench.command(-0.2, 0.1, 0.8),
@@ -43,30 +49,47 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""At most this many datagrams per wish have a fate, in each direction; polls are not counted.
+"""The number of datagrams per wish, in each direction, that are disturbed one after the other.
 
-Later datagrams are only the repeated stops of an e-stop.
+The driver's regular queries are not counted. Datagrams beyond this number are only the repeated
+stops of an e-stop.
 """
 PROOF_S: Final = 0.25
-"""Time in s after the death of the IMU; a motion that begins later was not proved."""
+"""Time in s after the death of the IMU. A motion that begins later was started without a check."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
-"""Commands that the server may be obeying when a driver starts."""
+"""Commands that the server may be executing when a driver starts."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times in s, from the start of the driver, after which the network comes back."""
+"""Times in s after the start of the driver. The network works from then on."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s, from the return of the network, after which it is away again for 1 s."""
+"""Times in s for which the network then works, before it is interrupted again for 1 s."""
 ENDS_S, SETTLED_S = 16.0, 1.5
 
 
 class Trial(NamedTuple):
-    """One run of the search: either wishes with one disturbed datagram, or a driver that starts.
+    """One run of the search: wishes with one disturbed datagram, or a driver that starts.
 
-    ``wishes``: what the user wants, in order. ``number``: number of the datagram (from 0, without
-    polls) that has the ``fate``, in direction ``way`` (0: to the server, 1: from it). ``met``: the
-    command that the server obeys when the driver starts. The network is away until ``away_s``, and
-    again for 1 s after a further ``back_s``, in the directions ``ways``.
+    For wishes:
+
+    ``wishes``: what the user wants, in order.
+
+    ``way``: the direction of the disturbed datagram: 0 to the server, 1 from the server.
+
+    ``number``: the number of the disturbed datagram in that direction, from 0, without regular
+    queries.
+
+    ``fate``: what happens to it.
+
+    For a driver that starts:
+
+    ``met``: the command that the server is executing at that time; empty if none.
+
+    ``away_s``: the time in s for which the network is interrupted at first.
+
+    ``back_s``: the time in s for which the network then works, before it is interrupted for 1 s.
+
+    ``ways``: the directions that are interrupted.
     """
 
     wishes: tuple[str, ...] = ()
@@ -80,7 +103,7 @@ class Trial(NamedTuple):
 
 
 class Carrier:
-    """A network in place of the robot's own, which treats each datagram as the trial prescribes."""
+    """A network that treats each datagram as the trial prescribes."""
 
     def __init__(self, bench: MartBench, trial: Trial) -> None:
         self.bench, self.robot, self.trial = bench, bench.robot, trial
@@ -148,20 +171,20 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield the trials of every pair of wishes: one trial for each fate of each datagram."""
+    """Yield the trials of all pairs of wishes: one trial for each fate of each datagram."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 
 
 def eights() -> Iterator[Trial]:
-    """Yield trials of eight wishes; over all trials, each wish follows every other wish."""
+    """Yield the trials of sequences of eight wishes: one trial for each fate of each datagram."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield a trial for each fate of each datagram in a run of these wishes."""
+    """Yield a trial for each fate of each datagram that is sent in a run of these wishes."""
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
         for n, fate in product(range(most), FATES):
@@ -169,7 +192,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
 
 
 def beginnings() -> Iterator[Trial]:
-    """Yield a trial for each motion that a starting driver meets, and each network outage."""
+    """Yield the trials of a driver that starts, one for each motion and network interruption."""
     for met, away_s, back_s in product(MET, AWAY_S, BACK_S):
         for ways in ((0, 1), (0,), (1,)):
             yield Trial(met=met, away_s=away_s, back_s=back_s, ways=ways)
@@ -181,7 +204,7 @@ def _ready() -> MartBench:
 
 
 def ran(trial: Trial) -> Carrier:
-    """Run the trial to its end."""
+    """Run the trial to its end; return its network, from which the end state can be read."""
     # The driver compares its words by identity, so the copy has the same words.
     same = {id(word): word for word in vars(words).values() if isinstance(word, words.Word)}
     bench = copy.deepcopy(_ready(), same) if trial.wishes else MartBench("firmware", seed=3)
@@ -211,7 +234,7 @@ def ran(trial: Trial) -> Carrier:
 
 
 def trouble(trial: Trial) -> str:
-    """Return what went wrong in the trial; empty if nothing did."""
+    """Run the trial; return what went wrong in it, or an empty text."""
     carrier = ran(trial)
     bench, server = carrier.bench, carrier.bench.server
     lost = bench.board._pilot.lost > 0

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of replies, and of the request to which each reply is attributed.
+"""Tests that the driver reads replies, and attributes each reply to the correct request.
 
-The reply texts are those of a running server.
+The texts of the replies are those of a running server.
 """
 
 import math
@@ -40,18 +40,18 @@ GOLDEN = {
 
 @pytest.mark.parametrize("data", GOLDEN)
 def test_a_reply_is_read(data: bytes) -> None:
-    """Each text of a reply is parsed to a message of its form."""
+    """The decoder turns each text of a reply into a message of the correct form."""
     assert parse(data) == GOLDEN[data]
 
 
 @given(st.binary(max_size=600))
 def test_no_datagram_raises(data: bytes) -> None:
-    """Any bytes give one message, and an empty datagram gives none."""
+    """The decoder makes one message of any bytes, and none of an empty datagram."""
     assert len(MartDecoder().feed(data, 0.0)) == bool(data)
 
 
 def test_a_request_fits_the_servers_buffer() -> None:
-    """A request has 1 to 49 bytes of ASCII; an empty datagram would shut the server down."""
+    """A request has 1 to 49 ASCII bytes. An empty datagram would shut the server down."""
     assert words.RMCS.request(5, -5).data == b"RMCS 5 -5"
     assert words.CHECK.request(0).data == b"MCR SLOW 0"
     assert words.TF.request("SLOW", 24).data == b"TF SLOW 24"
@@ -64,7 +64,7 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """An answer has the command of the pending request, and the time from request to reply."""
+    """An answer has the command of the pending request, and the time that the reply took."""
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -87,7 +87,11 @@ def test_a_reply_answers_the_pending_request() -> None:
     ],
 )
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
-    """A late reply has the wrong form, or a failure that the pending command never returns."""
+    """A late reply to an earlier request arrives while another request is pending.
+
+    It has a form, or a reason of failure, that the pending command never returns. So it is
+    discarded.
+    """
     talk = conversation()
     talk.ask(word.request(), 1.0)
     assert talk.hear(parse(late), 1.4) is None
@@ -96,7 +100,10 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """A check takes at least 0.32 s, and a reply to an earlier command is at most 0.3 s late."""
+    """An ok that comes 0.3 s after a check of the IMU belongs to an earlier command.
+
+    A check takes at least 0.32 s, and a reply to an earlier command is at most 0.3 s late.
+    """
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
     assert talk.hear(parse(b"ok"), 1.3) is None
@@ -105,10 +112,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The reply to RST IMU comes so soon that its time does not distinguish it from a late ``ok``.
+    """The server answers RST IMU very soon, so a late ok cannot be distinguished from the reply.
 
-    So the driver sends RST IMU only when no late copy of the last ``ok``, and no reply that it no
-    longer awaits, can still come.
+    So the driver sends RST IMU only when two kinds of ok can no longer arrive: a late copy of the
+    last one, and the reply to a request that the driver has given up.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -123,9 +130,10 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """After a lost reply, ENC, which driving needs, is sent at once; its answer is then doubtful.
+    """The reply to a sonar query is lost, and the driver gives it up.
 
-    Other queries whose replies have the same form wait until the lost reply can no longer come.
+    Another sonar query waits until the lost reply can no longer arrive. ENC, which driving needs,
+    is sent at once, and its answer is marked as doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -144,7 +152,10 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 
 
 def test_every_motion_is_stopped_by_its_own_word() -> None:
-    """Each motion is stopped by its own command only; the stop port is for controlled moves."""
+    """Each motion is stopped only by its own command.
+
+    The stop port is only for controlled moves.
+    """
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
         Motion.NONE: [],
@@ -165,7 +176,10 @@ def stopping(motion: Motion, *, started_s: float = 0.0, owed: int = 0) -> Stoppi
 
 
 def test_a_stop_is_repeated_until_it_is_answered() -> None:
-    """A repeated stop that fails with "no motion" proves the stop, just as an ok does."""
+    """The driver repeats a stop until the server answers.
+
+    "No motion" proves the stop just as ok does.
+    """
     stop = stopping(Motion.REFERENCE)
     assert stop.due(10.0) == (words.SRM,)
     assert stop.due(10.1) == ()
@@ -174,7 +188,7 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 
 
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
-    """The start is sent only 0.1 s before the stop, so it may arrive after the stop.
+    """The driver sends a stop only 0.1 s after a start, so the start may arrive after the stop.
 
     Only the reply to a later stop proves that the robot is stopped.
     """
@@ -186,9 +200,10 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """The replies to the start and to the first stop are both a bare ok, and may come twice.
+    """After a start and a stop, two replies arrive, both ok.
 
-    The reply to the second stop, "no motion", is unambiguous.
+    Both may be copies of the start's reply. They do not prove the stop. The reply to the second
+    stop, "no motion", is unambiguous.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -198,9 +213,10 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """Two equal replies may both be of the first stop, which may have arrived before the start.
+    """The driver sends two stops soon after a start, and gets two equal replies.
 
-    A copy comes at most 0.6 s after the first stop was sent.
+    Both may be replies to the first stop, which may have arrived before the start. A copy comes at
+    most 0.6 s after the first stop was sent, so only a later reply proves the stop.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -222,7 +238,10 @@ def test_the_stop_port_comes_last_and_ends_the_belief_in_replies() -> None:
 
 
 def test_a_count_below_zero_may_come_without_its_sign() -> None:
-    """A 64-bit server prints the 32 bits of a negative count as an unsigned number."""
+    """A 64-bit server prints a negative 32-bit count as an unsigned number.
+
+    The driver restores the sign.
+    """
     assert [signed(n) for n in (0, 5, -5, 4294967295, 4294966872)] == [0, 5, -5, -1, -424]
 
 
@@ -231,7 +250,10 @@ def at(at_s: float, spread_s: float = 0.01) -> Moment:
 
 
 def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
-    """An impossible encoder count is ignored; the distance continues from the count before it."""
+    """An encoder count that no wheel can reach is ignored.
+
+    Later counts are compared with the last good one.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 0.0)
     for count, at_s in ((0, 0.1), (50, 0.2), (4_000_000, 0.3), (100, 0.4), (150, 0.5)):
@@ -240,7 +262,10 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """A count from before the motion is a late reply, or the server has not received the start."""
+    """A second motion begins, and the first count that arrives is about that of the motion before.
+
+    It is a late reply, or the server has not received the start. So the pose does not change.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -257,7 +282,10 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 
 @pytest.mark.parametrize("stale", [300, 0, -1])
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
-    """The network may delay and duplicate replies, so a smaller count in a motion is an old one."""
+    """During a motion, a smaller encoder count arrives after a larger one.
+
+    The network has delayed or doubled it, so the pose does not move back.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -267,7 +295,10 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """The wheel shows that a reported turn of 3° was a late encoder count, not an angle."""
+    """After a turn, a late encoder count of 3 is read as a turn of 3°.
+
+    The wheel has turned much farther, so the odometry uses the wheel.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
@@ -279,7 +310,7 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """RM sets the heading to zero, so a heading that is still the old one is a late reply."""
+    """RM sets the heading to zero. A first heading that still has the old value is a late reply."""
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -292,7 +323,10 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """A check that fails because of a missing IMU or an unknown command is answered at once."""
+    """A check of the IMU usually takes a while, but the server may report a failure at once.
+
+    It does so if the IMU is missing or the command is unknown. The driver accepts this early reply.
+    """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)
     assert talk.hear(parse(f"fail {reason}".encode()), 1.001) is not None

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver against the simulated controller: motions, their starts, and odometry."""
+"""Tests of the driver with the simulated controller: motions, their starts, and odometry."""
 
 import math
 import re
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize(("left", "firmware"), [(True, "source"), (False, "firmware")])
 def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmware) -> None:
-    """The robot returns to within 5 % of the side, whether it turns to the left or to the right.
+    """The robot drives a square, to the left or right, and returns to within 10 cm of its start.
 
     The odometry is off by less than 6 cm after 8 m.
     """
@@ -34,10 +34,10 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
-    """A heading that does not change for a while is a sign of a dead IMU.
+    """The robot drives straight ahead, with a gyro without noise, so its heading hardly changes.
 
-    On a straight drive without gyro noise, the heading changes only because the driver steers a
-    little.
+    A constant heading is a sign of a dead IMU. The small corrections of the driver's steering are
+    enough to show that the IMU works.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -47,7 +47,10 @@ def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) ->
 
 
 def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
-    """Each motion has one IMU check, one start and one stop; a turn on the spot also needs SSP."""
+    """For each motion the driver sends one check of the IMU, one start and one stop.
+
+    For a turn on the spot it also sends SSP, which sets the speed.
+    """
     bench = MartBench().ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.17, 0.0), (0.0, 0.5), (0.3, 0.0)):
         bench.command(vx, yaw_rate, 2.0)
@@ -66,9 +69,9 @@ def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
 def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fifth_of_a_second() -> (
     None
 ):
-    """A proof of the IMU that is less than 0.2 s old precedes every start that the server receives.
+    """On a slow network with losses, the driver checks the IMU before each start.
 
-    The network is slow and loses datagrams.
+    It sends the start less than 0.2 s after the check has ended.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
@@ -88,9 +91,10 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """A lost RM does not set the relative heading to zero.
+    """After a curve, the next RM is lost, so the server does not set the relative heading to zero.
 
-    The heading that is still reported belongs to the motion before, and must not turn the odometry.
+    The driver sends RM again. The heading of the curve, which the server still reports, does not
+    turn the odometry.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -115,9 +119,9 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By chance, the first heading in RM may be equal to the last heading before it.
+    """By chance, the first heading in RM is equal to the last heading of the motion before.
 
-    RM then seems to be lost, until the encoder shows that the robot moves.
+    So RM seems to be lost, until the encoder shows that the robot moves. The drive is as commanded.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -132,7 +136,7 @@ def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
 
 
 def test_a_goal_and_a_job_show_how_far_they_are() -> None:
-    """The progress of goals and jobs is shown in /diagnostics, under "Goal" and "Job"."""
+    """The driver shows the progress of goals and jobs in /diagnostics, under "Goal" and "Job"."""
     bench = MartBench().ready()
     shown = set()
     bench.go_to(0.6, 0.4, 0.0)
@@ -154,7 +158,10 @@ def test_a_goal_and_a_job_show_how_far_they_are() -> None:
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
-    """A goal is reached within 10 cm and 6 degrees; a twist command then replaces the next goal."""
+    """The robot reaches two goals within 10 cm and 6 degrees.
+
+    A twist command replaces the third goal.
+    """
     bench = MartBench(firmware).ready()
     for x_m, y_m, yaw_rad in ((0.8, 0.4, 1.0), (0.0, 0.0, 0.0)):
         bench.go_to(x_m, y_m, yaw_rad)
@@ -170,7 +177,10 @@ def test_goals_are_turned_to_and_reached(firmware: Firmware) -> None:
 
 
 def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> None:
-    """During a controlled move the server does not answer, so the covariance must be large."""
+    """The server does not answer during a controlled move, so the covariance is large.
+
+    After the move the covariance is small again.
+    """
     bench = MartBench().ready()
     bench.go_to(1.5, 0.0, 0.0)
     bench.run_until(lambda: bench.server.chassis.x_m > 0.6, 15.0)
@@ -182,7 +192,10 @@ def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> Non
 
 
 def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() -> None:
-    """A sonar query takes 55 ms, so it is sent only at rest; infinity means nothing is near."""
+    """The driver publishes odometry 20 times a second, but asks the sonars only at rest.
+
+    A sonar query takes 55 ms. A distance of infinity means that nothing is near.
+    """
     bench = MartBench(front_m=3.0).ready()
     seen = len(bench.odometry)
     bench.run(2.0)
@@ -201,7 +214,10 @@ def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() ->
 
 
 def test_inverted_encoder_and_gyro_are_parameters() -> None:
-    """A negative ``metres_per_count`` is for an encoder that counts down in forward motion."""
+    """The encoder counts down in forward motion.
+
+    With a negative ``metres_per_count`` the pose is right.
+    """
     settings = MartSettings(metres_per_count=-0.0004)
     bench = MartBench("source", settings=settings, encoder_sign=-1).ready()
     bench.command(0.3, 0.2, 3.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of failures: a dead IMU, an obstacle, a stuck motor; the robot is stopped each time."""
+"""Tests of failures, such as a dead IMU, an obstacle or a stuck motor: the robot is stopped."""
 
 import pytest
 from honesty import nees
@@ -19,10 +19,10 @@ pytestmark = pytest.mark.slow
 def test_a_dead_imu_refuses_motion_until_it_is_back(
     firmware: Firmware, wish: tuple[float, float] | str
 ) -> None:
-    """With a dead IMU, commands that would start the motors are not sent, and the log says why.
+    """With a dead IMU, the driver does not send commands that would start the motors, and says why.
 
-    A server that has RST IMU is checked again without a command. On a server without it, motion
-    stays refused, as the check may move the robot.
+    On a server that has RST IMU, the driver repeats the check by itself, and allows motion when the
+    IMU is back. On a server without it, motion stays refused, as the check could move the robot.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -43,7 +43,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 
 
 def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
-    """If RST IMU fails, the driver repeats it; only a third failure shows that the IMU is dead."""
+    """RST IMU fails once, and the driver repeats it. Only a third failure would mean a dead IMU."""
     bench = MartBench("source").ready()
     bench.server.imu.alive = False
     bench.try_command(0.3, 0.0)
@@ -56,7 +56,10 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 
 
 def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
-    """If a stop takes 0.56 s to 0.6 s, the next RM fails at once; the driver sends RM again."""
+    """After a stop that took 0.56 s to 0.6 s, the server rejects the next RM.
+
+    The driver sends RM again.
+    """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
     bench.command(0.3, 0.0, 4.0)
@@ -68,7 +71,11 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """An RM that has failed has arrived at the server, so the stop before the next RM is short."""
+    """The server rejects an RM, so the driver knows that RM has arrived.
+
+    The stop before the next RM is therefore short. Two seconds after the command, the speed is
+    right.
+    """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 3.0)
     bench.command(0.0, 0.0, 1.0)
@@ -81,9 +88,10 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """An RM that succeeds after one that failed shows that the server has no defect.
+    """The server rejects one RM and obeys the next, so it has no defect.
 
-    So a robot that moves without a command within three seconds of the failure is only reported.
+    Within three seconds of the rejection, the robot moves without a command. The driver only
+    reports this, and does not refuse further motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -97,7 +105,7 @@ def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> 
 
 
 def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None:
-    """After a slow drive was blocked, the next slow drive is soon as fast as commanded."""
+    """A slow drive is blocked. The next slow drive is soon as fast as commanded, and not faster."""
     bench = MartBench("source").ready()
     bench.command(0.06, 0.0, 3.0)
     bench.server.chassis.change(stuck="both")
@@ -113,7 +121,10 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """RM fails with the reason of the last B, an obstacle, but the front sonar shows none."""
+    """The server rejects RM with the reason of the last B, an obstacle. The front sonar shows none.
+
+    So the driver sends RM again, and reports no obstacle.
+    """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -135,10 +146,11 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """A dead IMU is found by its constant heading within half a second, and the robot is stopped.
+    """The IMU dies while the robot moves, and the heading stays constant.
 
-    In the public source the heading changes only during RM, so a dead IMU is not found in this way
-    in other motions.
+    The driver stops the robot within 1.2 s, reports the server as lost, and refuses motion until
+    the server is restarted. With the public source the heading changes only during RM, so only RM
+    is tested there.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -158,7 +170,10 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 
 
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
-    """The controller stops at an obstacle without a report; the robot may still drive backward."""
+    """The controller stops at an obstacle without a report.
+
+    The driver names it and still allows reversing.
+    """
     bench = MartBench(front_m=1.4).ready()
     bench.command(0.3, 0.0, 6.0)
     assert bench.robot.stands
@@ -170,7 +185,10 @@ def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
 
 @pytest.mark.parametrize("bits", [4, 8, 16, 32])
 def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
-    """Motion is refused until the motor board no longer reports the fault."""
+    """The motor board reports a trip or a short circuit while the robot drives.
+
+    The driver stops the robot, names the fault, and refuses motion as long as the board reports it.
+    """
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.server.chassis.motor_status = bits
@@ -187,10 +205,11 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
-    """If a motor is stuck, both motors are switched off until a new command is given after a stop.
+    """One or both motors are stuck.
 
-    If the right wheel is stuck, the left one turns the robot until the start has failed. Nothing
-    measures this turn, but the covariance includes it.
+    The driver switches both off until a new command comes after a stop. If only the right wheel is
+    stuck, the left one turns the robot for a while. Nothing measures this turn, but the covariance
+    covers it.
     """
     bench = MartBench(firmware).ready()
     if driving:
@@ -210,7 +229,7 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """RM fails although the robot moves, and SRM finds no motion that it could stop.
+    """The server rejects RM although the robot moves, and SRM finds no motion to stop.
 
     So the driver begins a controlled turn, which takes over the motors and then ends.
     """
@@ -224,9 +243,10 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """A robot that moves although its RM failed begins to move at once, not seconds later.
+    """The server rejects an RM. Five seconds later the robot moves without a command.
 
-    So a later push of the robot is not regarded as a defect of the server.
+    If the rejected RM had started the robot, it would have moved at once. So the driver does not
+    suspect the server, and still allows motion.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -242,7 +262,10 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
-    """If another program has stopped the robot, RMCS fails, as the server knows of no motion."""
+    """Another program stops the robot, and the server rejects RMCS because it knows of no motion.
+
+    The driver reports the other program, and the robot drives on.
+    """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 2.0)
     bench.server.receive(b"SRM", 0, None, bench.robot.board.now_s)
@@ -258,7 +281,7 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
 ) -> None:
     """The server reports a failed move at once, while the wheels still roll out.
 
-    The roll-out is not a motion without a command.
+    The driver does not report the roll-out as a motion without a command.
     """
     bench = MartBench(firmware, motor_lag_s=0.12).ready()
     bench.go_to(1.5, 0.0, 0.0)
@@ -275,9 +298,10 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
 def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_failed(
     twist: tuple[float, float], dead_units: float, firmware: Firmware
 ) -> None:
-    """Before the motors are known, the first start is too weak; the next one is stronger.
+    """The driver does not know yet how many units the motors need, so the first start is too weak.
 
-    Neither a stuck motor nor the IMU is blamed.
+    The next start is stronger, and the robot moves. The driver blames neither a stuck motor nor the
+    IMU.
     """
     bench = MartBench(firmware, dead_zone_units=dead_units).ready()
     bench.command(*twist, 6.0)
@@ -297,9 +321,10 @@ def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_fa
 def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
     encoder_sign: int, settings: MartSettings, parameter: str
 ) -> None:
-    """A wrong sign or scale stops the robot, and a notice names its parameter.
+    """A parameter has a wrong sign or scale.
 
-    With an inverted heading the robot turns more and more before it is stopped.
+    The driver stops the robot, and a notice names the parameter. With an inverted heading, the
+    robot turns more and more before it is stopped.
     """
     bench = MartBench(settings=settings, encoder_sign=encoder_sign, motor_inequality=0.03).ready()
     bench.command(0.3, 0.0, 6.0)

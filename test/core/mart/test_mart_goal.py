@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Goals are reached although controlled moves of the server go beyond the requested distance."""
+"""Tests that goals are reached although the server's moves go farther than requested."""
 
 import math
 from random import Random
@@ -21,7 +21,10 @@ from omnibot_driver.simulator.mart import Firmware
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """If 1° is requested, the robot turns by 7°; it still reaches its goals in few moves."""
+    """The robot turns up to 9° farther than requested, and drives up to 30 % farther.
+
+    The driver learns this, and the robot reaches each goal before the moves run out.
+    """
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
         goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
@@ -54,7 +57,10 @@ def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, s
 def test_a_move_is_slow_if_the_normal_one_is_faster_than_the_limits(
     limits: dict[str, float], turn: bytes, way: bytes
 ) -> None:
-    """The server's speed NORMAL is 30 units: 0.26 m/s, and 1.3 rad/s on the spot."""
+    """The driver requests a SLOW move if a normal one would exceed the speed limits.
+
+    The server's normal speed is 30 units: 0.26 m/s, or 1.3 rad/s in a turn on the spot.
+    """
     settings, surplus = MartSettings(**limits), Surplus()
     to_the_left = next_move(Move(Pose(0.0, 1.0, 0.0)), Pose(), settings, surplus)
     ahead = next_move(Move(Pose(30 * INCH_M * STRETCH, 0.0, 0.0)), Pose(), settings, surplus)
@@ -64,7 +70,6 @@ def test_a_move_is_slow_if_the_normal_one_is_faster_than_the_limits(
 
 
 def end(bench: MartBench) -> None:
-    """Wait until the robot has been at rest for 3 s."""
     bench.run(1.0)
     for _ in range(20):
         bench.until_it_stands(60.0)
@@ -76,7 +81,11 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """Equal moves often end with equal encoder counts, and each of them is counted."""
+    """The driver repeats the same move ten times.
+
+    The encoder often ends at the same count each time. An equal count does not mean that the move
+    was lost, so the odometry adds every move.
+    """
     bench, goal = MartBench(firmware).ready(), Pose()
     for _ in range(10):
         goal = goal.moved(step)
@@ -89,7 +98,10 @@ def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) ->
 
 @pytest.mark.parametrize("every_s", [2.0, 1.0, 0.2])
 def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: float) -> None:
-    """A goal that ``ros2 topic pub`` repeats every second is not begun again each time."""
+    """A program such as ``ros2 topic pub`` repeats a goal every second.
+
+    The driver begins it only once.
+    """
     once, repeated = MartBench().ready(), MartBench().ready()
     for _ in range(round(30.0 / every_s)):
         repeated.go_to(1.0, 0.5, 0.0)
@@ -108,7 +120,11 @@ def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: flo
 def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
     firmware: Firmware,
 ) -> None:
-    """The reply to the first move shows that it ended; the driver must not assume a restart."""
+    """A new goal replaces the first one during a move.
+
+    The reply to that move shows that it has ended. The driver begins the next move at once, and
+    does not assume that the server was restarted.
+    """
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
     bench.go_to(2.0, 0.0, 0.0)
@@ -124,7 +140,10 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
-    """The command cancels the docking, so the driver stops the move to the dock at once."""
+    """During a docking, the user repeats the last goal. This cancels the docking.
+
+    The driver stops the move to the dock at once.
+    """
     bench = MartBench(firmware).ready()
     bench.go_to(0.0, 0.0, 0.0)
     bench.run(2.0)
@@ -136,7 +155,10 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 
 
 def lose_moves_and_copy_a_check(bench: MartBench) -> None:
-    """Lose all turns of goals; deliver a copy of the next RST IMU, and its reply, 0.29 s late."""
+    """Change the network: it loses all turns of goals, and doubles the next RST IMU.
+
+    The copy of RST IMU arrives 0.29 s late, and so does the reply to the copy.
+    """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
     replies: list[float] = []
@@ -171,7 +193,11 @@ def lose_moves_and_copy_a_check(bench: MartBench) -> None:
 def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     firmware: Firmware, before: tuple[float, float], stops_s: float | None
 ) -> None:
-    """The encoder still has the count of the motion before, which must not be counted again."""
+    """The turn of a goal is lost, and a late ok of the IMU check seems to confirm it.
+
+    The encoder still has the count of the motion before. The odometry does not add that count
+    again.
+    """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
     bench.command(0.0, 0.0, 1.5)
@@ -186,7 +212,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
-    """Command a goal straight ahead or behind; return the number of inches first requested."""
+    """Command a goal ahead or behind; return the first requested distance, in inches."""
     since = len(bench.written)
     bench.go_to(x_m, 0.0, 0.0)
 
@@ -198,7 +224,10 @@ def first_distance(bench: MartBench, x_m: float) -> int:
 
 
 def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> None:
-    """A move that an obstacle cuts short does not show how far the robot drives per inch."""
+    """An obstacle ends a move early.
+
+    The driver does not conclude that the robot drives less per inch.
+    """
     bench = MartBench(front_m=0.7).ready()
     first_distance(bench, 2.0)
     bench.run_until(lambda: any("clearance" in notice for notice in bench.notices), 10.0)
@@ -209,7 +238,10 @@ def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> Non
 
 
 def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
-    """A move that the dock ends teaches nothing: the next goal, behind, has the usual distance."""
+    """The dock ends a move early.
+
+    For the next goal, behind, the driver requests the usual distance.
+    """
     bench = MartBench(dock_m=0.2).ready()
     assert bench.job(Job.DOCK, "DOCK", 40).success
     bench.run(2.0)
@@ -217,7 +249,11 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_ends_the_goal() -> None:
-    """The encoder count covers only the duplicate move, so the robot's position is not known."""
+    """A copy of a move arrives at the server, which executes it after the move itself.
+
+    The encoder count covers only the copy, so the driver discards the goal and learns nothing from
+    it.
+    """
     bench = MartBench().ready()
     first_distance(bench, 2.0)
     (move,) = [data for data in bench.said() if data.startswith(b"TF")]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The covariance of odometry is large enough for its error, even on the worst network."""
+"""Test that the covariance of the odometry covers its error, even on the worst network."""
 
 from statistics import mean
 
@@ -12,7 +12,10 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("network", NETWORKS)
 def test_odometry_is_no_farther_off_than_its_covariance_says(network: str) -> None:
-    """The drives are forward, backward, curved and on the spot; the motors differ by up to 4 %."""
+    """The robot makes drives of all kinds, with motors that differ by up to 4 %.
+
+    The error of the odometry fits its covariance.
+    """
     drives = [list(drive(NETWORKS[network], seed)) for seed in range(5)]
     every = [value for each in drives for value in each]
     assert mean(each[-1] for each in drives) < 3.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests to the controller besides motion: gyro bias, dock, log, files, clock."""
+"""Tests of requests other than motion: gyro bias, docking, log, files and clock."""
 
 import calendar
 import math
@@ -20,7 +20,7 @@ from omnibot_driver.simulator.mart import Firmware
 
 
 def test_the_gyro_is_calibrated_at_rest() -> None:
-    """The calibration sends SB, and succeeds with the reply to SB."""
+    """The driver sends SB to calibrate the gyro. The job succeeds when the server replies."""
     done = MartBench().ready().job(Job.BIAS)
     assert (done.token, done.success) == ("token", True)
 
@@ -38,7 +38,10 @@ def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
 
 
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
-    """The docking job sends TF DOCK; an e-stop cancels the job."""
+    """The docking job sends TF DOCK and succeeds at the dock.
+
+    An e-stop cancels a second docking job.
+    """
     bench = MartBench(dock_m=0.3).ready()
     assert bench.job(Job.DOCK, "DOCK", 20).success
     bench.run(2.0)
@@ -57,9 +60,10 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
 
 @pytest.mark.parametrize("longest_m", [0.2, 0.5, 1.0, 3.0])
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
-    """The server drives beyond the requested distance, so the driver requests less.
+    """Without a dock, the robot drives at most the permitted distance.
 
-    No obstacle would stop a docking move.
+    The server drives farther than requested, so the driver requests less. Obstacles do not stop a
+    docking move.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))
@@ -68,7 +72,10 @@ def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
 
 
 def test_a_robot_that_must_not_move_does_not_dock() -> None:
-    """If the motor board reports a trip, TF is not sent, and the answer names the trip."""
+    """The motor board reports a trip.
+
+    The driver does not send TF, and the job's result names the trip.
+    """
     bench = MartBench(motor_status=4).ready()
     done = bench.job(Job.DOCK, "DOCK", 20)
     assert not done.success
@@ -77,7 +84,10 @@ def test_a_robot_that_must_not_move_does_not_dock() -> None:
 
 
 def test_docking_ends_with_the_stop_of_its_move() -> None:
-    """If the reply to TF is lost, the driver stops the robot, and the next job is accepted."""
+    """The reply to the docking move is lost.
+
+    The driver stops the robot, and accepts the next job.
+    """
     bench = MartBench().ready()
     inner = bench.robot.advance
 
@@ -95,7 +105,10 @@ def test_docking_ends_with_the_stop_of_its_move() -> None:
 
 
 def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
-    """A download whose reply was lost is cancelled, and the next download succeeds."""
+    """The request of a download is lost, and a command cancels this download.
+
+    The next download succeeds.
+    """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 2.0)
     bench.run(3.0)
@@ -112,7 +125,7 @@ def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
 
 
 def test_the_last_move_and_turn_are_downloaded_whole() -> None:
-    """A file comes in pieces of 512 bytes, in Latin-1."""
+    """The driver downloads the files of the last move and turn, in pieces of 512 bytes."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.command(0.0, 0.5, 2.0)
@@ -124,7 +137,7 @@ def test_the_last_move_and_turn_are_downloaded_whole() -> None:
 
 
 def test_nothing_to_download_is_told() -> None:
-    """If there is nothing to download, the job fails with the reason of the controller."""
+    """The controller has no file to download. The job fails with the controller's reason."""
     done = MartBench().ready().job(Job.LAST_MOVE)
     assert not done.success
     assert "no file available" in done.message
@@ -132,7 +145,7 @@ def test_nothing_to_download_is_told() -> None:
 
 @pytest.mark.parametrize("spoil", ["lose", "double"])
 def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None:
-    """A download with a lost or doubled piece is a failure, and no file is returned."""
+    """A piece of a file is lost or comes twice. The download fails, and names the cause."""
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -154,7 +167,10 @@ def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None
 
 
 def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
-    """The last piece of a file is shorter than the others, so it alone shows a wrong order."""
+    """Only the last piece of a file is shorter than the others.
+
+    If a shorter piece comes earlier, the pieces are in the wrong order, and the download fails.
+    """
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -171,7 +187,7 @@ def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
 
 @pytest.mark.parametrize("job", [Job.BIAS, Job.LAST_MOVE])
 def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
-    """The caller of a job gets an answer, even if the port does not come back."""
+    """The port is lost during a job. The job fails at once, even if the port never comes back."""
     bench = MartBench().ready()
     bench.board.ask(job, "token", bench.now)
     bench.run(0.02)
@@ -182,9 +198,10 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """EXIT has ended the server, so a second call would not get the file.
+    """A stop interrupts the download of the log, after EXIT has already ended the server.
 
-    The controller must be started again.
+    A second download is not possible, so the result tells the user to copy the file from the
+    controller.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -199,7 +216,10 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
-    """After a straight drive the heading is often exactly zero, as it is after a restart."""
+    """After a straight drive, the heading is often exactly zero, as it is after a restart.
+
+    The driver must not conclude that the server was restarted and its log is lost.
+    """
     for seed in range(6):
         bench = MartBench(firmware, seed=seed).ready()
         assert bench.job(Job.LOG).success
@@ -209,9 +229,10 @@ def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
 
 
 def test_only_a_log_that_was_started_ends_the_server() -> None:
-    """Only the download of a log sends EXIT, which ends the server.
+    """The log can be downloaded only after it was started.
 
-    The result says that the controller must be started again.
+    The download sends EXIT, which ends the server. The result says that the controller must be
+    started again.
     """
     bench = MartBench().ready()
     with pytest.raises(RequestRefused, match="start_log"):
@@ -227,7 +248,10 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
-    """A restarted server has no log, so EXIT would end it without an answer."""
+    """A server is restarted after its log was started, so it no longer has a log.
+
+    The driver refuses the download, because EXIT would end the server and bring no file.
+    """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
     bench.server.restart(1.0)
@@ -240,8 +264,8 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
 
-    The heading shows that the server was not restarted. Otherwise the driver would ask the user for
-    another ``~/start_log``, which deletes the file.
+    The heading shows that the server was not restarted, so the log can still be downloaded.
+    Otherwise the user would have to call ``~/start_log`` again, which deletes the file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -261,7 +285,10 @@ def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
 
 
 def test_the_setting_of_the_clock_gives_way_to_the_users_first_job() -> None:
-    """A server that has just appeared gets its clock set later; a user's job does not wait."""
+    """A server has just appeared, and the driver wants to set its clock.
+
+    A user's job comes first.
+    """
     bench = MartBench()
     bench.open()
     bench.run_until(lambda: bench.board.resting, 30.0)
@@ -270,7 +297,10 @@ def test_the_setting_of_the_clock_gives_way_to_the_users_first_job() -> None:
 
 
 def test_the_clock_is_set_while_the_robot_stands() -> None:
-    """TIME gets six numbers, in UTC; it is not sent while the robot is driven."""
+    """The driver sets the clock with TIME and six numbers, in UTC.
+
+    It does not do so during a drive.
+    """
     bench = MartBench().ready()
     assert bench.job(Job.TIME, 11, 22, 2026, 20, 15, 30).success
     assert b"TIME 11 22 2026 20 15 30" in bench.said()
@@ -283,9 +313,10 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 
 @given(st.floats(0.0, 4e9))
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
-    """After a drive, the clock is not set to a time before its own.
+    """After a drive, the driver never sets a correct clock to an earlier time.
 
-    The server ignores the seconds, and the datagram may take 1 s.
+    The server ignores the seconds, and the datagram may take 1 s. So the driver sets the clock only
+    at the end of a minute, to the next full minute.
     """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
@@ -296,12 +327,16 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 
 
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
-    """The fields are month, day, year, hour, minute and second, in UTC."""
+    """A clock that may be set back gets the present UTC: month, day, year and time."""
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """A clock that is set back makes the next RM's heading about 1e15 degrees; RM is sent again."""
+    """The clock is set back between two drives.
+
+    The next RM then reports a heading of about 1e15 degrees. The driver reports this once and sends
+    RM again. The drive and the odometry are then right.
+    """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh
     bench.command(0.3, 0.3, 2.0)
@@ -318,7 +353,10 @@ def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
 
 
 def test_another_server_is_refused_by_its_name() -> None:
-    """Another server answers HELLO with a different name, which a notice gives."""
+    """A different server answers HELLO with its own name.
+
+    The driver refuses it, and a notice has the name.
+    """
     bench = MartBench()
     bench.open()
     bench.run(0.5)

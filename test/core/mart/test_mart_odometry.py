@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry when replies are lost, late or duplicated, or belong to another query."""
+"""Tests of odometry when replies are lost, late or doubled, or belong to another query."""
 
 import math
 
@@ -33,9 +33,9 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     twist: tuple[float, float], quiet_s: float
 ) -> None:
-    """Two equal motions end with equal counts, and all replies to the second motion are lost.
+    """Two equal motions end with equal encoder counts. All replies to the second motion are lost.
 
-    The equal count must not be read as a sign that the second start was lost.
+    The driver must not conclude from the equal count that the second start was lost.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     for _ in range(2):
@@ -57,10 +57,10 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The ok of RST IMU comes twice; L, which begins a turn, and all queries after it are lost.
+    """The ok of RST IMU comes twice. L, which starts a turn, and all queries after it are lost.
 
-    The second ok seems to acknowledge L, but the encoder count is still that of the motion before:
-    the robot has not turned.
+    The second ok seems to be the reply to L. But the encoder count is still that of the motion
+    before, so the robot has not turned.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -89,9 +89,9 @@ def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
 
 
 def reversed_by_1000() -> MartOdometry:
-    """Return odometry of a robot that reversed by 1000 counts and then began a second motion.
+    """Return the odometry of a robot that reversed by 1000 counts, when its second motion begins.
 
-    The encoder count is still that of the first motion.
+    The encoder still has the count of the first motion.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -106,7 +106,10 @@ def reversed_by_1000() -> MartOdometry:
 
 
 def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
-    """The server answers the stop with "no motion", so the unchanged count adds no variance."""
+    """The server answers the stop of a second motion with "no motion", so it never got the start.
+
+    The encoder count is unchanged, and the covariance hardly grows.
+    """
     odometry = reversed_by_1000()
     before = odometry.doubt.total([]).xx
     odometry.wheel.refused()
@@ -118,9 +121,10 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """An unchanged count means that the start was lost, or that an equal motion has ended.
+    """After a second motion the encoder count is the same as before it.
 
-    The covariance covers an equal motion, even after a later count that is certain.
+    Either the start was lost, or an equal motion has ended. The covariance covers both, even after
+    a later count that is certain.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -132,7 +136,10 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 
 
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
-    """An ok seems to acknowledge the start, but the count stays: it was a copy of another ok."""
+    """An ok arrives after the start, but the encoder count does not change.
+
+    So the ok was a copy of an earlier one, and the robot did not start.
+    """
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
     for at_s in (5.2, 5.3, 5.4):
@@ -147,7 +154,7 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
     """Return whether the replies to two stops show that the motion had begun; None if unknown.
 
-    The start was sent at 8 s, the stops at 10 s and 10.3 s.
+    The driver sent the start at 8 s, and the stops at 10 s and 10.3 s.
     """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)
@@ -159,9 +166,10 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """A reply that may belong to the second stop does not tell whether the motion had begun.
+    """A reply to the first stop shows whether the motion had begun before it.
 
-    The first stop may have ended the motion, and its reply may have been lost.
+    "No motion" after the second stop does not show it. The first stop may have ended the motion,
+    and its reply may be lost.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
@@ -177,7 +185,7 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
 
 
 def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A copy of the encoder count is not taken for the range that a sonar query returns."""
+    """A copy of the encoder count arrives after a sonar query. It is not taken for a distance."""
     talk = Conversation(0.3)
     asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
     asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
@@ -189,7 +197,10 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 
 
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
-    """MCSTAT and ENC may both be answered by 0 each time: neither answer is a copy of the other."""
+    """The server answers both MCSTAT and ENC with 0, again and again.
+
+    No answer is taken for a copy.
+    """
     talk = Conversation(0.3)
     for n in range(3):
         asked(talk, words.MCSTAT, b"ok 0", 1.0 + 0.1 * n, 0.01)
@@ -197,7 +208,10 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """RMCS returns the angle that RMRA has just returned; the reply is not a copy."""
+    """RMCS returns the same angle that RMRA has just returned.
+
+    The reply is not taken for a copy.
+    """
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
     asked(talk, words.RMRA, b"ok 2.00", 1.0, 0.01)
@@ -205,7 +219,10 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """A copy of an old reply is not the missing one, so a query with that form of reply waits."""
+    """The driver waits for a missing reply, and a copy of an older reply arrives.
+
+    The copy is not the missing reply. So a query whose reply has the same form still waits.
+    """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
     talk.ask(words.SFC.request(), 1.1)
@@ -217,7 +234,11 @@ def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
 
 
 def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
-    """Both sonars report -1 if nothing is near, so equal values do not show a copy."""
+    """The driver leaves more than 0.35 s between two sonar queries.
+
+    Both sonars report -1 if nothing is near, so equal values do not show a copy. Only the time
+    does.
+    """
     polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
     for tick in range(1000):
         now = tick * 0.01
@@ -230,7 +251,10 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 
 
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
-    """A doubtful count may be the reply of a sonar; the third doubtful one in a row is accepted."""
+    """A doubtful encoder count may be the reply of a sonar. A single one does not change the pose.
+
+    The third doubtful count in a row is accepted.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
     assert odometry.counted(152, at(1.1, doubtful=True)) is None
@@ -242,7 +266,7 @@ def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
 
 
 def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
-    """During 1.2 s of a curve no reply comes; the covariance covers the unknown path."""
+    """During 1.2 s of a curve, no reply arrives. The covariance covers the unknown path."""
     settings = MartSettings()
     odometry = MartOdometry(settings)
     odometry.counted(0, at(0.9))
@@ -262,7 +286,10 @@ def test_a_curve_of_which_no_heading_came_leaves_the_place_uncertain() -> None:
 
 
 def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
-    """A speed change that arrives twice looks like unequal motors; at most 8 % is believed."""
+    """A speed change that arrives twice looks as if the motors were unequal.
+
+    So the driver assumes at most 8 % difference between the motors.
+    """
     loop = SpeedLoop(MartSettings())
     loop.begin(30, False, 0.0)
     for tick in range(100):
@@ -272,7 +299,11 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 
 
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
-    """The encoder count at the end of a move includes the part before the reset."""
+    """The odometry is reset during a controlled move.
+
+    The encoder count at its end covers the whole move. So the pose includes the part before the
+    reset. The covariance covers this error.
+    """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
     bench.run_until(lambda: bench.truth.x_m > 0.5, 10.0)
@@ -287,7 +318,10 @@ def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
 
 
 def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
-    """Before the first speed is measured, the covariance allows for the commanded speed."""
+    """A motion has just begun, and its speed is not measured yet.
+
+    The covariance covers a robot that already turns at the commanded rate.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
     odometry.begin(Motion.SPIN, 1.0)
@@ -301,9 +335,10 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """A speed change that arrives twice acts twice; only the heading can show that.
+    """A speed change that arrives twice acts twice. Only the heading can show that.
 
-    In B the heading may be unknown, so there a change is at most 5 units instead of 15.
+    In B the heading may be unknown, so a single change is at most 5 units there. In RM it is at
+    most 15.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

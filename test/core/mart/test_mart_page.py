@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""docs/boards/mart.md says for each command where the driver uses it, or why it does not."""
+"""Test that docs/boards/mart.md says of each command where the driver uses it, or why not."""
 
 import re
 from pathlib import Path
@@ -12,7 +12,10 @@ PAGE = Path(__file__).parents[3] / "docs/boards/mart.md"
 
 
 def test_every_command_has_its_row() -> None:
-    """Every command has a row, and of those that the driver sends, only TD is marked "never"."""
+    """The page has a row for every command.
+
+    Of the commands that the driver can send, only TD has "never".
+    """
     section = PAGE.read_text(encoding="utf-8").split("## Every command")[1].split("\n## ")[0]
     rows = re.findall(r"^\| ([A-Z][A-Z ,]*) \| (.+) \|$", section, re.MULTILINE)
     listed = {name: ("never" in used) for names, used in rows for name in names.split(", ")}

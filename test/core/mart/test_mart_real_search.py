@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A sample of the bounded search that runs the real pilot; ``real_search`` runs all of it."""
+"""A sample of the bounded search that runs the real driver; ``real_search`` runs all of it."""
 
 from collections.abc import Callable
 from random import Random
@@ -22,20 +22,30 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(12))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """The datagram that is lost, late or doubled may be any one of any pair of wishes."""
+    """The user has two wishes, one after the other. One datagram is lost, late or doubled.
+
+    The server does not hang, and the robot is at rest at the end. In other trials the IMU dies
+    instead: then no later motion begins, and the robot is at rest or a notice says why not.
+    """
     trial = Random(seed).choice(list(real_search.pairs()))
     assert trouble(trial) == ""
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> None:
-    """The robot may be in any motion at the start, and the network may come back at any time."""
+    """A driver starts while the robot may be moving, and the network is interrupted for some time.
+
+    The server does not hang, and the robot is at rest at the end.
+    """
     trial = Random(seed).choice(list(real_search.beginnings()))
     assert trouble(trial) == ""
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """SL on the stop port ends RM; a later SRM would hang the server, so SRM is not sent."""
+    """Only SL on the stop port arrives, and ends RM. A later SRM would hang the server.
+
+    So the driver does not send SRM.
+    """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
 
@@ -44,7 +54,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the pilot to send SRM and SM after a stop on the stop port, whatever moves."""
+    """Patch the driver to send SRM and SM after the stop port, without asking what still moves."""
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
 
@@ -59,7 +69,7 @@ def says_sl_before_sm(patch: Patch) -> None:
 
 
 def turns_within_rm(patch: Patch) -> None:
-    """Patch the pilot to send L during RM, without SRM in between."""
+    """Patch the driver to send L during RM, without SRM in between."""
     agrees, act = Pilot._agrees, Pilot._act
 
     def spins(pilot: Pilot, now: float) -> bool:
@@ -77,7 +87,6 @@ def turns_within_rm(patch: Patch) -> None:
 
 
 def starts_without_proof(patch: Patch) -> None:
-    """Patch the proof of the IMU to be always fresh."""
     patch(ImuProof, "fresh", lambda imu, now: True)
 
 
@@ -98,7 +107,7 @@ TRAPS = {
 def test_a_trap_that_is_planted_in_the_pilot_is_found(
     trap: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The search finds a planted defect in a trial that ends well without the defect."""
+    """A trial ends well. With a defect planted in the driver, the same trial ends badly."""
     plant, trial, found = TRAPS[trap]
     assert trouble(trial) == ""
     plant(monkeypatch.setattr)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a server that is restarted or lost: it gets no motion before it is ready."""
+"""Tests of a server that is restarted or lost: the driver starts no motion before it is ready."""
 
 import pytest
 from mart_bench import MartBench
@@ -19,10 +19,11 @@ pytestmark = pytest.mark.slow
 def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     motion: tuple[float, float], firmware: Firmware, boot_s: float
 ) -> None:
-    """When the IMU is back, the server ends the old motion, but its stop port stays hung.
+    """The IMU dies during a motion and comes back.
 
-    The next RM would never be answered, and nothing would stop it. Only a heading of zero, or a
-    long silence, shows that the server was restarted.
+    The server ends the motion, but its stop port stays hung. It would not answer the next RM, and
+    nothing could stop the robot. So the driver refuses motion until a heading of zero or a long
+    silence shows that the server was restarted.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -48,9 +49,10 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
     wanted: tuple[float, float], boot_s: float
 ) -> None:
-    """Voltage queries and motions would crash a server that starts up.
+    """The server is restarted during a motion, and the motors still run.
 
-    The robot, whose motors still run after the restart, is stopped.
+    The driver stops the robot. It sends neither voltage queries nor motions until the server is up,
+    as they would crash the server.
     """
     for offset_s in (0.0, 0.23, 0.46, 0.71):
         bench = MartBench().ready()
@@ -67,7 +69,11 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(seed: int) -> None:
-    """After missing replies the driver sends HELLO; the answer shows that the server is there."""
+    """The network loses replies.
+
+    The driver sends HELLO, and the answer shows that the server is there. So the driver does not
+    assume a restart again and again.
+    """
     bench = MartBench("source", NetworkFaults(lose=0.1), seed=seed).ready()
     appeared = set()
     for _ in range(300):
@@ -80,7 +86,10 @@ def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(se
 def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
     after_s: float,
 ) -> None:
-    """The server does not answer the check of the IMU, so the driver assumes a restart."""
+    """The server is restarted during the check of the IMU, and does not answer the check.
+
+    The driver assumes a restart, and sends no motion until the server is ready.
+    """
     bench = MartBench().ready()
     bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
     bench.run(after_s)
@@ -96,9 +105,10 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
 def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
     boot_s: float, x_m: float, y_m: float, firmware: Firmware
 ) -> None:
-    """After a restart the motors keep their last command, so the robot must be stopped soon.
+    """The server is restarted during a controlled move of 3 m. The motors keep their last command.
 
-    A driver that missed the restart would wait a minute for the end of a move of 3 m.
+    The driver notices the restart and stops the robot within 5 s. It does not wait for the end of
+    the move, which could take a minute.
     """
     bench = MartBench(firmware).ready()
     bench.go_to(x_m, y_m, 0.0)
@@ -121,7 +131,11 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
 ) -> None:
-    """A restart erases the speed that SSP has set, and without it L never starts."""
+    """A restart of the server erases the speed that SSP has set.
+
+    Without that speed, L does not turn the robot. So the driver sends SSP again before the next
+    turn.
+    """
     bench = MartBench(firmware).ready()
     for _ in range(3):
         bench.command(0.0, 0.5, 3.0)

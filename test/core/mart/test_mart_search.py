@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""No sequence of commands, losses, copies and delays hangs the server or keeps the robot moving."""
+"""Tests that no sequence of commands, losses, copies and delays makes a MART fail.
+
+A failure is a server that hangs, or a robot that cannot be stopped.
+"""
 
 from collections.abc import Callable
 from typing import Final
@@ -38,7 +41,10 @@ KINDS: Final = {
 
 
 def test_no_reachable_world_hangs_the_server_or_leaves_it_moving() -> None:
-    """Up to two copies and one reply may be late, and the IMU may die at any step."""
+    """Up to two copies and one reply are late, and the IMU may die at any step.
+
+    The search finds no failure.
+    """
     found = search()
     assert found.bad == ()
     assert found.worlds > 10_000
@@ -62,7 +68,10 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 
 @pytest.mark.parametrize("trap", TRAPS)
 def test_a_planted_trap_is_found(trap: str) -> None:
-    """If a table allows one command too many, the search finds a failure."""
+    """A table allows one command too many.
+
+    The search finds the failure that this command causes.
+    """
     more, trouble = TRAPS[trap]
     found = search(lambda *asked: model.table(*asked) or more(*asked))
     assert trouble in found.bad[-1]
@@ -72,7 +81,10 @@ def test_a_planted_trap_is_found(trap: str) -> None:
 def test_a_driver_that_does_not_wait_for_late_copies_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """If no command is in HARMFUL_LATE, the driver does not wait, and a late copy does harm."""
+    """With an empty HARMFUL_LATE, the driver does not wait for late copies.
+
+    The search finds the harm.
+    """
     monkeypatch.setattr(model, "HARMFUL_LATE", frozenset())
     assert search().bad
 
@@ -80,7 +92,10 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A driver that does not ask what moves would send SRM after SL, which hangs the server."""
+    """A driver does not ask what moves, and sends SRM after SL.
+
+    The search finds that the server hangs.
+    """
 
     def sweeps(world: World) -> model.Step:
         return "sweeps", world._replace(driver=model.Driver(State.STOPPING))
@@ -117,7 +132,7 @@ class Desk:
 
 
 def compared(server: Server) -> Server:
-    """Return the server's state without what a silent command port hides."""
+    """Return the server's state without the parts that cannot be seen while its port is silent."""
     if server.port in ("waits", "hung"):
         return server._replace(port="hung", motion=Motion.NONE, released=False)
     return server
@@ -125,9 +140,9 @@ def compared(server: Server) -> Server:
 
 @pytest.mark.parametrize("word", [*SAID, "the IMU dies"])
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
-    """Model and simulated firmware are compared in every state in which the server answers.
+    """The model and the simulated firmware are compared in every state in which the server answers.
 
-    A busy server queues commands, so there only the stop port is compared.
+    A busy server queues commands, so only its stop port is compared.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what the driver learns about motors without a speed regulator."""
+"""Tests of what the driver learns about motors that have no speed regulator."""
 
 from random import Random
 
@@ -17,13 +17,16 @@ STEP_S = 0.1
 
 
 def test_before_anything_is_measured_a_motor_is_taken_for_ideal() -> None:
-    """Before any measurement, the driver assumes an ideal motor with its nominal speed."""
+    """Before any measurement, the driver assumes that a motor turns at its nominal speed."""
     assert MotorLine().units(12.0) == 12.0
 
 
 @given(SLOPES, DEAD)
 def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
-    """Two measured speeds determine the line that gives the motor's units for any speed."""
+    """The driver measures two speeds.
+
+    The line through them gives the motor's units for a third speed.
+    """
     line = MotorLine()
     for units in (40.0, 40.0, 16.0, 40.0, 16.0):
         line.learn(units, slope * (units - dead))
@@ -34,7 +37,11 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
 def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     slope: float, dead: float, rate_radps: float
 ) -> None:
-    """The number of units for a turn is off by at most one, even if motors need some to begin."""
+    """The driver has measured a drive and a turn on the spot.
+
+    Then it chooses the units for another turn. The units are off by at most one, even if the motors
+    need several units to begin.
+    """
     settings = MartSettings()
     per_unit_mps = settings.speed_per_unit * slope
     loop, now = SpeedLoop(settings), 0.0
@@ -54,7 +61,10 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
 def test_whatever_is_measured_the_units_rise_with_the_speed(
     measured: list[tuple[float, float]],
 ) -> None:
-    """The units rise with the speed, and stay positive and below 200."""
+    """Whatever the driver measures, more speed needs more units.
+
+    The units stay between 0 and 200.
+    """
     line = MotorLine()
     for units, speed in measured:
         line.learn(units, speed)
@@ -65,7 +75,10 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """Noise at one speed, even for a long time, does not change the units for other speeds."""
+    """The robot drives for a long time at one speed, with noise.
+
+    The units for other speeds do not change.
+    """
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
         line.learn(units, slope * max(0.0, units - dead))
@@ -75,7 +88,10 @@ def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
 
 
 def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
-    """A wheel that does not turn at 6 units gets enough units within a second."""
+    """One wheel does not turn although the robot drives.
+
+    Within a second, the driver gives it more units.
+    """
     loop, now = SpeedLoop(MartSettings()), 0.0
     loop.begin(4, False, now)
     loop.changed(30, 2, now)
@@ -88,7 +104,10 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """A start that moves nothing triples the units of later starts, to at most 20 units."""
+    """A start does not move the robot.
+
+    The next starts use three times the units, but at most 20.
+    """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4
     for units, then in ((4, 12), (12, 20), (30, 20)):

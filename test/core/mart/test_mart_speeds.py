@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed and turn rate: the robot drives as fast as commanded, and what its motors teach."""
+"""Tests of speed and turn rate, and of what the driver learns about the motors."""
 
 import dataclasses
 from statistics import mean
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     volts: float, unequal: float, firmware: Firmware
 ) -> None:
-    """From two seconds after each new command on, the mean speeds are compared with the command."""
+    """From two seconds after each new command, the mean speeds are within 5 % of the command."""
     bench = MartBench(firmware, volts=volts, motor_inequality=unequal).ready()
     for vx, yaw_rate in STEPS:
         if firmware == "documented" and not vx:
@@ -45,9 +45,10 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
 
 @pytest.mark.parametrize("dead_units", [0.0, 2.0, 6.0])
 def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: float) -> None:
-    """The inner wheel turns at 0.01 m/s to 0.02 m/s, which is near the dead zone of the motors.
+    """In a curve the inner wheel is so slow, 0.01 m/s to 0.02 m/s, that its motor hardly turns.
 
-    The last curve leads backward, where the heading is unknown.
+    The curve is still as fast as commanded. The last curve leads backward, where the heading is
+    unknown.
     """
     bench = MartBench(
         "source", volts=22.0, motor_inequality=0.05, dead_zone_units=dead_units
@@ -70,10 +71,9 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
 def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
     dead_units: float, firmware: Firmware
 ) -> None:
-    """The motors are not known yet, so the first turn would be 25 % to 40 % too slow.
+    """The driver does not know the motors yet, so the first turn would be 25 % to 40 % too slow.
 
-    The turn is begun again, and is right two seconds after the command. It is not begun a third
-    time.
+    The driver begins the turn again, once. Two seconds after the command, the rate is right.
     """
     bench = MartBench(firmware, dead_zone_units=dead_units).ready()
     bench.command(0.0, 0.5, 2.0)
@@ -92,7 +92,10 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """A door sill, for example, slows a turn for a second; the next turn must not be too fast."""
+    """Something, such as a door sill, slows a turn for a second.
+
+    The next turn is not much too fast.
+    """
     bench = MartBench("source").ready()
     if learned:
         bench.command(0.0, 0.5, 4.0)
@@ -113,9 +116,9 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
-    """A turn on the spot shows only the mean speed of the motors, not their balance.
+    """A turn on the spot shows only the mean speed of the two motors, not their difference.
 
-    So a straight drive backward after such turns is as straight as before.
+    So a straight drive backward is as straight after such turns as before.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(
@@ -132,9 +135,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Rounding to whole units makes slow turns up to 17 % too fast.
+    """Slow turns are up to 17 % too fast, because units are whole numbers.
 
-    The measured motor balance must not change by this.
+    The motor balance that the driver has measured does not change by this.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
@@ -145,7 +148,10 @@ def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
 
 @pytest.mark.parametrize("noise_mps", [0.0, 0.02])
 def test_an_acceleration_limit_of_the_speed_delays_no_turn_on_the_spot(noise_mps: float) -> None:
-    """With a turn, a joystick also sends some linear speed; its limit must not delay the turn."""
+    """A joystick commands a turn, and with it a little linear speed.
+
+    The acceleration limit for the linear speed does not delay the turn.
+    """
     bench = MartBench().ready()
     ramp = SessionSettings(
         limits=SpeedLimits(linear_mps2=0.1), commands=CommandSettings(), odometry=OdometrySettings()
@@ -158,7 +164,10 @@ def test_an_acceleration_limit_of_the_speed_delays_no_turn_on_the_spot(noise_mps
 
 @pytest.mark.parametrize("dead_units", [0.0, 3.0])
 def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units: float) -> None:
-    """The server cannot change the rate of a turn, so the turn begins only at its final rate."""
+    """The driver ramps a turn up, but the server cannot change the rate of a turn.
+
+    So the turn begins only when the ramp has reached the final rate.
+    """
     bench = MartBench(dead_zone_units=dead_units).ready()
     ramp = SessionSettings(
         limits=SpeedLimits(angular_radps2=0.3),
@@ -172,7 +181,10 @@ def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units:
 
 
 def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
-    """At the first low rates the motors do not turn, which shows the units that they need."""
+    """The sender ramps a turn up. At the first, low rates the motors do not turn.
+
+    The driver learns from this how many units the motors need, and reports no fault.
+    """
     bench = MartBench(dead_zone_units=3.0).ready()
     for step in range(60):
         bench.command(0.0, min(0.5, 0.03 * step), 0.1)
@@ -181,7 +193,10 @@ def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
 
 
 def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
-    """A speed of 0 units would end RM, so a low speed is driven with one unit."""
+    """The commanded speed is less than one unit.
+
+    A speed of 0 units would end RM, so the driver sends 1.
+    """
     fast = 0.05
     bench = MartBench(
         settings=MartSettings(speed_per_unit=fast), speed_mps_per_unit=fast, volts=25.0
@@ -193,9 +208,10 @@ def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
-    """The server reports no heading in B, and no drive forward has shown the balance before.
+    """The first drive is a curve backward.
 
-    So the balance of the motors comes from the user's setting.
+    In B the server reports no heading, so nothing is measured. The driver takes the balance of the
+    motors from the user's setting, and the curve is right.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench("source", settings=settings, motor_inequality=unequal).ready()
@@ -206,7 +222,10 @@ def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: floa
 
 
 def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
-    """A drive forward shows the balance of the motors; the user can set `motor_balance` to it."""
+    """After a drive forward, /diagnostics shows the balance of the motors.
+
+    The user can set `motor_balance` to that value.
+    """
     bench = MartBench("source", motor_inequality=0.05).ready()
     bench.command(0.0, 0.5, 3.0)
     assert bench.board.figures.own["Motor balance"] == "unknown"
@@ -215,14 +234,20 @@ def test_the_balance_of_the_motors_is_shown_once_it_is_measured() -> None:
 
 
 def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> None:
-    """The measured balance is shown even beyond 8 %, the most that the driver itself assumes."""
+    """The motors differ by 18 %, and /diagnostics shows it.
+
+    The driver itself assumes at most 8 %.
+    """
     bench = MartBench("source", motor_inequality=0.18).ready()
     bench.command(0.3, 0.0, 6.0)
     assert float(bench.board.figures.own["Motor balance"]) == pytest.approx(1.198, abs=0.02)
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
-    """A turn is begun again only if its commanded rate stays the same for a while."""
+    """The commanded rate of a turn falls slowly. The driver does not begin the turn again.
+
+    It does so only if the commanded rate stays the same for a while.
+    """
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):
         bench.command(0.0, 0.5 - 0.008 * tick, 0.1)
@@ -236,7 +261,10 @@ def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_st
 def test_a_scale_that_is_changed_while_the_robot_is_at_rest_leaves_its_speed_as_it_was(
     change: dict[str, float],
 ) -> None:
-    """A change of a scale converts what was learned about the motors to the new units."""
+    """The user changes a scale at rest.
+
+    The driver converts what it has learned about the motors.
+    """
     bench = MartBench("source", dead_zone_units=3.0).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.1, 0.0), (0.0, 0.5)):
         bench.command(vx, yaw_rate, 3.0)

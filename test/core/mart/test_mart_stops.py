@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every motion of the simulated controller can be stopped, on any network."""
+"""Tests that every motion of the simulated controller can be stopped, on any network."""
 
 import math
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 def test_a_stop_leaves_the_robot_standing_within_half_a_second(
     firmware: Firmware, motion: tuple[float, float]
 ) -> None:
-    """The time from the e-stop to standstill is measured for each kind of motion."""
+    """An e-stop during any kind of motion brings the robot to rest within 0.5 s."""
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
     assert not bench.robot.stands
@@ -37,7 +37,10 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """The stop comes while the IMU is checked, RM is on its way, or the reply to RM is awaited."""
+    """An e-stop comes during a start: during the check of the IMU, or before RM is answered.
+
+    The robot is at rest afterwards, and stays at rest.
+    """
     bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
         bench.try_command(vx, yaw_rate)
@@ -66,7 +69,10 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
 def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
     faults: NetworkFaults, seed: int
 ) -> None:
-    """Motions of all kinds follow each other without a pause; then the driver shuts down."""
+    """On a bad network, motions of all kinds follow each other without a pause.
+
+    Then the driver shuts down. The robot is at rest within 3 s, and the server still answers.
+    """
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
         bench.command(vx, yaw_rate, 2.5)
@@ -84,7 +90,10 @@ def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
 
 
 def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
-    """The driver believes that the robot stands still; only its polls show the motion."""
+    """A late copy of a start makes the robot move while the driver believes that it is at rest.
+
+    The driver's regular queries show the motion, and the driver stops it within 1 s.
+    """
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
     bench.run(3.0)
@@ -97,7 +106,10 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """Only a command port that does not answer shows a late copy of a controlled move."""
+    """A late copy of a controlled move reaches the server, whose command port then does not answer.
+
+    This silence is the only sign of the move. After an e-stop the robot is at rest within 1 s.
+    """
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
     bench.run_until(lambda: b"TF" in bench.server.executed[-1].encode(), 10.0)
@@ -113,7 +125,10 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
 def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The server answers HELLO after the move, but the move's reply may come up to 0.3 s later."""
+    """After a move, the answer to HELLO arrives before the reply to the move, which is 0.25 s late.
+
+    The driver waits for the late reply, which ends the move as usual.
+    """
     bench = MartBench().ready()
     receive = bench.session.inbound.receive
     late: list[bytes] = []
@@ -139,7 +154,10 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A stop of a turn is answered with an angle, and a late encoder count looks like an angle."""
+    """The stop of a turn is lost. The server would have answered it with an angle.
+
+    A late encoder count looks like such an angle, but the driver does not accept it.
+    """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
     lost: list[bytes] = []
@@ -169,7 +187,11 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     start: bytes, twist: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The ok of the start is 0.4 s late and comes twice; the lost stop is sent in between."""
+    """The ok of a start is 0.4 s late and comes twice.
+
+    In between, the driver sends a stop, which is lost. The driver does not take the second ok for
+    the reply to the stop.
+    """
     bench = MartBench().ready()
     while not bench.said()[-1].startswith(start):
         bench.try_command(*twist)
@@ -192,9 +214,10 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
     firmware: Firmware,
 ) -> None:
-    """A reply soon after a count or an ``ok`` may be a copy of it, so the stop is repeated.
+    """One motion follows another, and the new one has its speed 1.5 s after the command.
 
-    The server then knows of no motion to stop, which must not be taken for a restart of the server.
+    A reply to the stop may look like a copy of an earlier reply, so the driver repeats the stop.
+    The server then answers "no motion". The driver does not take this for a restart of the server.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)
@@ -212,7 +235,7 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
-    """While the e-stop is latched, the stop is sent ten times a second.
+    """While the e-stop is latched, the driver sends the stop ten times a second.
 
     So a motion that another program starts is stopped soon.
     """
@@ -232,7 +255,10 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """A stop on the stop port directly after SM or SRM might hang a port, so the driver waits."""
+    """A command on the stop port directly after SM or SRM could hang a port.
+
+    So the driver waits for more than the network delay.
+    """
     bench = MartBench("firmware").ready()
     bench.command(*motion, 2.5)
     bench.server.imu.alive = False
@@ -245,7 +271,10 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 
 
 def test_a_restarted_driver_stops_what_it_meets() -> None:
-    """A driver that starts stops the robot, even in a controlled move, which is not answered."""
+    """A driver starts while the robot moves, and stops it.
+
+    In a controlled move the server does not answer.
+    """
     for begun in (b"RM 30", b"B SLOW", b"L SLOW", b"TF 200", b"MCR 300"):
         bench = MartBench()
         bench.server.receive(begun, 0, None, 0.0)
@@ -261,7 +290,10 @@ def test_a_restarted_driver_stops_what_it_meets() -> None:
 def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
     wish: str,
 ) -> None:
-    """If the driver is killed, the guard repeats the driver's last stops for a second."""
+    """The driver is killed at any moment of a motion.
+
+    The guard repeats the stops that the driver prepared, for a second, and the robot comes to rest.
+    """
     twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
     seen = set()
     for tenths in [*range(2, 16), 25, 40]:
@@ -286,7 +318,7 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
 
 
 def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
-    """A robot at rest has its motors off, so a push needs no commands other than stops."""
+    """Someone pushes the robot while the e-stop is latched. The driver sends only stops."""
     bench = MartBench().ready()
     bench.estop(True)
     bench.run(1.0)
@@ -299,7 +331,10 @@ def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
 
 @pytest.mark.parametrize("motion", ["twist", "goal"])
 def test_a_network_that_is_cut_while_a_command_waits_is_reported(motion: str) -> None:
-    """The check of the IMU before a start is repeated, but never answered."""
+    """A command waits for the check of the IMU, and the network is cut.
+
+    The driver repeats the check, gets no answer, and reports that no data comes from the board.
+    """
     bench = MartBench().ready()
     bench.robot.receive = lambda *_: None  # type: ignore[method-assign]
     if motion == "goal":
