@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""An IMU frame is returned with the packet that completes it, however the adapter splits the line.
+"""Tests that an IMU frame is returned with the packet that completes it, with any serial adapter.
 
-If the last byte of an IMU frame is like 0xFF, arrival times show that the byte does not begin the
-next frame, which is not due yet.
+The last byte of an IMU frame may look like the first byte of the next frame. The arrival times show
+that it is not, because the next frame is not due yet.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,18 +19,21 @@ from omnibot_driver.simulator.omnibot import BoardSettings, SimulatedBoard
 
 TICKS = 1200
 SETTLED = 300
-"""Number of readings after which the decoder has learned how the adapter sends."""
+"""Number of readings after which the decoder has learned in which pieces the adapter sends."""
 IMU_LENGTH = 14
 DRIFT = 1.0002
-"""Relative rate of the adapter's clock; so its packets end at all phases of a tick, in turn."""
+"""Rate of the adapter's clock, relative to the board's clock.
+
+So the adapter's packets end at all phases of a tick, in turn.
+"""
 
 Handed = Iterator[tuple[float, bytes]]
 
 
 def ticks() -> Iterator[tuple[float, bytes]]:
-    """Yield time in s and bytes of each tick of a robot at rest.
+    """Yield the time in s and the bytes of each tick of a robot at rest.
 
-    The robot's gyro reads -1 more often than any value but 0.
+    Its gyro reads -1, which has bytes like a header, more often than any value but 0.
     """
     board = SimulatedBoard(BoardSettings(seed=1, running=True))
     for tick in range(TICKS):
@@ -38,7 +41,7 @@ def ticks() -> Iterator[tuple[float, bytes]]:
 
 
 def pieces() -> Handed:
-    """Yield the bytes in pieces of 1 to 16, at the pace of the line."""
+    """Yield the bytes in pieces of 1 to 16 bytes, each when its last byte has arrived."""
     random = Random(1)
     for at, data in ticks():
         start = 0
@@ -49,7 +52,7 @@ def pieces() -> Handed:
 
 
 def behind_timer(timer_s: float) -> Handed:
-    """Yield all bytes that the adapter holds, each time its timer runs out."""
+    """Yield all bytes that the adapter holds, each time its latency timer runs out."""
     held, out = b"", 0.0
     for at, data in ticks():
         for number in range(len(data)):
@@ -69,7 +72,7 @@ def behind_timer(timer_s: float) -> Handed:
 def test_hardly_a_frame_waits_for_the_next_packet(
     adapter: Callable[[], Handed], waits: float
 ) -> None:
-    """A frame waits only if a delta may follow it or if the adapter splits it."""
+    """An IMU frame waits only if a delta may follow it, or if the adapter splits it."""
     board = OmniBot(OmniBotSettings())
     ends: list[int] = []
     sent = 0
@@ -89,7 +92,10 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """For ten seconds after a lost byte, the decoder does not treat the line as calm."""
+    """The line loses a byte.
+
+    For the next ten seconds, the decoder does not treat the line as calm.
+    """
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}
     for at, data in ticks():

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings of the OmniBot in SI units, letters sent to the board, and a new connection."""
+"""Tests of the OmniBot's readings in SI units, the letters sent to it, and new connections."""
 
 import math
 
@@ -48,7 +48,7 @@ def readings(board: OmniBot, *sent: Frame) -> list[Reading]:
 
 
 def in_mode(mode: Mode) -> OmniBot:
-    """Return a board whose received data puts it in ``mode``."""
+    """Return a board in ``mode``, after it has received data that shows this mode."""
     board = bot()
     if mode is Mode.PAUSED:
         board.receive(TEXT, 0.0)
@@ -76,7 +76,7 @@ def test_a_delta_is_in_tenths_of_millimetres_and_milliradians_over_40_ms() -> No
 
 
 def test_the_frame_of_the_deltas_is_the_settings() -> None:
-    """A setting gives the frame of the deltas, because the board does not report it."""
+    """The board does not say in which coordinate frame its deltas are, so a setting says it."""
     (reading,) = readings(bot(delta_frame="body"), moved(0))
     assert isinstance(reading, DisplacementReading)
     assert reading.frame == "body"
@@ -84,7 +84,7 @@ def test_the_frame_of_the_deltas_is_the_settings() -> None:
 
 @pytest.mark.parametrize("order", ["big", "little"])
 def test_a_pose_is_in_millimetres_and_milliradians(order: str) -> None:
-    """A value of 1000 is 1 m or 1 rad; a setting gives the byte order of poses."""
+    """A value of 1000 in a pose is 1 m or 1 rad. A setting gives the byte order of poses."""
     board = bot(pose_byte_order=order)
     board.receive(encode(REST) * 2, 0.0)
     found = board.receive(encode(PoseFrame(1500.0, -250.0, 3142.0, 0), order), 0.0)  # type: ignore[arg-type]
@@ -101,27 +101,36 @@ def test_imu_counts_are_scaled_by_the_ranges_of_the_settings() -> None:
 
 
 def test_a_text_says_that_the_board_is_paused() -> None:
-    """The number in a paused text is not part of its reading."""
+    """A paused text gives a reading, which does not contain the number in the text."""
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """Data between two paused texts shows that the board ran, and it may have restarted."""
+    """Consecutive paused texts show that the board stayed paused.
+
+    If data comes between them, the board ran, and may have restarted.
+    """
     texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
     assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
     assert readings(bot(), PausedFrame(0), data, PausedFrame(1))[-1] == PausedReading()
 
 
 def test_readings_come_in_the_order_of_the_line() -> None:
-    """Readings keep the order of the line, because a pose includes the delta before it."""
+    """Readings have the order of their frames.
+
+    It matters because a pose includes the delta before it.
+    """
     sent = [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0), PausedFrame(0)]
     kinds = [type(reading) for reading in readings(bot(), *sent)]
     assert kinds == [ImuReading, DisplacementReading, PoseReading, PausedReading]
 
 
 def test_readings_are_finite_but_for_poses() -> None:
-    """IMU and delta readings are scaled integers, so only a pose can contain infinity or NaN."""
+    """The largest IMU and delta values give finite readings, because they are scaled integers.
+
+    Only a pose can contain infinity or NaN.
+    """
     edge = (32767, -32768, -32768)
     found = readings(bot(), ImuFrame(edge, edge), DeltaFrame(*edge, 0))
     assert isinstance(found[0], ImuReading)
@@ -141,7 +150,10 @@ def lost(board: OmniBot, *sent: Frame) -> list[int]:
 
 @given(st.integers(0, 255), st.integers(0, 2000))
 def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, gap: int) -> None:
-    """SEQ is one byte; arrival times show how often it has wrapped."""
+    """Deltas are lost, and their counter SEQ, which is one byte, may wrap several times.
+
+    The arrival times show how often it has wrapped, so the lost deltas are counted correctly.
+    """
     board = bot()
     readings(board, moved(start))
     (reading,) = board.receive(encode(moved((start + 1 + gap) % 256)) + b"\xff", 0.04 * (gap + 1))
@@ -150,9 +162,10 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """SEQ wraps within each read, which holds seconds of data.
+    """Two reads bring seconds of data each, and SEQ wraps within a read.
 
-    Between the two reads three deltas are lost, and all other frames of that time.
+    Between the reads, three deltas and all other frames of that time are lost. Exactly three lost
+    deltas are counted, and no restart.
     """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
@@ -164,12 +177,15 @@ def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> N
 
 
 def test_a_regular_sequence_has_no_losses() -> None:
-    """In 600 regular deltas SEQ wraps twice, and no delta counts as lost."""
+    """During 600 regular deltas, SEQ wraps twice. No delta is counted as lost."""
     assert sum(lost(bot(), *[moved(n % 256) for n in range(600)])) == 0
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """The first delta of a connection or after a pause reports no losses."""
+    """The first delta of a connection, or after a pause, has any count.
+
+    No delta is counted as lost.
+    """
     board = bot()
     assert lost(board, moved(7)) == [0]
     assert lost(board, PausedFrame(0), moved(100)) == [0]
@@ -178,7 +194,7 @@ def test_the_first_delta_has_lost_nothing() -> None:
 
 
 def test_the_poses_have_a_counter_of_their_own() -> None:
-    """A pose with the count 99 between deltas 1 and 2 does not mean that deltas were lost."""
+    """A pose with the count 99 comes between deltas 1 and 2. No delta is counted as lost."""
     assert lost(bot(), moved(1), PoseFrame(0.0, 0.0, 0.0, 99), moved(2)) == [0, 0]
 
 
@@ -186,7 +202,7 @@ def test_the_poses_have_a_counter_of_their_own() -> None:
 
 
 def test_faults_are_counted_over_all_connections() -> None:
-    """A new connection has a new decoder, but the fault counters continue."""
+    """Each new connection has a new decoder. The fault counters nevertheless continue."""
     board = bot()
     board.receive(encode(REST) * 8, 0.0)
     assert (board.figures.faults, board.figures.discarded_bytes) == (0, 0)
@@ -199,19 +215,25 @@ def test_faults_are_counted_over_all_connections() -> None:
 
 
 def test_stop_and_emergency_stop_are_the_manuals() -> None:
-    """Stop and e-stop have the bytes of the manual's appendix."""
+    """Stop and the emergency stop have the bytes of the manual's appendix."""
     assert joined(bot().stop()) == STOP
     assert joined(bot().emergency_stop()) == ZEROS + bytes.fromhex("FF FE 10 00 00 00 00 00 00")
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
-    """The zeros before Stop complete any command that was cut, and are not letters."""
+    """To wake the board, the driver sends zeros and Stop.
+
+    The zeros complete a command that was cut, and have no meaning as letters.
+    """
     assert joined(bot().wake()) == STOP
 
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
-    """S is sent in every mode, because it is harmless; only received data changes the mode."""
+    """The driver may send S in every mode, because S is harmless.
+
+    S alone does not change the mode. Only received data does.
+    """
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"
     assert board.mode is mode
@@ -219,7 +241,10 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """P is a toggle, so it is refused unless the board runs; a refusal changes nothing."""
+    """To pause a running board, the driver sends Stop and P.
+
+    P is a toggle, so the driver refuses it if the board does not run. The mode stays as it was.
+    """
     board = in_mode(mode)
     if mode.running:
         assert joined(board.pause()) == STOP + ZEROS + b"\x50"
@@ -231,7 +256,7 @@ def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -
 
 @pytest.mark.parametrize("mode", Mode)
 def test_reset_is_stop_and_r(mode: Mode) -> None:
-    """After a reset, the mode is unknown."""
+    """To reset the board, the driver sends Stop and R. The mode is then unknown."""
     board = in_mode(mode)
     assert joined(board.reset()) == STOP + ZEROS + b"\x52"
     assert board.mode is Mode.UNKNOWN
@@ -239,7 +264,7 @@ def test_reset_is_stop_and_r(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
-    """The mode is known only from received data, so silence or a new line makes it unknown."""
+    """The board falls silent, or a new connection begins. The mode is then unknown."""
     board = in_mode(mode)
     board.silence()
     assert board.mode is Mode.UNKNOWN
@@ -249,7 +274,10 @@ def test_after_silence_or_on_a_new_line_the_mode_is_unknown(mode: Mode) -> None:
 
 
 def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
-    """Bytes on a new line do not complete a frame from the old line."""
+    """A connection ends within a frame.
+
+    The bytes of the next connection do not complete that frame.
+    """
     board = bot()
     board.receive(encode(REST) * 2 + encode(moved(0))[:5], 0.0)
     board.connect()
@@ -258,7 +286,10 @@ def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
 
 
 def test_a_frame_that_waited_comes_out_at_the_end() -> None:
-    """A frame that ends in FF is held until the next byte, or until the line is closed."""
+    """A frame that ends in FF is held until the next byte comes.
+
+    At the end of the connection it is returned.
+    """
     board = bot()
     board.receive(encode(REST) * 2, 0.0)
     assert board.receive(encode(moved(255)), 0.0) == []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands in SI units, encoded as the OmniBot's bytes."""
+"""Tests that commands in SI units are encoded as the OmniBot's bytes."""
 
 import math
 import re
@@ -42,12 +42,12 @@ def encoder(**settings: object) -> CommandEncoder:
 def test_a_velocity_is_70_lsb_for_a_metre_and_500_for_a_radian(
     twist: tuple[float, float, float], typed: str
 ) -> None:
-    """In mode 1, the vendor's scales are 70 LSB per m/s and 500 LSB per rad/s."""
+    """A velocity is encoded in mode 1, with 70 LSB per m/s and 500 LSB per rad/s."""
     assert bare(encoder().velocity(BodyTwist(*twist))) == bytes.fromhex(typed)
 
 
 def test_the_scales_are_those_of_the_settings() -> None:
-    """Commands use the scales of the settings: 100 LSB per m/s and 200 LSB per rad/s."""
+    """The settings have other scales, 100 LSB per m/s and 200 LSB per rad/s. Commands use them."""
     commands = encoder(linear_scale=100.0, angular_scale=200.0)
     typed = bytes.fromhex("FF FE 01 00 64 FF 38 00 C8")
     assert bare(commands.velocity(BodyTwist(1.0, -2.0, 1.0))) == typed
@@ -61,7 +61,7 @@ def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
 
 
 def test_commands_are_rounded_to_the_nearest() -> None:
-    """0.0493 m/s is 3.451 LSB and is sent as 3; 0.0508 m/s is 3.556 LSB and is sent as 4."""
+    """0.0493 m/s is 3.451 LSB, so 3 is sent. 0.0508 m/s is 3.556 LSB, so 4 is sent."""
     assert bare(encoder().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
         "00 03 FF FC"
     )
@@ -69,7 +69,10 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """Zeros in mode 1 are never sent: with the switch on position they are a goal, the origin."""
+    """A velocity that rounds to zero is sent as Stop, never as zeros in mode 1.
+
+    If the board's switch is at "position", zeros in mode 1 would send the robot to the origin.
+    """
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
@@ -81,7 +84,7 @@ def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -
 
 @pytest.mark.parametrize("tiny", [0.0, -0.0, 0.005, -0.007, 5e-324])
 def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
-    """Body velocities and wheel rates that are almost zero give the Stop frame."""
+    """Velocities and wheel rates that are almost zero are sent as Stop."""
     assert encoder().velocity(BodyTwist(tiny, -tiny, tiny / 10)) == STOP
     assert encoder().wheels((tiny, -tiny, tiny)) == STOP
 
@@ -90,7 +93,7 @@ def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
 def test_a_command_too_large_for_the_wire_keeps_its_direction(
     values: tuple[float, float, float],
 ) -> None:
-    """One factor scales all three words down, without an exception or an overflow."""
+    """A velocity is too large for 16 bits. All three words are scaled down by the same factor."""
     command = bare(encoder().velocity(BodyTwist(*values)))
     counts = (70 * values[0], 70 * values[1], 500 * values[2])
     largest = max(1.0, max(map(abs, counts)) / 32767)
@@ -103,7 +106,7 @@ def test_a_command_too_large_for_the_wire_keeps_its_direction(
 
 @given(words, words, words)
 def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int) -> None:
-    """A velocity of whole counts is sent as exactly these counts, unless a byte is harmful."""
+    """A velocity of whole counts is sent as these counts, unless one of their bytes is harmful."""
     x, y, omega = (max(-32767, word) for word in (x, y, omega))
     assume(not HARMFUL.search(struct.pack(">3h", x, y, omega)))
     command = bare(encoder().velocity(BodyTwist(x / 70, y / 70, omega / 500)))
@@ -123,7 +126,7 @@ def test_what_is_commanded_comes_back_as_it_was_meant(x: int, y: int, omega: int
 def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
     pose: tuple[float, float, float], typed: str
 ) -> None:
-    """Goals use mode 1, and the origin is a goal like any other."""
+    """A goal is encoded in mode 1, in mm and mrad. The origin is a goal like any other."""
     assert bare(encoder().drive_to(Pose(*pose))) == bytes.fromhex(typed)
 
 
@@ -132,7 +135,10 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A 16-bit word ends at 32.77 m or rad; a goal beyond it is refused rather than limited."""
+    """A goal is beyond 32.77 m or rad, where a 16-bit word ends. The driver refuses it.
+
+    A goal that is only limited would lead to another place.
+    """
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
@@ -140,7 +146,10 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
 
 
 def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
-    """A command that exceeds the range of the wire is counted; one exactly at the limit is not."""
+    """The driver counts the commands that were scaled down.
+
+    A command exactly at the limit is not counted.
+    """
     commands = encoder(linear_scale=10_000.0)
     commands.velocity(BodyTwist(3.2767, 0.0, 0.0))
     assert commands.saturated == 0
@@ -151,7 +160,7 @@ def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
 
 
 def test_settings_may_be_replaced_while_it_runs() -> None:
-    """New scales apply from the next command on."""
+    """The settings are replaced while the driver runs. The next command uses the new scales."""
     commands = encoder()
     commands.settings = OmniBotSettings(linear_scale=100.0)
     assert bare(commands.velocity(BodyTwist(1.0, 0.0, 0.0)))[3:5] == b"\x00\x64"
@@ -173,7 +182,10 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
 def test_a_frame_means_the_velocity_that_it_commands(
     typed: str, twist: tuple[float, float, float]
 ) -> None:
-    """The last frame in the bytes gives the velocity; the zeros before it have no meaning."""
+    """The driver reads the commanded velocity from bytes to the board. The last frame counts.
+
+    Zeros before a frame have no meaning.
+    """
     found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
 
@@ -182,7 +194,11 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """The velocity of a frame is off by 0.5 LSB, or up to 1.5 LSB to avoid a letter's byte."""
+    """A velocity is encoded, and then read from the bytes again.
+
+    The two differ by 0.5 LSB of rounding. To avoid a byte that is a letter, it may be up to 1.5
+    LSB.
+    """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)

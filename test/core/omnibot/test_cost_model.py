@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The cost of a frame, by which the decoder judges whether its content fits earlier frames."""
+"""Tests of the cost of a frame: how little the frame's content fits the frames before it."""
 
 import pytest
 
@@ -12,7 +12,10 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """Return the context after a pose at 100 mrad, and deltas with these turns (in 0.1 mrad)."""
+    """Return what is known after a pose with a heading of 100 mrad, and deltas with these turns.
+
+    ``turns`` are in 0.1 mrad, and ``seqs`` are the counts of the deltas.
+    """
     context = NOTHING_KNOWN
     for frame in (DeltaFrame(0, 0, 0, 9), PoseFrame(0.0, 0.0, 100.0, 1)):
         _, context = EXPECTATION.weigh(frame, context)
@@ -28,14 +31,17 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five turns of 1 mrad are 5 mrad; a rounding error of the pose is not a contradiction."""
+    """Five deltas turn by 5 mrad in all. The next pose may differ from that by a rounding error.
+
+    A larger difference is a contradiction, which has a cost.
+    """
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)
     assert (cost > 0.0) is contradicts
 
 
 def test_a_pose_after_a_lost_delta_contradicts_nothing() -> None:
-    """The turn of the lost delta is unknown, so the pose may have any heading."""
+    """A delta was lost before a pose, and its turn is unknown. So any heading of the pose fits."""
     context = after_a_cycle([10] * 5, [10, 11, 13, 14, 15])
     near, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 105.0, 2), context)
     far, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 180.0, 2), context)

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The decoder on undamaged streams, from the beginning or from any other byte.
+"""Tests of the decoder on undamaged streams, from their beginning or from any other byte.
 
-Streams come from the simulated board, or are typed from the manual's layouts. The expected frames
-come from decoding the parts of a stream one by one.
+The streams come from the simulated board, or are typed from the manual. The expected frames come
+from decoding the parts of a stream one by one.
 """
 
 from random import Random
@@ -42,7 +42,10 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: str) -> None:
-    """All frames of the simulated board come out in order, and no others."""
+    """The decoder returns all frames of the simulated board in order, and no others.
+
+    It makes no difference whether the bytes come all at once, tick by tick, or one by one.
+    """
     ticks = ticks_of(name)
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     assert decoded([b"".join(ticks)]) == sent
@@ -53,7 +56,10 @@ def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: st
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
-    """Each stream is cut in 24 ways, into chunks of 1.5 to 200 bytes on average."""
+    """Each stream is cut into random chunks, of 1.5 to 200 bytes on average.
+
+    All frames are returned.
+    """
     stream = b"".join(ticks_of(name))
     sent = [frame for _, frame in frames_of(stream)]
     random = Random(11)
@@ -67,7 +73,10 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
 def test_in_step_any_content_is_delivered_in_any_chunks(
     sent: list[Frame], data: st.DataObject
 ) -> None:
-    """A real shock, a stuck sensor and words that look like headers are decoded like the rest."""
+    """The decoder is in step with the stream. It returns all frames, whatever their content.
+
+    The content may be a real shock, a stuck sensor, or words that look like headers.
+    """
     stream = LEAD_IN + b"".join(map(encode, sent))
     chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # an empty one is a pause
     assert decoded(chunks, step_s=1e-3) == [REST, REST, *sent]
@@ -75,7 +84,10 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """Only a frame that jumps, or that ends in a header's byte, waits for the next bytes."""
+    """A frame is returned as soon as its last byte has come.
+
+    Only a frame whose values jump, or whose last byte may begin a header, waits for the next frame.
+    """
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
     for number, tick in enumerate(ticks_of(name)):
@@ -96,7 +108,10 @@ def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
 
 @given(believable_frames.filter(lambda frame: not isinstance(frame, PausedFrame)), st.data())
 def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataObject) -> None:
-    """Content that looks like damage is accepted when two good frames follow it."""
+    """The content of a frame looks like damage.
+
+    The frame is returned when two good frames follow it.
+    """
     made, content = FrameDecoder(), encode(odd) + LEAD_IN + encode(REST)[:2]
     assert made.feed(LEAD_IN, 0.0) == [REST, REST]
     found = [frame for chunk in data.draw(chunkings(content)) for frame in made.feed(chunk, 0.0)]
@@ -104,7 +119,7 @@ def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataO
 
 
 def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
-    """A frame with a jump is returned, although an adapter pauses within the frame."""
+    """During a shock, an adapter pauses within a frame. All frames of the shock are returned."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)  # shows how calm the sensor is
     shock = [
@@ -118,7 +133,7 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """A frame with a knock is returned, although a pause splits it and a silence follows."""
+    """A frame with a knock is split by a pause, and a silence follows it. The frame is returned."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
@@ -127,7 +142,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """A doubtful frame waits for one byte, not for a whole frame."""
+    """A doubtful frame is returned with the first byte of the next frame, not with its last one."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -136,7 +151,11 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """An IMU frame that ends in FB or FC waits only in a tick in which a delta is due."""
+    """The last byte of an IMU frame may belong to a header.
+
+    The frame waits if a delta is due in this tick. In other ticks, the pause after the byte shows
+    that no header begins, so the frame does not wait.
+    """
     made, waited = FrameDecoder(), []
     for tick in range(60):
         imu = encode(ImuFrame((120, -80, -16384), (1, 2, -4 - tick % 2)))
@@ -157,7 +176,7 @@ def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
 def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
     name: str, by: str
 ) -> None:
-    """Decoding starts at various positions in the first 345 bytes, about a fifth of a second."""
+    """Decoding starts at any of the first 345 bytes. All frames but at most two are returned."""
     ticks = ticks_of(name)[:60]
     stream = b"".join(ticks)
     sent = frames_of(stream)
@@ -181,7 +200,10 @@ def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
 def test_a_robot_on_a_slope_is_not_misread_for_ever(
     gyro: tuple[int, int, int], imu_only: bool
 ) -> None:
-    """At five degrees of tilt, -6 on a gyro axis makes a false header in every frame."""
+    """A robot stands on a slope, and -6 on a gyro axis looks like a header in every frame.
+
+    From any starting byte, all frames but at most two are returned, and no false ones.
+    """
     random, ticks = Random(3), []
     for tick in range(60):
         accel = tuple(round(random.gauss(mean, 46)) for mean in (1428, 0, -16322))
@@ -199,19 +221,22 @@ def test_a_robot_on_a_slope_is_not_misread_for_ever(
 
 
 def test_one_whole_text_is_enough_to_believe() -> None:
-    """Texts come once a second, so the decoder accepts the first complete text."""
+    """Paused texts come only once a second, so the decoder accepts the first complete one."""
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 
 
 def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
-    """Two frames at the beginning are rejected if a wrong byte follows instead of a frame."""
+    """At the beginning of a stream, a wrong byte follows two frames.
+
+    The decoder rejects both frames.
+    """
     look_alike = encode(DeltaFrame(1, 2, 3, 4)) + encode(DeltaFrame(5, 6, 7, 8))
     assert decoded([look_alike + b"\x00" + LEAD_IN * 2]) == [REST] * 4
 
 
 @pytest.mark.parametrize("start", range(12))
 def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> None:
-    """The stream may start anywhere within a text."""
+    """Decoding starts anywhere within a paused text. All complete texts are returned."""
     texts = [b"Paused: 7 \n", b"Paused: 8 \n", b"Paused: 9 \n"]
     found = decoded([texts[0][start:], *texts[1:]], step_s=1.0)
     assert found == [PausedFrame(n) for n in (7, 8, 9)][start > 0 :]
@@ -222,7 +247,7 @@ def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> N
 
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_has_no_faults(name: str) -> None:
-    """Every byte of an undamaged stream belongs to a frame."""
+    """In an undamaged stream every byte belongs to a frame, so no fault is counted."""
     made = FrameDecoder()
     for number, tick in enumerate(ticks_of(name)):
         made.feed(tick, number * TICK_S)
@@ -235,7 +260,10 @@ def test_an_undamaged_stream_has_no_faults(name: str) -> None:
 @given(st.lists(st.one_of(frames.map(encode), st.binary(max_size=20)), max_size=20))
 @example([LEAD_IN, b"\x00", LEAD_IN])
 def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> None:
-    """Every byte belongs to a returned frame or is counted as discarded."""
+    """The stream contains frames and noise.
+
+    Each byte is part of a returned frame, or counted as discarded.
+    """
     made, stream = FrameDecoder(), b"".join(pieces)
     found = made.feed(stream, 0.0) + made.flush(0.0)
     in_frames = sum(len(encode(frame)) for frame in found if not isinstance(frame, PausedFrame))
@@ -245,7 +273,10 @@ def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> 
 
 
 def test_a_pose_is_read_in_the_byte_order_asked_for() -> None:
-    """The byte order of poses is a setting, because the manual can be read either way."""
+    """The manual does not make the byte order of poses clear, so it is a setting.
+
+    The decoder uses it.
+    """
     pose = PoseFrame(1000.0, -2.5, 1.0, 9)
     for order in ("big", "little"):
         made = FrameDecoder(order)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The decoder on damaged streams, on texts between frames, and after silences."""
+"""Tests of the decoder on damaged streams, on texts between frames, and after silences."""
 
 from random import Random
 
@@ -37,10 +37,11 @@ from omnibot_driver.core.omnibot.frames import Frame
 def assert_back_in_step(
     sent: list[tuple[int, Frame]], hurt: set[int], found: list[Frame], place: int
 ) -> None:
-    """Check that only frames near the damage are missing, and that no false frame was found.
+    """Check that only frames near the damage are missing, and that no false frame was returned.
 
-    ``hurt``: numbers of the frames whose bytes are changed or pushed apart. ``place``: position of
-    the damage, for messages.
+    ``hurt``: the numbers of the frames that the damage changed or split.
+
+    ``place``: the position of the damage, for messages.
     """
     truth = [frame for _, frame in sent]
     assert is_subsequence(found, truth), f"a false frame came out: damage at {place}"
@@ -66,7 +67,10 @@ def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
-    """Any byte of a frame may be lost; the decoder is in step again within two frames."""
+    """A frame has lost one byte.
+
+    It is not returned, and the decoder is in step again within two frames.
+    """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     for place, number in damage_places(sent):
@@ -83,7 +87,10 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
 def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
-    """After an inserted byte, the decoder is in step again, with at most one false frame."""
+    """A byte is inserted into a stream.
+
+    Then the decoder is in step again, after at most one false frame.
+    """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -100,7 +107,10 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """A gyro that reads like a header may cause a false frame, in at most 1 of 30 insertions."""
+    """Bytes are inserted into streams at random. At most 1 in 30 of them leads to a false frame.
+
+    This happens if a gyro value looks like a header.
+    """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -116,7 +126,7 @@ def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     "extra", [b"\x00", b"P", b"\xfa", b"\xff", b"\xff\xff", b"\xff\xfd", b"Pau"]
 )
 def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes) -> None:
-    """Bytes between two frames may belong to the first one; the second one is returned."""
+    """Extra bytes come between two frames. At most the frame before them is lost."""
     other = ImuFrame((100, 90, -16300), (4, 5, 6))
     after = LEAD_IN * 2
     found = decoded([LEAD_IN + encode(other) + extra + after])
@@ -126,7 +136,10 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """A frame that lost a byte takes FF from the next header; the byte after FF shows the error."""
+    """A frame has lost a byte, so the first byte of the next header seems to complete it.
+
+    The byte after that shows the error, and the frame is not returned.
+    """
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
     for number in range(8, 24):
@@ -147,7 +160,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
 def test_rubbish_between_frames_costs_a_few_frames_only(
     pieces: list[Frame | bytes], data: st.DataObject
 ) -> None:
-    """After six ordinary frames the decoder is in step, whatever came before."""
+    """After any frames and noise, six ordinary frames come. Then the decoder is in step."""
     stream = b"".join(piece if isinstance(piece, bytes) else encode(piece) for piece in pieces)
     made = FrameDecoder()
     for chunk in data.draw(chunkings(stream)):
@@ -163,7 +176,10 @@ def test_rubbish_between_frames_costs_a_few_frames_only(
 @pytest.mark.parametrize("count", [0, 42, 255])
 @pytest.mark.parametrize("ends", ["text", "data"])
 def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> None:
-    """A text before data or before another text is decoded, wherever a read ends."""
+    """A paused text comes after frames, and a read ends anywhere within it.
+
+    The text is returned.
+    """
     text = encode(PausedFrame(count))
     stream = LEAD_IN + text + (LEAD_IN if ends == "data" else text)
     last = [REST, REST] if ends == "data" else [PausedFrame(count)]
@@ -175,7 +191,7 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """Each byte of a text but its digit is left out once; only a missing blank is accepted."""
+    """A paused text has lost one character. It is not returned, unless only a blank is missing."""
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
     found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])
@@ -190,7 +206,10 @@ def test_a_damaged_text_does_not_come_out(place: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
-    """Bytes after an interruption of the line do not complete the frame that was cut."""
+    """The line is interrupted within a frame.
+
+    The bytes after the silence do not complete that frame.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
     after = [DeltaFrame(1, 2, 3, 4), REST, PoseFrame(1.0, 2.0, 3.0, 4), DeltaFrame(5, 6, 7, 8)]
@@ -200,7 +219,10 @@ def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: int) -> None:
-    """The rest of the cut frame never comes, and the text after the boot is decoded at once."""
+    """The board reboots within a frame.
+
+    Its first paused text after the boot is returned at once.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
     assert made.feed(b"Paused: 0 \n", 0.3) == [PausedFrame(0)]
@@ -209,7 +231,7 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """The reader is late, not the line, so the backlog completes the frame that was cut."""
+    """The reader is late, not the line. The bytes that waited complete the frame that was cut."""
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
     sent = [frame for _, frame in frames_of(stream)]
@@ -225,7 +247,7 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """If silence follows a doubtful frame, no bytes contradict the frame, so it is returned."""
+    """A silence follows a doubtful frame, so nothing contradicts the frame, and it is returned."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -234,7 +256,10 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """``flush`` returns a complete frame if the decoder is in step, but never a partial one."""
+    """If the decoder is in step, ``flush`` returns a complete frame that was held.
+
+    A partial frame is never returned.
+    """
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()
     in_step.feed(LEAD_IN + encode(doubtful), 0.0)

@@ -2,13 +2,14 @@
 
 """Fuzz tests of the decoder, with any bytes, at any times, in any chunks.
 
-The decoder
 
-* never raises;
-* returns frames that are in the stream, byte for byte, in order and without overlap;
-* holds less than ``DOUBT_BYTES`` between calls, and nothing after ``flush``;
-* does work in proportion to the number of bytes, however they are chosen and cut;
-* returns all frames of a stream in which nothing is lost or added, in any chunks.
+The decoder must
+
+* never raise an exception;
+* return only frames that are in the stream, byte for byte, in order and without overlap;
+* hold less than ``DOUBT_BYTES`` between calls, and nothing after ``flush``;
+* do an amount of work in proportion to the number of bytes, for any bytes in any chunks;
+* return all frames of a stream in which no byte is lost or added.
 
 ``test/integrity`` measures how rarely a damaged stream gives a wrong frame.
 """
@@ -28,14 +29,14 @@ from omnibot_driver.core.omnibot.frames import LENT, Frame, decode_measured, mea
 
 REST = encode(ImuFrame((120, -80, -16384), (1, 2, 3)))
 THIRD = 300
-"""Number of bytes in a third of a stream; the buffers are full before the second third."""
+"""Number of bytes in a third of a stream. The decoder's buffers are full after the first third."""
 times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 
 
 def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
-    """Check that the stream holds the frames in order.
+    """Check that ``stream`` contains the frames of ``found`` in order.
 
-    Frames are compared as text, because a pose may contain NaN, which does not equal itself.
+    Frames are compared as text, because a pose may contain NaN, which is not equal to itself.
     """
     at = 0
     for frame in found:
@@ -54,7 +55,10 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """No bytes raise an exception, and fewer than ``DOUBT_BYTES`` are held between calls."""
+    """The decoder gets any bytes at any times. It returns only frames that are in the stream.
+
+    It raises no exception, and holds fewer than ``DOUBT_BYTES`` between calls.
+    """
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)
@@ -69,7 +73,10 @@ def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
 def test_all_frames_between_silences_come_in_any_chunks(
     bursts: list[list[Frame]], data: st.DataObject
 ) -> None:
-    """The board is paused and started again, and chunks end anywhere."""
+    """The board sends frames between silences, and the chunks end anywhere.
+
+    All frames are returned.
+    """
     made, now = FrameDecoder(), 0.0
     found = made.feed(REST * 2, now)[2:]
     for burst in bursts:
@@ -82,9 +89,9 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """A frame whose content and count follow the frame before is returned with its last byte.
+    """A frame that fits the one before it is returned with its last byte.
 
-    Only a frame that ends in a header's byte must wait.
+    Only a frame whose last byte may begin a header must wait.
     """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
@@ -99,7 +106,10 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """Below 0.5 g, -6 (FF FA) among the accelerations looks like an IMU header."""
+    """In free fall, below 0.5 g, an acceleration of -6 has the bytes of an IMU header.
+
+    Only an IMU frame with that value is lost.
+    """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
     assert found.count(fall) == (word != -6)
@@ -129,9 +139,9 @@ ADVERSARIES = {
 def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[list[int], int]:
-    """Return the work until the end of each chunk, beginning with 0, and the most bytes held.
+    """Return the work up to the end of each chunk, beginning with 0, and the most bytes held.
 
-    The work is counted in examined bytes and in edges of the trellis.
+    The unit of work is one examined byte, or one edge of the trellis.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
@@ -164,7 +174,10 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
 ) -> None:
-    """With full buffers, the last third of a stream costs about as much work as the second."""
+    """A pattern that is hard to decode is repeated.
+
+    The last third costs about as much as the second.
+    """
     stream = pattern * (THIRD // len(pattern))
     if chunk_length < THIRD:
         sums, most = work(monkeypatch, stream * 3, chunk_length, pause_s)
@@ -185,7 +198,7 @@ def test_work_is_linear_and_memory_bounded(
 def test_no_repeated_pattern_costs_much_more_than_another(
     pattern: bytes, chunk_length: int
 ) -> None:
-    """Any repeated pattern costs a bounded amount of work for each byte."""
+    """Any pattern is repeated. The work for each byte is bounded."""
     stream = pattern * (1000 // len(pattern))
     with pytest.MonkeyPatch.context() as patch:
         sums, _ = work(patch, stream, chunk_length)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards that send deltas at another rate than 25 Hz, with a driver that is set to that rate."""
+"""Tests of boards that send deltas at a rate other than 25 Hz; the driver is set to that rate."""
 
 import math
 from itertools import pairwise
@@ -51,7 +51,10 @@ def off_by_m(bench: Bench) -> float:
 @EVERY_PERIOD
 @pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
 def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str) -> None:
-    """The robot drives at 0.3 m/s, -0.1 m/s and 0.4 rad/s, and nothing is counted as lost."""
+    """The robot drives at 0.3 m/s, -0.1 m/s and 0.4 rad/s. The driver publishes the right values.
+
+    No frame is counted as lost.
+    """
     bench = driving(period_s, frame=frame)
     begun, readings = len(bench.odometry), sum(isinstance(e, ImuEstimate) for e in bench.events)
     drive(bench, 5.0)
@@ -78,7 +81,7 @@ def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str
 
 @EVERY_PERIOD
 def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s: float) -> None:
-    """At every delta period each frame is returned, and the order of frames causes no fault."""
+    """At every delta period, all frames of an undamaged stream are returned, without a fault."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     ticks = [board.step() for _ in range(600)]
     stream = b"".join(ticks)
@@ -98,7 +101,11 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """At 10 Hz, ten IMU frames precede a delta and two deltas a pose; at 25 Hz, four and five."""
+    """With deltas at 10 Hz, ten IMU frames come before each delta, and two deltas before each pose.
+
+    At 25 Hz the numbers are four and five. Each schedule accepts only its own numbers without a
+    cost.
+    """
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
     for schedule, right in ((Schedule(0.1), True), (Schedule(), False)):
@@ -112,7 +119,7 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
 
 @EVERY_PERIOD
 def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
-    """A delta of up to 10 m/s times the delta period is possible."""
+    """A delta at 9.9 m/s is possible, and one at 10.1 m/s is not, whatever the delta period."""
     expectation = Expectation(16384.0, Schedule(period_s))
     for speed_mps, possible in ((9.9, True), (10.1, False)):
         delta = DeltaFrame(round(speed_mps * period_s * 1e4), 0, 0, 8)
@@ -121,7 +128,10 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """Each delta may be off by 0.05 mrad, half a digit; twice as much contradicts the pose."""
+    """Each delta may be off by 0.05 mrad because of rounding.
+
+    A pose that shows their sum is accepted. A difference of twice that sum contradicts the pose.
+    """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
     before = Context(seq=7, pose=PoseFrame(0.0, 0.0, 0.0, 4), deltas=deltas, turned=0)
@@ -134,7 +144,10 @@ def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: 
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """Deltas come at 10 Hz, and SEQ wraps in the longest gap."""
+    """The board sends deltas at 10 Hz, and all frames are lost for a while.
+
+    SEQ wraps in the longest gap. 1.2 s later, the odometry is equal to the board's own pose again.
+    """
     for seed in range(3):
         on = Line(
             BoardSettings(running=True, delta_period_s=TEN_HZ_S, frame=frame, seed=seed), seed=seed
@@ -149,7 +162,10 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """At 10 Hz, a pose follows every second delta and shows the motion of lost deltas."""
+    """At 10 Hz, a pose follows every second delta.
+
+    It shows the motion of the deltas that were lost.
+    """
     on = Line(BoardSettings(running=True, delta_period_s=TEN_HZ_S))
     on.run(3.0)
     on.loses = lambda data, _now: data[:2] == DELTA
@@ -161,7 +177,10 @@ def test_a_lost_delta_is_bridged_and_settled() -> None:
 
 @EVERY_PERIOD
 def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
-    """Lost deltas are counted correctly even if SEQ wraps several times in a gap."""
+    """Deltas are lost, and SEQ may wrap several times in the gap.
+
+    The lost deltas are counted correctly.
+    """
     schedule = Schedule(period_s)
     for lost in (0, 1, 7, 200, 256, 300, 1000):
         sequence = Sequence(schedule)
@@ -173,7 +192,10 @@ def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
 
 @pytest.mark.parametrize("period_s", [period_s for period_s in DELTA_PERIODS_S if period_s >= 0.04])
 def test_a_restart_shows_in_the_count(period_s: float) -> None:
-    """A count of 1 after a gap of 1.5 s fits no continued count, so the board has restarted."""
+    """After a gap of 1.5 s, a delta has the count 1. A board that ran on could not have this count.
+
+    So the board has restarted.
+    """
     sequence = Sequence(Schedule(period_s))
     for count in range(100):
         sequence.delta(count, count * period_s)
@@ -182,7 +204,10 @@ def test_a_restart_shows_in_the_count(period_s: float) -> None:
 
 @pytest.mark.parametrize("action", [Request.RESET, "pause", "unplugged"])
 def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> None:
-    """Odom continues when a board at 10 Hz is reset, paused and started, or connected again."""
+    """A board with deltas at 10 Hz is reset, or paused and started, or connected again.
+
+    The odometry continues.
+    """
     bench = driving(TEN_HZ_S)
     bench.run(2.0)
     begun = off_by_m(bench)
@@ -203,7 +228,7 @@ def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> N
 
 @EVERY_PERIOD
 def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
-    """A few deltas may be lost by chance, so IMU frames alone do not change the mode at once."""
+    """A few deltas are lost. The driver assumes IMU-only mode only when six are missing."""
     schedule = Schedule(period_s)
     assert schedule.imus_alone > max(24, 6 * schedule.imus_per_delta)
     assert ModeTracker(schedule).imus_to_come == schedule.imus_alone
@@ -221,7 +246,7 @@ def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_bytes_that_made_no_frame_tell_how_many_imu_frames_they_were(period_s: float) -> None:
-    """By the order of frames, 23 damaged bytes were one IMU frame and the delta after it."""
+    """In place of an IMU frame and a delta come 23 damaged bytes. One lost IMU frame is counted."""
     schedule = Schedule(period_s)
     rhythm = FrameSchedule(schedule)
     for _ in range(3):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lost frames, inferred from bytes that form no frame."""
+"""Tests of how many IMU frames were lost, inferred from bytes that form no frame."""
 
 import pytest
 from hypothesis import given
@@ -13,7 +13,7 @@ kinds = st.sampled_from([ImuFrame, DeltaFrame, PoseFrame])
 
 
 def nominal(imus: int) -> FrameSchedule:
-    """Return a schedule after one second of nominal mode, and ``imus`` IMU frames after a pose."""
+    """Return a schedule after a second of nominal mode, and then ``imus`` IMU frames."""
     rhythm = FrameSchedule()
     for _ in range(5):
         for _ in range(5):
@@ -32,12 +32,18 @@ def nominal(imus: int) -> FrameSchedule:
 def test_damaged_bytes_tell_how_many_imu_frames_they_were(
     imus: int, skipped: int, lost: int
 ) -> None:
-    """Lost IMU frames are counted from damaged bytes; a delta in these bytes is not counted."""
+    """From the number of damaged bytes, the schedule counts the lost IMU frames.
+
+    A delta among these bytes is not counted.
+    """
     assert nominal(imus).hear(ImuFrame, skipped) == lost
 
 
 def test_a_damaged_pose_is_not_an_imu_frame() -> None:
-    """Damage in place of a pose (15 bytes) is not counted as an IMU frame (14 bytes)."""
+    """Where a pose of 15 bytes is due, 14 damaged bytes come.
+
+    They are not counted as an IMU frame.
+    """
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -46,7 +52,10 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """An IMU frame that is lost before a pose is counted with the frame after the pose."""
+    """An IMU frame is lost before a pose.
+
+    The schedule counts it when the frame after the pose comes.
+    """
     rhythm = nominal(0)
     for _ in range(4):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):
@@ -58,7 +67,7 @@ def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
 
 
 def test_imu_frames_alone_are_all_that_was_lost() -> None:
-    """After 30 IMU frames in a row, all damaged bytes are counted as IMU frames."""
+    """After 30 IMU frames in a row, all damaged bytes are counted as lost IMU frames."""
     rhythm = nominal(0)
     for _ in range(30):
         rhythm.hear(ImuFrame, 0)
@@ -67,7 +76,10 @@ def test_imu_frames_alone_are_all_that_was_lost() -> None:
 
 @given(st.lists(st.tuples(kinds, st.integers(0, 500))))
 def test_any_order_of_frames_is_borne(heard: list[tuple[type, int]]) -> None:
-    """For seven bytes that form no frame, at most one IMU frame is counted as lost."""
+    """Frames and damaged bytes come in any order.
+
+    At most one lost IMU frame is counted for each seven damaged bytes.
+    """
     rhythm = FrameSchedule()
     skipped = lost = 0
     for kind, count in heard:

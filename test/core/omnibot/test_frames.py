@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The codec, against bytes typed by hand from the manual."""
+"""Tests of the codec, with bytes typed by hand from the manual."""
 
 import math
 import struct
@@ -82,7 +82,7 @@ FRAME_TABLES: dict[str, tuple[str, Frame | CommandFrame]] = {
 
 @pytest.mark.parametrize(("typed", "frame"), APPENDIX.values(), ids=APPENDIX.keys())
 def test_each_command_of_the_appendix_is_these_bytes(typed: str, frame: CommandFrame) -> None:
-    """The ten useful serial commands of the manual are encoded and decoded."""
+    """The ten commands of the manual's appendix are encoded and decoded as printed there."""
     assert encode(frame) == bytes.fromhex(typed)
     assert decode(bytes.fromhex(typed)) == frame
 
@@ -91,13 +91,19 @@ def test_each_command_of_the_appendix_is_these_bytes(typed: str, frame: CommandF
 def test_each_frame_table_is_laid_out_as_in_the_manual(
     typed: str, frame: Frame | CommandFrame
 ) -> None:
-    """A frame has a header, words with the most significant byte first, and SEQ, if any, last."""
+    """A frame has a header, then its words, and SEQ last, if it has SEQ.
+
+    The most significant byte of a word comes first.
+    """
     assert encode(frame) == bytes.fromhex(typed)
     assert decode(bytes.fromhex(typed)) == frame
 
 
 def test_the_pose_may_be_little_endian() -> None:
-    """The manual can also be read so that the bytes of each float are reversed."""
+    """The manual may also mean that the bytes of each float are reversed.
+
+    A setting selects this order.
+    """
     typed = bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 09")
     frame = PoseFrame(1000.0, -2.5, 1.0, 9)
     assert encode(frame, "little") == typed
@@ -106,7 +112,10 @@ def test_the_pose_may_be_little_endian() -> None:
 
 @pytest.mark.parametrize("count", [0, 7, 42, 255])
 def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
-    """The text is «Paused: i» with a space before the line feed; i is a uint8."""
+    """The paused text is «Paused: i», with a space before the line feed.
+
+    The number i is a uint8.
+    """
     typed = {
         0: "50 61 75 73 65 64 3A 20 30 20 0A",
         7: "50 61 75 73 65 64 3A 20 37 20 0A",
@@ -119,7 +128,10 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 
 @pytest.mark.parametrize("text", [b"Paused: 3\n", b"Paused: 3 \r\n", b"Paused: 3\r\n"])
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
-    """A text with other white space at its end is accepted, as firmware may differ in this."""
+    """A paused text ends with other white space than in the manual, as firmware may differ.
+
+    It is accepted.
+    """
     assert decode(text) == PausedFrame(3)
 
 
@@ -132,19 +144,19 @@ def test_the_named_frames_and_letters_are_those_of_the_manual() -> None:
 
 @given(frames, byte_orders)
 def test_decoding_undoes_encoding(frame: Frame, order: ByteOrder) -> None:
-    """Every frame that the board may send is equal after encoding and decoding."""
+    """Every frame that the board may send is the same after encoding and decoding."""
     assert decode(encode(frame, order), order) == frame
 
 
 @given(commands)
 def test_decoding_undoes_encoding_of_commands(command: CommandFrame) -> None:
-    """Every command that may be sent to the board is equal after encoding and decoding."""
+    """Every command to the board is the same after encoding and decoding."""
     assert decode(encode(command)) == command
 
 
 @given(st.one_of(frames, commands), byte_orders)
 def test_encoding_undoes_decoding(frame: Frame | CommandFrame, order: ByteOrder) -> None:
-    """Every byte of a frame has a meaning, so decoding and encoding give the same bytes."""
+    """Every byte of a frame has a meaning, so decoding and encoding give the same bytes again."""
     data = encode(frame, order)
     assert encode(decode(data, order), order) == data
 
@@ -159,7 +171,7 @@ def test_the_simulated_board_speaks_the_same_language(
     theta: float,
     order: ByteOrder,
 ) -> None:
-    """Two codecs, written separately from one manual, agree on every value."""
+    """The driver and the simulated board have separate codecs. Both understand the same values."""
     assert decode(wire.imu_frame(a, b)) == ImuFrame(a, b)
     assert decode(wire.delta_frame(a, seq)) == DeltaFrame(*a, seq)
     assert decode(wire.pose_frame(x, y, theta, seq, order), order) == PoseFrame(x, y, theta, seq)
@@ -168,7 +180,7 @@ def test_the_simulated_board_speaks_the_same_language(
 
 @given(commands)
 def test_the_simulated_board_understands_every_command(command: CommandFrame) -> None:
-    """The board's receiver reads what the driver encodes."""
+    """The receiver of the simulated board reads every command as the driver has encoded it."""
     receiver = CommandReceiver(awake=True)
     understood = [receiver.feed(byte, 0.0, control_frames=True) for byte in encode(command)]
     assert understood[-1] == (wire.ControlFrame(command.mode, command.values),)
@@ -176,7 +188,7 @@ def test_the_simulated_board_understands_every_command(command: CommandFrame) ->
 
 
 def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
-    """A pose with NaN or infinity is decoded, because decoding does not judge values."""
+    """A pose contains NaN or infinity. It is decoded, because the codec does not judge values."""
     frame = decode(bytes.fromhex("FF FC 7F C0 00 00 FF 80 00 00 00 00 00 00 01"))
     assert isinstance(frame, PoseFrame)
     assert math.isnan(frame.x)
@@ -185,7 +197,10 @@ def test_a_pose_that_is_not_a_number_is_still_a_pose() -> None:
 
 @given(pose_frames, st.floats(allow_nan=False, allow_infinity=False))
 def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -> None:
-    """A coordinate is rounded to a 32-bit float, or refused if it is beyond the float's range."""
+    """A coordinate is rounded to a 32-bit float.
+
+    One that is too large for such a float is refused.
+    """
     wide = PoseFrame(x, pose.y, pose.theta, pose.seq)
     try:
         rounded = float32(x)
@@ -215,7 +230,7 @@ def test_a_pose_is_rounded_to_four_bytes_or_refused(pose: PoseFrame, x: float) -
     ids=str,
 )
 def test_a_value_that_does_not_fit_its_field_is_refused(frame: Frame | CommandFrame) -> None:
-    """A value too large for its field is refused, and the message names the frame."""
+    """A value is too large for its field. Encoding is refused, and the message names the frame."""
     with pytest.raises(FrameError, match=type(frame).__name__):
         encode(frame)
 
@@ -232,7 +247,7 @@ def test_a_part_of_a_frame_is_not_a_frame(frame: Frame | CommandFrame, length: i
 def test_a_frame_and_something_more_is_not_a_frame(
     frame: Frame | CommandFrame, more: bytes
 ) -> None:
-    """A frame with extra bytes in front or behind is refused."""
+    """A frame with extra bytes after it is refused."""
     data = encode(frame)
     with pytest.raises(FrameError, match="not exactly one frame"):
         decode(data + more)
@@ -255,14 +270,17 @@ def test_a_frame_and_something_more_is_not_a_frame(
     ],
 )
 def test_bytes_of_no_frame_are_refused(data: bytes) -> None:
-    """The refusal of bytes that form no frame contains the bytes."""
+    """Bytes that form no frame are refused, and the message contains the bytes."""
     with pytest.raises(FrameError, match=data.hex(" ") or "no bytes"):
         decode(data)
 
 
 @given(frames, st.binary(max_size=20), st.binary(max_size=20))
 def test_a_frame_is_measured_wherever_it_stands(frame: Frame, before: bytes, after: bytes) -> None:
-    """``measure`` returns the length of a complete frame, and INCOMPLETE for its beginning."""
+    """``measure`` returns the length of a complete frame anywhere in a stream.
+
+    For the beginning of a frame it returns INCOMPLETE.
+    """
     data = encode(frame)
     assert measure(before + data + after, len(before)) == len(data)
     for length in range(1, len(data)):
@@ -271,14 +289,14 @@ def test_a_frame_is_measured_wherever_it_stands(frame: Frame, before: bytes, aft
 
 @given(st.binary(min_size=1, max_size=20))
 def test_what_no_frame_begins_with_is_never_waited_for(data: bytes) -> None:
-    """Bytes that begin neither a header nor the paused text are NO_FRAME at once."""
+    """For bytes that cannot become a frame, ``measure`` returns NO_FRAME at once."""
     headers = (b"\xff\xfa", b"\xff\xfb", b"\xff\xfc")
     may_become = data.startswith((*headers, b"P")) or data == b"\xff"
     assert may_become or measure(data, 0) == NO_FRAME
 
 
 def test_struct_sizes_are_the_lengths_of_the_manual() -> None:
-    """Frames from the board have 14, 9 and 15 bytes, and frames to the board have 9 bytes."""
+    """Frames from the board have 14, 9 and 15 bytes. Frames to the board have 9 bytes."""
     zeros = (0, 0, 0)
     assert len(encode(ImuFrame(zeros, zeros))) == 14
     assert len(encode(DeltaFrame(0, 0, 0, 0))) == 9

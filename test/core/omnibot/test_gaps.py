@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of an idle line: the time in which bytes arrive is not a pause."""
+"""Test that an idle line is detected, and that the time in which bytes arrive is not a pause."""
 
 import pytest
 
@@ -18,7 +18,10 @@ from omnibot_driver.core.omnibot.gaps import InterFrameGaps
     ],
 )
 def test_bytes_of_a_slow_line_take_longer(baudrate: int, pause_s: float, idle: bool) -> None:
-    """24 bytes take 2.08 ms at 115200 baud, 6.25 ms at 38400; 4 ms more are a pause."""
+    """A read brings 24 bytes, which take 2.08 ms at 115200 baud and 6.25 ms at 38400 baud.
+
+    The line was idle only if the read came at least 4 ms later than that.
+    """
     pauses = InterFrameGaps(10 / baudrate)
     pauses.read(pause_s, 24, 5, now=1.0)
     assert bool(pauses.gaps) is idle

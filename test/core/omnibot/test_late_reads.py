@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Late reads: bytes wait in the computer until they are read, so none of them is lost."""
+"""Tests of late reads: bytes wait in the computer until they are read, and none of them is lost."""
 
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -17,9 +17,9 @@ from omnibot_driver.core.omnibot.frames import Frame
 Reads = Iterator[tuple[bytes, float]]
 
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
-"""Durations for which a reader stops, in s.
+"""Times in s for which a reader stops.
 
-The line is idle for 8.8 ms between two ticks; each tick without frames adds 10 ms.
+Several are near 8.8 ms, for which the line is idle between two ticks, or 10 ms, a whole tick.
 """
 
 
@@ -36,10 +36,12 @@ def arrivals(ticks: Sequence[bytes]) -> tuple[bytes, list[float]]:
 def stopped(
     ticks: Sequence[bytes], place: int, stop_s: float, *, most: int = 4096, piece: int = 1
 ) -> Reads:
-    """Yield reads of ``piece`` bytes by a reader that stops once for ``stop_s``.
+    """Yield the reads of a reader that stops once, for ``stop_s``, after ``place`` bytes.
 
-    The reader stops after ``place`` bytes. After the stop, one read of at most ``most`` bytes every
-    20 µs takes the bytes that have arrived.
+    ``piece``: the number of bytes in each read before the stop.
+
+    ``most``: the largest number of bytes in a read. After the stop the reader reads every 20 µs,
+    until it has all bytes that have arrived.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -70,7 +72,10 @@ def heard(reads: Reads) -> list[Frame]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """A reader stops between any two bytes of five frames, after 0.5 s of prompt reads."""
+    """A reader stops once, between any two bytes of five frames. No frame is lost.
+
+    Before that, it has read promptly for 0.5 s.
+    """
     ticks = ticks_of(name)[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
@@ -82,7 +87,7 @@ def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: floa
 @pytest.mark.parametrize("most", [1, 8, 32])
 @pytest.mark.parametrize("piece", [1, 4])
 def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
-    """A reader that catches up a few bytes at a time after a stop loses no bytes."""
+    """After a stop, a reader reads the bytes that waited in small pieces. No frame is lost."""
     ticks = ticks_of("driving")[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))
@@ -100,7 +105,7 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """A reader that is always late still gets every frame, even during a shock."""
+    """A reader is late at every read, and the frames have any content. No frame is lost."""
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
     for seq, (accel, gyro, delta) in enumerate(content):
@@ -127,7 +132,10 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """A reader that was stopped still gets the text, and the last frame before the text."""
+    """A reader stops within the last frame and within the paused text after it.
+
+    Both are returned.
+    """
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"
     made = FrameDecoder()
@@ -142,9 +150,9 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter sends 8 bytes at a time: a piece may hold parts of two texts.
+    """An adapter sends 8 bytes at a time, so a piece may hold parts of two paused texts.
 
-    The silence between the texts then lies within the piece.
+    The silence between the texts then lies within the piece. All texts are returned.
     """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
@@ -154,9 +162,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The front of one frame and the back of a later frame do not form a frame.
+    """The line is cut within a frame and comes back within a later frame.
 
-    At rest only the pause between the two parts shows this; a prompt reader has measured it.
+    The two parts have the length of a frame, but only the pause between them shows that they are
+    not one. The reader is prompt and measures this pause, so no false frame is returned.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
@@ -173,7 +182,7 @@ def test_where_the_line_was_cut_a_pause_still_tells() -> None:
 
 
 def test_a_line_that_was_out_for_long_is_read_anew() -> None:
-    """After an interruption of 0.5 s, new bytes do not complete the frame that was cut."""
+    """The line is interrupted for 0.5 s within a frame. New bytes do not complete that frame."""
     made = FrameDecoder()
     found = made.feed(LEAD_IN + encode(REST)[:5], 0.0)
     other = ImuFrame((100, -70, -16300), (2, 3, 4))
@@ -207,7 +216,7 @@ A read is the time in ms since the read before, and the bytes.
 
 @pytest.mark.parametrize("name", LATE_ENDS)
 def test_a_late_end_belongs_to_its_frame_where(name: str) -> None:
-    """A delta whose end is read late is decoded; the reads are like those of a busy computer."""
+    """The end of a delta is read late, as on a busy computer. The delta is returned."""
     made, ticks = FrameDecoder(), ticks_of("driving")[:96]
     found, now = [], 0.0
     for number, tick in enumerate(ticks):

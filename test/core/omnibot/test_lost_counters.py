@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry across lost frames and false poses, with the simulated board."""
+"""Tests of odometry across lost frames and false poses, with the simulated board."""
 
 import math
 from random import Random
@@ -30,7 +30,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """One second after a gap, odom is right, even in curves and if SEQ has wrapped."""
+    """All frames are lost for a while, also in curves and while SEQ wraps.
+
+    One second later, the odometry is equal to the board's own pose again.
+    """
     for seed in range(5):
         on = line(seed, frame=frame)
         lose(on, lost * PERIOD_S)
@@ -39,7 +42,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_short_gap_is_bridged_at_once() -> None:
-    """The motion on both sides fills a gap: 0.12 s of loss leave less than 2 mm of error."""
+    """All frames are lost for 0.12 s. The motion before and after fills the gap, within 2 mm."""
     for seed in range(5):
         on = line(seed)
         lose(on, 0.12)
@@ -49,7 +52,7 @@ def test_a_short_gap_is_bridged_at_once() -> None:
 
 
 def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
-    """For ten seconds no pose arrives; odometry from deltas alone is right within 5 mm."""
+    """For ten seconds no pose arrives. Odometry from deltas alone is right within 5 mm."""
     on = line(1)
     lose(on, 10.0, POSE)
     assert on.error.way_m < 0.005
@@ -60,7 +63,10 @@ def test_lost_poses_alone_cost_nothing_but_rounding() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.01, 0.1, 0.3])
 def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float) -> None:
-    """Frames are lost at random for 30 s; a second without losses removes the error of odom."""
+    """Frames are lost at random for 30 s. The odometry is always within 0.1 m of the robot.
+
+    After one second without losses, the error is gone.
+    """
     for seed in range(3):
         random, on = Random(seed), line(seed)
         on.loses = lambda _data, _now, random=random: random.random() < rate
@@ -76,7 +82,10 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """Steps of odom are below 2 m/s and 8 rad/s; the first step may take as long as the gap."""
+    """All frames are lost for a while. The odometry then changes by at most 2 m/s and 8 rad/s.
+
+    The first step covers the whole gap, so it may be as large as a motion during the gap.
+    """
     for seed in range(5):
         on = line(seed, frame=frame)
         before = on.estimates[-1]
@@ -89,7 +98,10 @@ def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str
 
 
 def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_faster() -> None:
-    """The robot reverses in a gap; the interpolation is 0.5 m off and is corrected at 2 m/s."""
+    """The robot reverses in a gap, so the interpolation is 0.5 m off.
+
+    The odometry is corrected at 2 m/s, the fastest speed of the robot.
+    """
     odometry, x, stamp_s = attached(), 0.0, 0.0
     estimates: list[OdometryEstimate] = []
 
@@ -115,7 +127,10 @@ def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_fa
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """After a long gap, displacements wait up to 0.2 s for a pose, so no guess is published."""
+    """After a long gap, displacements wait up to 0.2 s for a pose of the board.
+
+    So the first published pose is right, and not a guess.
+    """
     for seed in range(5):
         on = line(seed)
         lose(on, lost * PERIOD_S)
@@ -131,7 +146,10 @@ def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -
 
 
 def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
-    """If the pose after a long gap is lost too, the interpolation is used after about 0.25 s."""
+    """After a long gap, the next pose is lost too.
+
+    The driver waits about 0.25 s, then interpolates.
+    """
     on = line(1)
     lose(on, 2.0)
     on.loses = lambda data, _now: data[:2] == POSE
@@ -143,7 +161,7 @@ def test_after_a_long_gap_nothing_waits_for_a_pose_that_does_not_come() -> None:
 
 
 def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> None:
-    """A correction of the pose after a gap does not appear in the twist."""
+    """After a gap the pose is corrected. The correction does not appear in the twist."""
     on = line(3)
     lose(on, 1.0)
     twists = [estimate.twist for estimate in on.run(1.0)]
@@ -153,7 +171,10 @@ def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> N
 
 @pytest.mark.parametrize("lost", [2, 5, 10])
 def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
-    """A pose after the gap removes the variance of the gap, but not the variance of the drift."""
+    """A gap increases the covariance. A pose after the gap removes this increase.
+
+    The covariance of the drift, which has nothing to do with the gap, stays.
+    """
     whole, torn = line(2), line(2)
     whole.run(lost * PERIOD_S)
     lose(torn, lost * PERIOD_S)
@@ -167,7 +188,10 @@ def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: in
 
 
 def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
-    """With ``use_board_pose`` off, the board's pose does not correct the error of a gap."""
+    """With ``use_board_pose`` off, the board's pose does not correct the error of a gap.
+
+    The gap is interpolated, and its error and covariance stay.
+    """
     on = line(1, OdometrySettings(use_board_pose=False))
     lose(on, 0.4)
     (first,) = on.run(PERIOD_S)
@@ -181,7 +205,10 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 @pytest.mark.parametrize("use_board_pose", [True, False])
 @pytest.mark.parametrize("phase", range(5))
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
-    """A pose reveals lost deltas before the next delta does; their motion is filled in once."""
+    """A pose shows that deltas were lost, before the next delta does.
+
+    Their motion is added only once.
+    """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)
     lose(on, 2 * PERIOD_S, DELTA)
@@ -191,7 +218,10 @@ def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose:
 
 
 def test_a_board_that_sends_no_pose_is_bridged() -> None:
-    """Without poses, the interpolation is exact at constant speed in a constant curve."""
+    """The board sends no poses.
+
+    At constant speed in a constant curve, the interpolation is exact.
+    """
     odometry = Odometry(OdometrySettings())
     for number in range(60):
         if number < 30 or number >= 40:
@@ -214,7 +244,10 @@ def moved(lost: int = 0) -> DisplacementReading:
     "bad", [(math.nan, 0.0, 0.0), (1e9, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0)]
 )
 def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None:
-    """A pose that is not finite, out of reach or not confirmed by the next does not move odom."""
+    """A damaged pose is not finite, is out of reach, or is not confirmed by the next pose.
+
+    The odometry does not move.
+    """
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     for pose in (bad, (0.0, 0.0, 0.0), bad, (0.0, 0.0, 0.0)):
@@ -225,7 +258,7 @@ def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None
 
 
 def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
-    """When two poses agree that a displacement was wrong, odom is corrected in five steps."""
+    """Two poses agree that a displacement was wrong. The odometry is corrected in five steps."""
     odometry = attached()
     still = DisplacementReading(0.0, 0.0, 0.0, "earth", PERIOD_S, 0)
     odometry.displace(DisplacementReading(0.05, 0.0, 0.0, "earth", PERIOD_S, 0), 0.0)
@@ -240,7 +273,10 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
 
 
 losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
-"""Pairs of numbers of frames (deltas and poses): how many arrive, then how many are lost."""
+"""Each element is two numbers of frames: how many arrive, and then how many are lost.
+
+Only deltas and poses are counted.
+"""
 
 
 @pytest.mark.slow
@@ -249,7 +285,10 @@ losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:
-    """After one good second, odom is the board's pose; no step before that exceeds 2 m/s."""
+    """Deltas and poses are lost in any pattern.
+
+    One good second later, odometry is the board's pose. No step before that exceeds 2 m/s.
+    """
     on = line(seed, frame=frame)
     fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])
     on.loses = lambda _data, _now: next(fate, False)
@@ -279,7 +318,7 @@ def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
 def test_any_readings_give_finite_estimates_and_never_a_certain_one(
     readings: list[DisplacementReading | PoseReading], use_board_pose: bool
 ) -> None:
-    """For any readings nothing raises, and x, y and yaw keep a variance of at least 1e-6."""
+    """Any readings give finite estimates. The variances of x, y and yaw are at least 1e-6."""
     odometry = Odometry(OdometrySettings(use_board_pose=use_board_pose))
     for number, reading in enumerate(readings):
         if isinstance(reading, PoseReading):

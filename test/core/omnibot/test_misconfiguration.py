@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on settings that the board's data contradicts, and no advice on right settings."""
+"""Tests of advice on settings that the board's data contradicts; right settings cause no advice."""
 
 import math
 
@@ -21,7 +21,7 @@ from omnibot_driver.simulator.omnibot import (
 )
 
 DRIVE = bytes.fromhex("FF FE 01 00 15 00 0E 00 C8")
-"""Command for 0.3 m/s forward, 0.2 m/s to the left, 0.4 rad/s."""
+"""Command for 0.3 m/s forward, 0.2 m/s to the left and 0.4 rad/s."""
 
 
 def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0) -> str | None:
@@ -35,7 +35,10 @@ def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0
 
 @pytest.mark.parametrize(("sent", "read"), [("big", "little"), ("little", "big")])
 def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
-    """Poses that are valid only in the other byte order lead to advice on the byte order."""
+    """The poses make sense only in the other byte order.
+
+    The driver advises to change that setting.
+    """
     board = BoardSettings(running=True, pose_byte_order=sent)
     told = advice(board, OmniBotSettings(pose_byte_order=read))
     assert told is not None
@@ -45,7 +48,7 @@ def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
 @pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
 @pytest.mark.parametrize("period_s", DELTA_PERIODS_S)
 def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: float) -> None:
-    """A wrong ``delta_frame`` is noticed at any rate of deltas, once the robot has turned."""
+    """The setting ``delta_frame`` is wrong. The driver notices it once the robot has turned."""
     turned = BoardPose(0.0, 0.0, 1500.0)
     board = BoardSettings(running=True, frame=sent, initial_pose=turned, delta_period_s=period_s)
     told = advice(board, OmniBotSettings(delta_frame=read, delta_period_s=period_s))
@@ -56,7 +59,11 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: floa
 @pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
 @pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
 def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
-    """After 3 s, the advice names the right delta period; the right period causes no advice."""
+    """The setting of the delta period is wrong.
+
+    After 3 s, the driver's advice names the right period. If the setting is right, there is no
+    advice.
+    """
     board = BoardSettings(running=True, delta_period_s=sent_s)
     told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
     if sent_s == read_s:
@@ -71,7 +78,10 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
 @pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
-    """Lost IMU frames suggest another delta period, but the arrival times of deltas refute it."""
+    """IMU frames are lost, so fewer of them come between two deltas, as with another delta period.
+
+    The arrival times of the deltas show that the setting is right. There is no advice.
+    """
     sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     driver = OmniBot(OmniBotSettings(delta_period_s=period_s))
     line = FaultyLine(LineFaults(lose=lose), 5)
@@ -83,7 +93,10 @@ def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("lose", [0.001, 0.005])
 def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
-    """On a bad line a wrong delta period is noticed, even where IMU frames are missing."""
+    """The delta period is wrong, and the line loses bytes.
+
+    The driver still advises the right period.
+    """
     sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     driver = OmniBot(OmniBotSettings())
     line = FaultyLine(LineFaults(lose=lose), 5)
@@ -95,7 +108,10 @@ def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
 
 @pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
 def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
-    """Reads with up to a second of data, as on a busy computer, do not look like another period."""
+    """A busy computer reads up to one second of data at once.
+
+    The driver does not advise another period.
+    """
     sender, driver = SimulatedBoard(BoardSettings(running=True)), OmniBot(OmniBotSettings())
     held, read_at = b"", 0.0
     for tick in range(3000):
@@ -113,13 +129,19 @@ def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: f
 def test_nobody_is_told_anything_of_right_settings(
     frame: str, order: str, start: BoardPose
 ) -> None:
-    """Right settings cause no advice, also for a start far away, at zero or close to zero."""
+    """All settings are right, and the robot starts far away, at zero or close to zero.
+
+    There is no advice.
+    """
     board = BoardSettings(running=True, frame=frame, pose_byte_order=order, initial_pose=start)
     assert advice(board, OmniBotSettings(delta_frame=frame, pose_byte_order=order), 30.0) is None
 
 
 def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
-    """A wrong byte order causes one notice, and impossible poses do not move the odometry."""
+    """The byte order is wrong, so the poses are impossible. The driver gives one notice.
+
+    The odometry ignores the poses and continues with the deltas.
+    """
     start = BoardPose(3000.0, -2000.0, 0.0)
     bench = Bench(BoardSettings(running=True, pose_byte_order="little", initial_pose=start))
     bench.open()
@@ -134,7 +156,7 @@ def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
 
 
 def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
-    """While no pose is valid, the stored data must not grow, however many deltas arrive."""
+    """No pose makes sense for a long time. The stored deltas do not grow without limit."""
     suspicion = MisconfigurationChecks()
     zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
     suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")

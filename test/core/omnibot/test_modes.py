@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The mode table: what S, P, R and received data do in each mode."""
+"""Tests of the mode table: how S, P, R and received data change the mode."""
 
 from itertools import product
 
@@ -34,26 +34,26 @@ def tracker(mode: Mode) -> ModeTracker:
 
 
 def test_the_public_names_are_those_of_the_interface() -> None:
-    """The names of the modes are the values of ~/state."""
+    """The names of the modes are the values that ~/state publishes."""
     assert {mode.value for mode in Mode} == {"connecting", "paused", "nominal", "imu_only"}
     assert {mode for mode in Mode if mode.running} == {Mode.NOMINAL, Mode.IMU_ONLY}
 
 
 def test_nothing_is_believed_before_anything_is_heard() -> None:
-    """The mode on a new line is unknown."""
+    """On a new line, the mode is unknown."""
     assert ModeTracker().mode is Mode.UNKNOWN
 
 
 @pytest.mark.parametrize(("happening", "mode"), list(product(HEARD, Mode)))
 def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode) -> None:
-    """Any data may arrive in any mode, so the table has an entry for each case."""
+    """Any data may arrive in any mode, so the table has a result for each combination."""
     made = tracker(mode)
     made.apply(happening)
     assert made.mode is TRANSITIONS[happening][mode]
 
 
 def test_only_p_is_ever_refused() -> None:
-    """Only P has modes in which it is refused; S is harmless, and R is always allowed."""
+    """Only P is refused in some modes. S and R are always allowed."""
     missing = {
         happening
         for happening, mode in product(Happening, Mode)
@@ -69,7 +69,7 @@ def test_only_p_is_ever_refused() -> None:
     ids=["text", "delta", "pose"],
 )
 def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard: Mode) -> None:
-    """A single text, delta or pose sets the mode, whatever the mode before."""
+    """A single paused text, delta or pose determines the mode, whatever the mode before."""
     made = tracker(mode)
     made.hear(frame)
     assert made.mode is heard
@@ -77,7 +77,10 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 
 @pytest.mark.parametrize("mode", Mode)
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
-    """After 24 IMU frames in a row, five deltas may be lost by chance; 25 prove IMU-only mode."""
+    """25 IMU frames in a row show IMU-only mode.
+
+    After 24, five deltas may still be lost by chance.
+    """
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
         made.hear(DELTA)
@@ -90,7 +93,7 @@ def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
 
 
 def test_the_rhythm_of_a_nominal_board_is_never_imu_only() -> None:
-    """Even if five deltas in a row are lost, only 24 IMU frames arrive without a delta."""
+    """Five of six deltas are lost, so 24 IMU frames come in a row. The mode stays nominal."""
     made = ModeTracker()
     for tick in range(1, 400):
         made.hear(IMU)
@@ -108,7 +111,10 @@ def test_r_makes_the_mode_unknown(mode: Mode) -> None:
 
 
 def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
-    """R sets the count of IMU frames without a delta to zero."""
+    """24 IMU frames come before R and one after it.
+
+    They do not show IMU-only mode, as R sets the count to 0.
+    """
     made = tracker(Mode.NOMINAL)
     for _ in range(24):
         made.hear(IMU)
@@ -119,7 +125,10 @@ def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
-    """S and P may be lost, so the mode changes only with received data."""
+    """S and P may be lost.
+
+    So the mode changes only when data is received, not when they are sent.
+    """
     made = tracker(mode)
     made.apply(Happening.SENT_START)
     assert made.mode is mode
@@ -130,7 +139,10 @@ def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", [Mode.UNKNOWN, Mode.PAUSED])
 def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
-    """P is a toggle: it would start a paused board; in an unknown mode its effect is unknown."""
+    """P is a toggle, so it would start a paused board.
+
+    It is refused if the board is not known to run.
+    """
     made = tracker(mode)
     with pytest.raises(RequestRefused, match=mode.value):
         made.apply(Happening.SENT_PAUSE)
@@ -141,7 +153,10 @@ def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
 def test_an_illegal_request_raises_and_changes_nothing(
     happenings: list[Happening | Frame],
 ) -> None:
-    """A tracker that refused a request continues exactly like one that never got it."""
+    """A tracker refuses a request.
+
+    Then it continues exactly like a tracker that never got the request.
+    """
     asked, spared = ModeTracker(), ModeTracker()
     for happening in happenings:
         if not isinstance(happening, Happening):

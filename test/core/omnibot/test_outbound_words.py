@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Zeros before frames to the board, and payload words that could act as commands."""
+"""Tests of the zeros before frames to the board, and of words that could act as commands."""
 
 import re
 
@@ -28,19 +28,22 @@ def payload(a: int, b: int, c: int) -> bytes:
 
 
 def words_of(counts: list[float]) -> tuple[int, ...]:
-    """Return the words for ``counts``, scaled down to fit 16 bits."""
+    """Return the words for ``counts``, scaled down by one factor if they do not fit 16 bits."""
     return nearest(*slow(counts, MAX_WORD))
 
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """If a parser misses a frame's header, no byte of the payload acts as a letter or header."""
+    """The board may miss the header of a frame, and read the payload as commands.
+
+    So no payload contains a byte that is a letter, or two that are a header.
+    """
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
 
 @given(st.tuples(words, words, words).filter(lambda w: min(w) > -32768))
 def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
-    """Only words that could act as a letter or header are changed."""
+    """Only words that could act as a letter or a header are changed."""
     if not re.search(rb"[SPR]|\xff\xfe", payload(*counts)):
         assert harmless(counts) == counts
 
@@ -49,7 +52,7 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """Up to 20,479, a harmful word changes by one LSB; beyond, its high byte may be a letter."""
+    """Up to 20,479 only the low byte of a word can be harmful. Such a word changes by one LSB."""
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5
 
@@ -70,12 +73,18 @@ def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
 def test_words_that_would_act_take_the_nearest_value_that_does_not(
     counts: tuple[float, float, float], typed: str
 ) -> None:
-    """The expected words are typed by hand."""
+    """Words with harmful bytes are changed to the nearest harmless ones.
+
+    The expected bytes are typed by hand.
+    """
     assert payload(*harmless(counts)) == bytes.fromhex(typed)
 
 
 def test_everything_goes_out_behind_zeros() -> None:
-    """The zeros before each frame complete a frame that was cut, and wake a booted board."""
+    """Zeros come before each frame and letter.
+
+    They complete a frame that was cut, and wake a booted board.
+    """
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "
     stop = zeros + "ff fe 02 00 00 00 00 00 00"
@@ -90,7 +99,10 @@ def test_everything_goes_out_behind_zeros() -> None:
 
 @pytest.mark.parametrize("x_mm", [0x5000, 0x5210, 0x53FF])
 def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
-    """The nearest harmless goal could be 0.26 m away, so the driver refuses the goal."""
+    """The high byte of a goal is a letter. The nearest harmless goal could be 0.26 m away.
+
+    So the driver refuses the goal.
+    """
     encoder = CommandEncoder(OmniBotSettings())
     with pytest.raises(CommandRefused, match=r"start, pause or reset if the line"):
         encoder.drive_to(Pose(x_mm / 1000, 0.0, 0.0))
@@ -98,7 +110,7 @@ def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
 
 
 def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
-    """A goal at 83 mm (53 hex, the letter S) is sent as a goal at 84 mm."""
+    """A goal at 83 mm has the letter S as its low byte. It is sent as a goal at 84 mm."""
     encoder = CommandEncoder(OmniBotSettings())
     assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
 
@@ -115,13 +127,13 @@ def test_words_are_the_nearest_integers(counts: list[float]) -> None:
 
 @given(st.lists(st.floats(-32767, 32767), min_size=3, max_size=3))
 def test_rounding_is_the_same_to_both_sides(counts: list[float]) -> None:
-    """If positive and negative values were rounded differently, a robot would drift."""
+    """Positive and negative values are rounded alike. Otherwise the robot would drift."""
     mirrored = words_of([-count for count in counts])
     assert mirrored == tuple(-word for word in words_of(counts))
 
 
 def test_halves_are_rounded_away_from_zero() -> None:
-    """Halves are rounded away from zero, also above even numbers: 10.5 LSB are sent as 11."""
+    """Halves are rounded away from zero, also next to even numbers: 10.5 LSB are sent as 11."""
     assert words_of([0.5, -0.5, 10.5]) == (1, -1, 11)
 
 
@@ -129,7 +141,10 @@ def test_halves_are_rounded_away_from_zero() -> None:
 @example([1e308, -1e308, 5e307])
 @example([32768.0, 100.0, 0.0])
 def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
-    """Counts that are too large are scaled down by one factor, exact to half a count."""
+    """Counts that are too large are all scaled down by one factor.
+
+    Each is exact to half a count.
+    """
     words = words_of(counts)
     assert all(-32768 <= word <= 32767 for word in words)
     largest = max(map(abs, counts))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board that another program pauses and starts, with two P, within one read."""
+"""Test of a board that another program pauses and starts again, before the driver's next read."""
 
 import pytest
 from session_bench import STOP, TICK_S, Bench
@@ -14,7 +14,7 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 def test_what_was_commanded_before_it_ends_with_stop(
     kept_back: int, imu_only: bool, run: bool
 ) -> None:
-    """Stop is repeated for 1 s, because the board may resume a command from before the pause."""
+    """After such a pause, the board may resume an old command. The driver sends Stop for 1 s."""
     bench = Bench(BoardSettings(seed=2, running=True, imu_only=imu_only), run=run)
     bench.open()
     bench.run(2.0)

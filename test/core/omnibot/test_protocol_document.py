@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The examples in docs/internals/omnibot_protocol.md, checked against the codec.
+"""Tests that the examples in docs/internals/omnibot_protocol.md agree with the codec.
 
-An example is a line of a code block: bytes, ``->``, a word and its numbers, perhaps a remark.
+An example is a line of a code block. It has bytes, ``->``, a word with its numbers, and perhaps a
+remark.
 """
 
 import json
@@ -72,7 +73,6 @@ AnyFrame = ImuFrame | DeltaFrame | PoseFrame | PausedFrame | CommandFrame
 
 
 def command(mode: int) -> Callable[..., CommandFrame]:
-    """Return a function that makes a control frame with this mode from its three words."""
     return lambda a, b, c: CommandFrame(mode, (a, b, c))
 
 
@@ -95,7 +95,7 @@ SENT_AS_IT_IS = {
 
 
 class Example(NamedTuple):
-    """One example of the document: a line of a code block."""
+    """One example of the document."""
 
     data: bytes
     word: str
@@ -109,7 +109,7 @@ def code_lines(text: str) -> list[str]:
 
 
 def examples(text: str) -> list[Example]:
-    """Return the examples of a text, in order."""
+    """Return the examples in the code blocks of a text, in order."""
     found = filter(None, map(EXAMPLE.fullmatch, code_lines(text)))
     return [
         Example(
@@ -123,7 +123,7 @@ def examples(text: str) -> list[Example]:
 
 
 def section(title: str) -> str:
-    """Return the part of the document under the second-level heading that contains ``title``."""
+    """Return the section of the document whose second-level heading contains ``title``."""
     return next(part for part in DOCUMENT.split("\n## ") if title in part.partition("\n")[0])
 
 
@@ -143,7 +143,7 @@ def test_each_example_means_what_the_document_says(example: Example) -> None:
 
 
 def test_no_line_of_bytes_escapes_the_check() -> None:
-    """In a code block, a line that begins with bytes or has an arrow must be an example."""
+    """Each line in a code block that begins with bytes, or has an arrow, is a valid example."""
     suspects = re.compile(r"\s*[0-9A-Fa-f]{2}( [0-9A-Fa-f]{2})*(\s|$)|.*\s->\s")
     lines = [line for line in code_lines(DOCUMENT) if suspects.match(line)]
     assert [line for line in lines if not EXAMPLE.fullmatch(line)] == []
@@ -151,18 +151,21 @@ def test_no_line_of_bytes_escapes_the_check() -> None:
 
 
 def test_every_kind_of_frame_and_letter_has_an_example() -> None:
-    """The document has an example of every kind of frame and of every letter."""
+    """The document has an example of every kind of frame, and of every letter."""
     assert {example.word for example in EXAMPLES} == FRAMES.keys() | SENT_AS_IT_IS.keys()
 
 
 def test_the_ten_commands_of_the_appendix_are_shown_under_their_names() -> None:
-    """The ten commands have the bytes that are printed in the manual."""
+    """The document shows the ten commands of the manual's appendix, each with its printed bytes."""
     shown = {example.remark: example.data.hex(" ").upper() for example in EXAMPLES}
     assert {name: shown.get(name) for name in APPENDIX} == APPENDIX
 
 
 def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None:
-    """The driver encodes the motion in an example's remark as the bytes of the example."""
+    """Some examples have a motion in SI units as a remark.
+
+    The driver encodes it as the example's bytes.
+    """
     wishes = [
         (example, [float(part.split()[0]) for part in example.remark.split(",")])
         for example in EXAMPLES
@@ -176,7 +179,10 @@ def test_the_commands_in_si_units_are_what_the_driver_sends_by_default() -> None
 
 
 def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() -> None:
-    """The bytes of two true frames contain false frames, which the decoder does not return."""
+    """The document shows two true frames whose bytes contain false frames, at the given offsets.
+
+    The decoder returns only the true frames.
+    """
     in_section = examples(section("Why framing is hard"))
     false = [example for example in in_section if example.remark.startswith("false")]
     true = [example for example in in_section if example not in false]
@@ -189,7 +195,7 @@ def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() 
 
 
 def test_the_parameters_that_carry_a_decision_exist_with_the_stated_defaults() -> None:
-    """The document's table of decisions agrees with the driver's declared parameters."""
+    """The document has a table of decisions, with parameters. The driver has the same defaults."""
     rows = re.findall(r"^\| `([a-z]\w+)` \| ([^|]+?) \|", DOCUMENT, re.MULTILINE)
     assert {name for name, _ in rows} == DECISIONS
     for name, value in rows:

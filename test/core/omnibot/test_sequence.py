@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the board's counters reveal: losses, wraps, pauses and restarts."""
+"""Tests of what the board's counters show: losses, wraps, pauses and restarts."""
 
 import pytest
 from hypothesis import given
@@ -12,7 +12,7 @@ counts = st.integers(0, 255)
 
 
 def begun(count: int) -> Sequence:
-    """Return a sequence that has seen one delta, with this count, at 100 s."""
+    """Return a sequence that has received one delta, with the count ``count``, at 100 s."""
     sequence = Sequence()
     sequence.delta(count, 100.0)
     return sequence
@@ -22,20 +22,30 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """A gap is counted correctly even if an arrival time is wrong by up to 0.4 s."""
+    """Deltas are lost, and the arrival time of the next one is wrong by up to 0.4 s.
+
+    The lost deltas are counted correctly, also if the count has wrapped.
+    """
     step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
     assert step == Step(lost)
 
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """If a host hangs for up to five seconds, the next delta does not count as a gap."""
+    """The host hangs for up to five seconds, and the next delta has the next count.
+
+    No delta is lost.
+    """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """A delta after a pause has an unknown duration; 0 after 255 may also be a restart."""
+    """The board is paused, and then continues its count.
+
+    The duration of the first delta is unknown. If the count is 0 after 255, the board may also have
+    restarted.
+    """
     sequence = begun(count)
     sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
@@ -44,9 +54,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """Two explanations of a count are compared: a restart, and a count that continues.
+    """After a pause, a delta has any count.
 
-    The one with fewer lost deltas is accepted; if both have equally many, it is the restart.
+    Either the board has restarted, or the old count continues. The explanation with fewer lost
+    deltas is accepted. If both have equally many, it is the restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -57,7 +68,10 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """A count of 0 after two seconds fits no continued count, so the board has restarted."""
+    """Two seconds after a delta, a delta with the count 0 comes.
+
+    The old count could not be 0 by then. So the board has restarted.
+    """
     assert begun(count).delta(0, 102.0).restarted
 
 
@@ -67,7 +81,10 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
-    """The TTL side is unplugged for minutes, and the board's clock is 1 % slow or fast."""
+    """The serial line is unplugged for minutes, and the board's clock is 1 % slow or fast.
+
+    The lost deltas are counted correctly, and no restart is assumed.
+    """
     sequence = begun(100)
     passed = round(elapsed_s / 0.04 * (1 + drift))
     step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
@@ -78,7 +95,10 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """In 120 s, a board whose clock is 1 % fast sends 30 more deltas than the time suggests."""
+    """The board's clock is 1 % fast. In 120 s it sends 30 more deltas than the time suggests.
+
+    The 3029 lost deltas are counted correctly.
+    """
     sequence = Sequence()
     sequence.delta(100, 0.0)
     assert sequence.delta((100 + 3030) % 256, 120.0) == Step(3029)
@@ -86,7 +106,7 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 
 @pytest.mark.parametrize("wraps", [0, 1, 3])
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
-    """A false count near zero looks like a restart; the next true delta refutes this."""
+    """A false delta with a count near zero looks like a restart. The next true delta refutes it."""
     sequence = begun(88)
     passed = 1 + 256 * wraps
     assert sequence.delta(1, 100.02 + 10.24 * wraps, imus=1).restarted
@@ -95,7 +115,7 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 
 
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
-    """If a pose has shown that deltas were lost, the next delta does not count them again."""
+    """A pose shows that three deltas were lost. The next delta does not count them again."""
     sequence = Sequence()
     for count in range(10):
         sequence.delta(count, count * 0.04)
@@ -108,7 +128,10 @@ def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_wit
 
 
 def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
-    """Twelve deltas are missing: two poses reveal five each, and the next delta the other two."""
+    """Twelve deltas are lost.
+
+    Two poses show five of them each, so the next delta counts only two.
+    """
     sequence = Sequence()
     for count in range(10):
         sequence.delta(count, count * 0.04)
@@ -120,7 +143,11 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """Two seconds after 205, a count of 0 may be a continued SEQ; the pose counter decides."""
+    """Two seconds after the count 205, a delta has the count 0.
+
+    A continued count would be 0 too, because 50 deltas fit into this time. The next pose has the
+    count 0 as well, which shows a restart.
+    """
     sequence = Sequence()
     for count in range(206):
         sequence.delta(count, count * 0.04)
@@ -134,7 +161,10 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
-    """With a pose after every second delta, a pose says nothing about lost deltas."""
+    """The board sends a pose after every second delta.
+
+    Such a pose says nothing about lost deltas.
+    """
     sequence = Sequence()
     for count in range(20):
         assert sequence.delta(count, count * 0.04) == Step(0)
@@ -143,7 +173,10 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """A pose counter that begins again is not a gap: a gap of this size would take longer."""
+    """The pose counter begins at zero again.
+
+    As a gap this would take longer, so no delta is lost.
+    """
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -153,14 +186,20 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnect, a count that fits neither a restart nor a gap is another board's."""
+    """After a reconnect, the count fits neither a restart nor a gap, so it is another board.
+
+    This is treated like a restart.
+    """
     sequence = begun(7)
     sequence.reconnect()
     assert sequence.delta(200, 103.0) == Step(0, None, restarted=True)
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """A false delta comes too early; the true one has the same count. This is not a wrap."""
+    """A false delta comes too early, and the true delta has the same count.
+
+    No delta is counted as lost.
+    """
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)
     assert sequence.delta(10, 100.04, imus=2) == Step(0)
@@ -169,7 +208,11 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """If the host's clock stood still, the count is ahead of time; the next count confirms it."""
+    """While the host's clock stood still, 100 deltas were lost.
+
+    So the next count is far ahead of the time. The lost deltas are counted when the delta after it
+    confirms the count.
+    """
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
@@ -177,7 +220,10 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
 
 
 def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
-    """A false count is near zero, but the next true delta continues the old count."""
+    """A false delta has a count near zero.
+
+    The next true delta continues the old count, without losses.
+    """
     sequence = begun(88)
     assert sequence.delta(1, 100.02, imus=1).restarted
     assert sequence.delta(89, 100.04, imus=2) == Step(0)
@@ -185,7 +231,10 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """The decoder may hold a pose and release it late, so the next delta may follow at once."""
+    """A pose shows that a delta was lost. The decoder may have held the pose for a while.
+
+    So the next delta may follow at once, and no further delta is counted as lost.
+    """
     sequence = Sequence()
     for count in range(11):
         sequence.delta(count, count * 0.04, imus=4)
@@ -199,7 +248,10 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """A continued count would mean many lost deltas, but only four IMU frames have arrived."""
+    """After 3 s of silence, a delta has the count 0, but only four IMU frames have arrived.
+
+    A continued count would mean that many deltas were lost. So the board has restarted.
+    """
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted
