@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulator as a separate program: start it, type into its console, read what it prints."""
+"""The simulator as a separate program: functions to start it, type into its console and read it."""
 
 import os
 import subprocess
@@ -23,14 +23,14 @@ RUN_MODULE = (
 def simulator(
     *arguments: str, stdin: int | IO[str] = subprocess.PIPE
 ) -> AbstractContextManager[subprocess.Popen[str]]:
-    """Run the simulator as a user does; kill it if the test leaves it running."""
+    """Run the simulator as a user does. Kill it if the test leaves it running."""
     return _running(["-m", "omnibot_driver.simulator", *arguments], stdin)
 
 
 def toy(
     name: str, *arguments: str, stdin: int | IO[str] = subprocess.PIPE
 ) -> AbstractContextManager[subprocess.Popen[str]]:
-    """Run the simulator with a toy board: a module of the tests, by its name."""
+    """Run the simulator with a toy board, which is a module of the tests with this name."""
     return _running(["-c", RUN_MODULE, name, *arguments], stdin)
 
 

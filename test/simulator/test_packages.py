@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Rules for imports between the packages of the simulator."""
+"""Test of the rules for imports between the packages of the simulator."""
 
 import ast
 from pathlib import Path
@@ -15,7 +15,6 @@ PACKAGE = simulator.__name__
 
 
 def imported(folder: Path) -> set[str]:
-    """Return the modules that the modules in this folder import."""
     return {
         node.module
         for path in folder.rglob("*.py")
@@ -26,7 +25,7 @@ def imported(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize("name", ["common", *boards()])
 def test_a_package_imports_itself_and_what_all_share(name: str) -> None:
-    """Each board can be removed without breaking another, as no board imports another."""
+    """A board's package imports only itself and ``common``, so any board can be removed."""
     allowed = (f"{PACKAGE}.common", f"{PACKAGE}.{name}")
     ours = {module for module in imported(FOLDER / name) if module.startswith(PACKAGE)}
     assert not {module for module in ours if not module.startswith(allowed)}

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulator as a separate program, with toy boards."""
+"""Tests of the simulator as a separate program, with toy boards."""
 
 import json
 import os
@@ -18,7 +18,10 @@ from omnibot_driver.simulator.__main__ import boards, main, run
 
 
 def test_the_console_helps_and_says_what_it_does_not_know() -> None:
-    """The help and the message on an unknown word go to stderr, as stdout is for answers only."""
+    """A user types ``help`` and an unknown word.
+
+    The texts go to stderr, as stdout is for answers.
+    """
     with toy("toy_udp") as process:
         line(process)
         out, err = process.communicate("help\nfly\nquit\n", timeout=PATIENCE_S)
@@ -29,9 +32,9 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """After a signal, the exit code is 0, no traceback is printed, and links are removed.
+    """The program gets a signal. It removes its links and ends with code 0, without a traceback.
 
-    A closed stdin does not end the program.
+    The end of its input has not ended it before.
     """
     link = tmp_path / "toy"
     with toy("toy_lines", "--link", str(link), stdin=subprocess.DEVNULL) as process:
@@ -47,7 +50,7 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
 def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The error message names the unknown board and lists the boards that exist."""
+    """A user names an unknown board. The error message lists the boards that exist."""
     assert main(["--board", "zeppelin", "--wings", "2"]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
@@ -56,14 +59,14 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_the_boards_are_the_packages_beside_what_they_share() -> None:
-    """The simulator finds the package of a new board without a list of boards."""
+    """Each package beside ``common`` is a board, so a new board is found without a list."""
     folder = Path(simulators.__file__).parent
     packages = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert {*boards(), "common"} == packages
 
 
 def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path) -> None:
-    """For a board with two lines, a single ``--link`` makes a link for each line.
+    """A user gives one ``--link`` for a board with two lines. Each line gets a link.
 
     The hint has all port parameters of the driver.
     """
@@ -78,9 +81,9 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 
 
 def test_a_board_on_the_network_prints_its_address() -> None:
-    """A board on the network has options for network faults.
+    """A board on the network prints its UDP address, and has options for network faults.
 
-    The simulator rejects ``--link`` and ``--flip`` for it.
+    It has no options for serial lines, such as ``--link`` and ``--flip``.
     """
     with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
         address = line(process)
@@ -97,7 +100,7 @@ def test_a_board_on_the_network_prints_its_address() -> None:
 def test_a_link_that_cannot_be_made_is_one_sentence_and_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """An impossible link gives one line on stderr, without traceback, and exit code 1.
+    """A link is impossible. The program prints one line on stderr and ends with code 1.
 
     The signal handlers are restored.
     """

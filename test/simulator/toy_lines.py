@@ -2,8 +2,9 @@
 
 """A simulated toy board with two serial channels: one for its drive, one for a steered wheel.
 
-It receives ``go V W`` (m/s, rad/s) and ``angle DEGREES``, and sends ``odo X Y YAW`` (m, m, rad)
-every 400 ms and ``fwl DEGREES`` every 20 ms, each as a line.
+It receives the lines ``go V W``, in m/s and rad/s, and ``angle DEGREES``.
+
+It sends the lines ``odo X Y YAW``, in m and rad, every 400 ms, and ``fwl DEGREES`` every 20 ms.
 """
 
 import argparse
@@ -17,7 +18,7 @@ CHANNELS = (Channel("drive"), Channel("front", "front_port"))
 
 
 class ToyLines:
-    """A board with two serial lines; ``seed`` is stored, but has no effect."""
+    """A board with two serial lines. ``seed`` is stored, but has no effect."""
 
     channels, tick_s = CHANNELS, 0.02
 

@@ -2,9 +2,12 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-The reply to ``odo`` is ``ok X`` (m). ``move X`` drives X m at 0.5 m/s; its reply ``ok X`` comes at
-the end of the move. ``stop`` ends the move, which is then answered as failed, and ``stop`` is
-acknowledged. A second ``move`` during a move fails.
+``odo``: the reply is ``ok X``, the position in m.
+
+``move X``: drives X m at 0.5 m/s. The reply ``ok X`` comes at the end. A second ``move`` in this
+time fails.
+
+``stop``: ends the move. The move is then answered as failed, and ``stop`` with ``ok``.
 """
 
 import argparse
@@ -16,7 +19,7 @@ CHANNELS = (Channel(datagrams=True),)
 
 
 class ToyServer:
-    """A server that executes one move at a time; ``requests`` holds all datagrams received."""
+    """A server that executes one move at a time. ``requests`` holds all datagrams received."""
 
     channels, tick_s = CHANNELS, 0.01
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The faulty serial line of the simulated boards."""
+"""Tests of the serial line with faults, through which a simulated board sends."""
 
 import pytest
 import toy_lines
@@ -19,7 +19,7 @@ def bits(value: int) -> int:
 
 
 def test_a_line_without_faults_changes_nothing() -> None:
-    """On a line without faults, the fault counters stay at zero."""
+    """A line without faults carries all bytes unchanged, and its fault counters stay at zero."""
     line = FaultyLine(LineFaults())
     assert line.carry(SENT) == SENT
     assert (line.lost, line.flipped) == (0, 0)
@@ -29,7 +29,10 @@ def test_a_line_without_faults_changes_nothing() -> None:
 def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
     cuts: list[int], seed: int
 ) -> None:
-    """The same bytes are lost or changed in chunks of any size, even within a burst of losses."""
+    """The same bytes are sent whole and in chunks.
+
+    The same ones are lost or changed, also in bursts.
+    """
     faults, data = LineFaults(lose=0.01, burst=0.005, flip=0.01), SENT[:2000]
     line = FaultyLine(faults, seed)
     parts = [
@@ -39,14 +42,14 @@ def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
 
 
 def test_single_bytes_are_lost_at_the_given_rate() -> None:
-    """At a rate of 0.01, one byte in a hundred is lost, and none is changed."""
+    """With a loss rate of 0.01, one byte in a hundred is lost, and no byte is changed."""
     line = FaultyLine(LineFaults(lose=0.01))
     assert len(line.carry(SENT)) == len(SENT) - line.lost
     assert line.lost == pytest.approx(len(SENT) / 100, rel=0.2)
 
 
 def test_bursts_of_1_to_200_bytes_are_lost() -> None:
-    """A burst loses 100.5 bytes on average."""
+    """Bursts of 1 to 200 bytes are lost. A burst has 100.5 bytes on average."""
     line = FaultyLine(LineFaults(burst=0.0005))
     arrived = line.carry(SENT)
     assert len(arrived) == len(SENT) - line.lost
@@ -54,7 +57,7 @@ def test_bursts_of_1_to_200_bytes_are_lost() -> None:
 
 
 def test_a_flip_changes_one_bit_and_no_length() -> None:
-    """At a rate of 0.01, one byte in a hundred is changed."""
+    """With a flip rate of 0.01, one bit is changed in one byte of a hundred. No byte is lost."""
     line = FaultyLine(LineFaults(flip=0.01))
     arrived = line.carry(SENT)
     changes = [bits(was ^ now) for was, now in zip(SENT, arrived, strict=True)]
@@ -64,7 +67,10 @@ def test_a_flip_changes_one_bit_and_no_length() -> None:
 
 @pytest.mark.parametrize("rate", ["-0.1", "1.1", "nan", "often"])
 def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
-    """A rate outside 0 to 1 is refused before anything starts, and the message gives the range."""
+    """A user gives a rate outside 0 to 1.
+
+    The program refuses it, and the message says the range.
+    """
     for name, toy in (("lose", toy_lines), ("flip", toy_lines), ("duplicate", toy_udp)):
         with pytest.raises(options.OptionError, match="give a number from 0 to 1"):
             options.from_words([f"--{name}={rate}"], toy)
@@ -72,6 +78,6 @@ def test_a_rate_that_is_not_a_chance_is_refused(rate: str) -> None:
 
 @pytest.mark.parametrize("delay", ["-0.1", "61", "nan", "long"])
 def test_a_delay_that_nobody_waits_for_is_refused(delay: str) -> None:
-    """A delay that is not a number from 0 to 60 (in s) is refused."""
+    """A user gives a delay that is not a number from 0 to 60, in s. The program refuses it."""
     with pytest.raises(options.OptionError, match="give seconds from 0 to 60"):
         options.from_words([f"--delay={delay}"], toy_udp)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The faulty network of a simulated board, in board time."""
+"""Tests of the network with faults around a simulated board, in the board's time."""
 
 import pytest
 from hypothesis import given
@@ -21,7 +21,7 @@ def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
 
 
 def test_a_good_network_hands_over_at_once_and_in_order() -> None:
-    """On a network without faults, no datagram is lost or duplicated, and none is late."""
+    """A network without faults delivers each datagram at once, once and in order."""
     network = FaultyNetwork()
     network.to_board.send(b"hello", 1.0)
     assert network.to_board.arrived(1.0) == [b"hello"]
@@ -31,7 +31,10 @@ def test_a_good_network_hands_over_at_once_and_in_order() -> None:
 
 
 def test_datagrams_are_lost_at_the_given_rate() -> None:
-    """Losses toward the board are independent of losses from the board."""
+    """With a loss rate of 0.1, one datagram in ten is lost.
+
+    The two directions lose different ones.
+    """
     network = FaultyNetwork(NetworkFaults(lose=0.1))
     there, back = through(network.to_board), through(network.from_board)
     assert set(there) <= set(SENT)
@@ -41,7 +44,10 @@ def test_datagrams_are_lost_at_the_given_rate() -> None:
 
 
 def test_datagrams_come_twice_at_the_given_rate() -> None:
-    """If there is no delay, a copy of a datagram directly follows the original."""
+    """With a duplicate rate of 0.1, one datagram in ten comes twice.
+
+    If there is no delay, the copy directly follows the original.
+    """
     path = NetworkPath(NetworkFaults(duplicate=0.1), "seed")
     arrived = through(path)
     assert len(arrived) - len(SENT) == path.duplicated == pytest.approx(500, rel=0.2)
@@ -49,7 +55,10 @@ def test_datagrams_come_twice_at_the_given_rate() -> None:
 
 
 def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
-    """With polls every 10 ms and delays up to 50 ms, each datagram is at most 60 ms late."""
+    """Datagrams have random delays of up to 50 ms. Some overtake others, but all arrive in time.
+
+    The board is polled every 10 ms, so a datagram is at most 60 ms late.
+    """
     path = NetworkPath(NetworkFaults(delay_s=0.05), "seed")
     for number in range(200):
         now_s = number * 0.01
@@ -62,7 +71,7 @@ def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
 
 @given(st.integers(0, 5))
 def test_equal_seeds_meet_equal_fates(seed: int) -> None:
-    """Equal seeds give equal faults, and another seed gives other faults."""
+    """Networks with the same seed have the same faults. Another seed gives other faults."""
     faults = NetworkFaults(lose=0.1, duplicate=0.1, delay_s=0.1)
     first = through(FaultyNetwork(faults, seed).to_board)
     assert first == through(FaultyNetwork(faults, seed).to_board)

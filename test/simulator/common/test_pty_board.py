@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Any board with one serial line, in real time behind a real pseudo-terminal."""
+"""Tests of a board with one serial line, in real time behind a real pseudo-terminal."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -18,7 +18,10 @@ PATIENCE_S = 20.0
 
 
 class Ticker:
-    """A board that sends its tick number in each tick, as 26 bytes; ``sent`` holds all bytes."""
+    """A board that sends its tick number in each tick, as 26 bytes.
+
+    ``sent`` holds all bytes sent.
+    """
 
     channels, tick_s = (Channel(),), 0.01
 
@@ -44,14 +47,17 @@ class Ticker:
 
 
 def all_of(port: int) -> Iterator[bytes]:
-    """Yield all bytes that a terminal holds, in pieces, as one read may not return all."""
+    """Yield all bytes that a terminal holds, in pieces. One read may not return all of them."""
     with suppress(BlockingIOError):
         while data := os.read(port, 8192):
             yield data
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """If no program reads, the board continues; the terminal keeps only the oldest bytes."""
+    """No program reads the terminal.
+
+    The board continues, and the terminal keeps only the oldest bytes.
+    """
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: pty.dropped > 100, PATIENCE_S)
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -67,7 +73,7 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 class Clock:
-    """A replacement of the computer's clock that advances only when the board waits or works."""
+    """A replacement of the computer's clock. It advances only when the board waits or computes."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.now_s = 0.0
@@ -102,7 +108,10 @@ class Clock:
 def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Although every 50th tick takes 25 ms to compute, the 999th tick begins at 9.99 s."""
+    """Every 50th tick takes 25 ms to compute, longer than a tick.
+
+    The 999th tick still begins at 9.99 s.
+    """
     clock = Clock(monkeypatch)
     board = clock.board(lambda tick: 0.025 if tick % 50 == 0 else 0.003)
     with PtyBoard(board) as pty:
@@ -111,7 +120,10 @@ def test_a_slow_machine_delays_ticks_but_does_not_make_the_time_drift(
 
 
 def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After the computer slept for an hour, the board continues at one tick per 10 ms."""
+    """The computer sleeps for an hour.
+
+    The board then continues at one tick per 10 ms, not faster.
+    """
     clock = Clock(monkeypatch)
     with PtyBoard(clock.board(lambda tick: 3600.0 if tick == 10 else 0.0)) as pty:
         assert pty.wait_for(lambda board: board.tick >= 30, PATIENCE_S)
@@ -119,15 +131,15 @@ def test_a_long_standstill_is_not_made_up_for(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_waiting_for_what_does_not_come_ends_with_false() -> None:
-    """A wait for a condition that is never true returns False after its timeout of 0.05 s."""
+    """A test waits 0.05 s for a condition that is never true. The wait returns False."""
     with PtyBoard(Ticker()) as pty:
         assert not pty.wait_for(lambda board: False, 0.05)
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """If a board's thread fails, a wait for the board raises RuntimeError; so does closing it.
+    """The thread of a board fails. Both a wait for the board and its closing raise RuntimeError.
 
-    The cause of the RuntimeError is the exception of the thread.
+    The exception of the thread is the cause of the RuntimeError.
     """
 
     class BrokenBoard(Ticker):
@@ -146,13 +158,13 @@ def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
 
 @pytest.mark.usefixtures("nothing_left_behind")
 def test_no_thread_and_no_descriptor_is_left_behind() -> None:
-    """After its end, a board has left no thread and no file descriptor in the process."""
+    """A board is closed. No thread and no file descriptor of it remain in the process."""
     with PtyBoard(Ticker()) as pty:
         assert pty.wait_for(lambda board: board.tick > 2, PATIENCE_S)
 
 
 def test_a_link_leads_to_the_terminal_and_goes_with_it(tmp_path: Path) -> None:
-    """The symbolic link to the terminal exists exactly while the board runs."""
+    """The symbolic link to the terminal exists as long as the board runs."""
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)) as pty:
         assert os.readlink(link) == pty.path
@@ -168,7 +180,10 @@ def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
 
 
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
-    """If a second simulator replaces the link, the first one does not remove it when it ends."""
+    """A second simulator replaces the link of the first one.
+
+    The first one ends and keeps the link.
+    """
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)):
         second = PtyBoard(Ticker(), str(link))
@@ -181,7 +196,10 @@ def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "link to a file"])
 def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> None:
-    """A file at the link's path is kept; the message gives advice, and no descriptor is left."""
+    """A file has the name that the link would have.
+
+    The simulator keeps the file and ends with advice. No file descriptor is left open.
+    """
     precious = tmp_path / "precious"
     precious.write_text("data")
     link = precious
@@ -199,7 +217,10 @@ def test_a_real_file_is_never_replaced_by_a_link(tmp_path: Path, kind: str) -> N
 
 
 def test_a_link_that_cannot_be_made_is_named_with_what_to_do(tmp_path: Path) -> None:
-    """If the folder of the link does not exist, the error message names the link and what to do."""
+    """The folder of the link does not exist.
+
+    The error message names the link and says what to do.
+    """
     with (
         pytest.raises(FileNotFoundError, match=r"nowhere/board .*choose a folder that exists"),
         PtyBoard(Ticker(), tmp_path / "nowhere/board"),

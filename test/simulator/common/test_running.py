@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The thread of a simulated board on a computer that is too busy to run it in time."""
+"""Test of a simulated board's thread on a computer that is too busy to run it in time."""
 
 import time
 from collections.abc import Iterable
@@ -14,7 +14,10 @@ LATE_S = 0.7
 
 
 class Motor:
-    """A board that is driven until it receives a stop; ``driven``: number of ticks until then."""
+    """A board that drives until it receives a stop.
+
+    ``driven``: the number of ticks until then.
+    """
 
     channels, tick_s = (Channel(),), 0.01
 
@@ -37,7 +40,7 @@ class Motor:
 
 
 class LateBoard(RunningBoard[Motor]):
-    """A board whose thread does not run for ``LATE_S``; a stop arrives in this time."""
+    """A board whose thread does not run for ``LATE_S``, while a stop arrives."""
 
     def __init__(self) -> None:
         super().__init__(Motor())
@@ -59,9 +62,10 @@ class LateBoard(RunningBoard[Motor]):
 def test_what_came_while_the_thread_was_late_precedes_the_ticks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """If a stop arrives while the thread does not run, it acts before the ticks that are due.
+    """A stop arrives while the board's thread does not run.
 
-    A real board would not drive on while its computer is busy.
+    It acts before the ticks that are overdue. A real board would not drive on while the computer is
+    busy.
     """
     board = LateBoard()
     monkeypatch.setattr(time, "monotonic", lambda: board.now_s)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards with several channels or datagrams, in real time behind real terminals and sockets."""
+"""Tests of boards with several lines or with datagrams, in real time."""
 
 import os
 import socket
@@ -31,14 +31,17 @@ def client() -> Iterator[socket.socket]:
 
 
 def place(address: str) -> tuple[str, int]:
-    """Return host and port of an address as the simulator prints it."""
+    """Return the host and the port of an address, which has the form that the simulator prints."""
     scheme, host, port = address.split(":")
     assert scheme == "udp"
     return host.removeprefix("//"), int(port)
 
 
 def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
-    """Commands and reports of one serial channel do not appear on the other channel."""
+    """A board has two serial channels.
+
+    Each has its own terminal, with only its own commands and reports.
+    """
     with ServedBoard(ToyLines()) as served, ExitStack() as stack:
         ports = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in served.addresses]
         for port in ports:
@@ -52,7 +55,11 @@ def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
 
 
 def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> None:
-    """The name of each link ends in a hyphen and the channel; the links are removed at the end."""
+    """A user gives one link for a board with two terminals.
+
+    Each terminal gets a link with its own name. The name ends in a hyphen and the name of the
+    channel. At the end the links are removed.
+    """
     with ServedBoard(ToyLines(), links=[tmp_path / "board"]) as served:
         assert served.names == [str(tmp_path / "board-drive"), str(tmp_path / "board-front")]
         assert [os.readlink(name) for name in served.names] == served.addresses
@@ -60,14 +67,14 @@ def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> N
 
 
 def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
-    """If several links are given, they are for the channels, in this order."""
+    """A user gives one link for each terminal. The links are used in the order of the channels."""
     links = [tmp_path / "a", tmp_path / "b"]
     with ServedBoard(ToyLines(), links=links) as served:
         assert [os.readlink(link) for link in links] == served.addresses
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """Too many links are refused, and so are a link whose path exists and one for a UDP socket."""
+    """The program refuses too many links, a link named like a file, and one to a UDP port."""
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
         open_carriers(ToyLines.channels, three)
@@ -80,7 +87,10 @@ def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path
 
 
 def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
-    """A reply is one datagram, and goes to the program that has sent the request."""
+    """Two programs send requests over UDP.
+
+    Each gets the reply to its own request, as one datagram.
+    """
     with ServedBoard(ToyServer()) as served:
         client.sendto(b"odo", place(served.addresses[0]))
         assert client.recv(100) == b"ok 0.000"
@@ -91,7 +101,10 @@ def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
 
 
 def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -> None:
-    """Datagrams that wait at the same time, even empty ones, are neither joined nor dropped."""
+    """Several datagrams wait at the same time, one of them empty.
+
+    The board gets each of them separately.
+    """
     with ServedBoard(ToyServer()) as served:
         with served.lock:  # they wait in the socket
             for data in (b"odo", b"", b"odo"):
@@ -100,7 +113,10 @@ def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -
 
 
 def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
-    """A datagram that a board sends before any request has no receiver, so it is dropped."""
+    """A board sends a datagram before any request has come.
+
+    It has no receiver, so it is dropped.
+    """
 
     class Talking(ToyServer):
         def advance(self) -> list[tuple[int, bytes]]:
@@ -111,9 +127,9 @@ def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
 
 
 def test_datagram_channels_stand_on_ports_in_a_row() -> None:
-    """The UDP ports of the channels are consecutive, and only on the loopback address.
+    """The channels of a board have UDP ports in a row, only on the loopback address.
 
-    The first port can be chosen.
+    A user can choose the first port.
     """
     sockets = open_sockets(2)
     first, second = (place(one.address) for one in sockets)
@@ -128,7 +144,7 @@ def test_datagram_channels_stand_on_ports_in_a_row() -> None:
 
 
 def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
-    """If a UDP port is in use or impossible, one sentence names the ports and what to do."""
+    """A UDP port is in use or impossible. One sentence names the ports and says what to do."""
     with closing(open_sockets(1)[0]) as taken:
         number = place(taken.address)[1]
         with pytest.raises(OSError, match=rf"UDP port {number} \(Address already in use\)"):
@@ -140,7 +156,7 @@ def test_a_port_that_is_taken_or_does_not_exist_is_one_sentence() -> None:
 
 
 def test_the_facts_add_what_became_of_the_lines() -> None:
-    """A served board adds counts of dropped data and of the lines' faults to the board's facts."""
+    """The facts of a running board include the counts of dropped, lost and doubled data."""
     with ServedBoard(ToyServer()) as served, served.lock:
         assert served.facts == {
             "x_m": 0.0,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards with several channels or datagrams behind their lines, in simulated time."""
+"""Tests of boards with several lines or with datagrams, in simulated time."""
 
 import pytest
 from toy_lines import DRIVE, FRONT, ToyLines
@@ -12,7 +12,10 @@ from omnibot_driver.simulator.common.wired import WiredBoard
 
 
 def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
-    """A board obeys a command that comes in two pieces, with data of another channel in between."""
+    """A command comes in two pieces, with data of another channel in between.
+
+    The board obeys it.
+    """
     wired = WiredBoard(ToyLines())
     wired.receive(b"go 0.", 0.0, DRIVE)
     wired.receive(b"angle 30\n", 0.0, FRONT)
@@ -22,7 +25,7 @@ def test_each_channel_has_its_own_bytes_in_any_pieces() -> None:
 
 
 def test_each_channel_has_its_own_faults() -> None:
-    """The line of the front wheel loses all bytes; the line of the drive loses none."""
+    """The line of the front wheel loses all bytes. The line of the drive still loses none."""
     cut = FaultyLine(LineFaults(lose=1.0))
     wired = WiredBoard(ToyLines(), [FaultyLine(), cut])
     packets = [packet for _ in range(20) for packet in wired.advance()]
@@ -31,7 +34,10 @@ def test_each_channel_has_its_own_faults() -> None:
 
 
 def test_a_request_is_answered_when_its_move_is_done() -> None:
-    """The reply to ``move`` comes at its end; meanwhile another move fails and ``odo`` succeeds."""
+    """The reply to ``move`` comes at the end of the move.
+
+    Before that, another ``move`` fails, and ``odo`` is answered at once.
+    """
     wired = WiredBoard(ToyServer())
     wired.receive(b"move 0.02", 5.0)
     wired.receive(b"odo", 5.0)
@@ -45,7 +51,10 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """Delays are in board time, so a delay of 10 s passes without waiting."""
+    """Datagrams are delayed by up to 10 s of board time. The test does not wait in real time.
+
+    Each datagram reaches the board once, twice or never.
+    """
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
     wired = WiredBoard(board, [network])
@@ -60,7 +69,10 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """A datagram's delay of 1 s is by the caller's clock, which in this test begins at 1000 s."""
+    """A caller sends at 1000 s of its own clock, with a delay of up to 1 s.
+
+    The datagram reaches the board with a time by the caller's clock.
+    """
     at: list[float] = []
 
     class Watch(ToyServer):
@@ -75,7 +87,10 @@ def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
 
 
 def test_lines_that_do_not_match_the_channels_are_a_defect() -> None:
-    """One line for two channels is refused, and so is a line of the wrong kind."""
+    """A program gives one line for two channels, or a line of the wrong kind.
+
+    ValueError is raised.
+    """
     for lines in ([FaultyLine()], [FaultyLine(), FaultyNetwork()]):
         with pytest.raises(ValueError, match="do not match"):
             WiredBoard(ToyLines(), lines)

@@ -11,10 +11,11 @@ BEAT = re.compile(r"(;\d\d)?hbt ")
 
 
 class Rig:
-    """A board and its host.
+    """A simulated board and its host.
 
-    lines: all lines received, with time and port, without line ends.
-    relays: whether the host relays each angle of the front wheel to the drive half.
+    ``lines``: all lines received from the board, without line ends, each with its time and port.
+
+    ``relays``: whether the host relays each angle of the front wheel to the drive half.
     """
 
     def __init__(self, *, firmware: Firmware | None = None, **settings: object) -> None:
@@ -28,17 +29,15 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated time, in s."""
         return self.board.now_s
 
     def booted(self) -> "Rig":
-        """Run for a second after power on, and discard the lines received in this time."""
+        """Run for a second after power-on; discard the lines that came in this time."""
         self.run(1.0)
         self.lines.clear()
         return self
 
     def say(self, port: int, *texts: str) -> None:
-        """Send these lines to a port."""
         for text in texts:
             self.board.receive(text.encode("latin-1") + b"\n", self.now, port)
 
@@ -64,7 +63,7 @@ class Rig:
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
-        """Send the same ``rc`` line to both halves; run for ``seconds``, with the angle relayed."""
+        """Send an ``rc`` line to both halves; run for ``seconds``, with the front angle relayed."""
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)
         self.say(DRIVE, text)

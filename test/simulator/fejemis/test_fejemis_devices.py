@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Devices of the simulated Fejemis: brush, lift, LEDs, distances, IMU, stored settings."""
+"""Tests of the simulated Fejemis's brush, lift, LEDs, distance sensors, IMU and stored settings."""
 
 from math import degrees, pi
 
@@ -9,7 +9,10 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """The lift takes 12 s from end to end at 6 V; it stops after the given time, or with 0 V."""
+    """The lift takes 12 s from end to end at 6 V. It stops after the given time, or at 0 V.
+
+    The brush is switched on and off.
+    """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")
     rig.run(1.0)
@@ -28,7 +31,7 @@ def test_brush_and_lift() -> None:
 
 
 def test_the_band_and_single_leds() -> None:
-    """Each colour of the LEDs is limited to 0..255."""
+    """The host sets the whole LED band and single LEDs. Each colour is limited to 0..255."""
     rig = Rig().booted()
     rig.say(FRONT, "ledb 10 20 300", "led 3 1 2 3")
     rig.run(0.01)
@@ -42,9 +45,9 @@ def test_the_band_and_single_leds() -> None:
 
 
 def test_distances_to_a_wall() -> None:
-    """All sensors measure a wall at 0.5 m.
+    """All sensors measure the distance to a wall at 0.5 m.
 
-    Without a wall they report the ends of their ranges; the sonar reports 0.
+    Without a wall, each reports the end of its range, but the sonar reports 0.
     """
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]
@@ -57,7 +60,10 @@ def test_distances_to_a_wall() -> None:
 
 
 def test_the_sonar_measures_when_it_is_triggered() -> None:
-    """``hcsr`` triggers the sonar; without it the sonar repeats the last distance."""
+    """The sonar measures only when ``hcsr`` triggers it.
+
+    Before that, it reports the old distance.
+    """
     rig = Rig(front_m=2.0).booted()
     rig.drive("rc 2 0.5 0", 2.0)
     assert rig.ask(DRIVE, "sr04i") == ["sr04 2.000"]
@@ -66,7 +72,10 @@ def test_the_sonar_measures_when_it_is_triggered() -> None:
 
 
 def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
-    """``gyroc`` stores the mean reading of the gyro as its offset, even while the robot turns."""
+    """``gyroc`` measures the gyro for a second.
+
+    It stores the mean as offset, even if the robot turns.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -79,7 +88,10 @@ def test_the_gyro_is_calibrated_in_a_second_whether_it_stands_or_not() -> None:
 
 
 def test_the_accelerometer_is_calibrated_as_level() -> None:
-    """``acccal2`` calibrates for a level board; ``acccal`` sets the given offsets and scales."""
+    """``acccal2`` calibrates the accelerometer as if the board were level.
+
+    ``acccal`` sets the given offsets and scales.
+    """
     rig = Rig(accel_noise_mps2=0.0).booted()
     rig.say(DRIVE, "acccal2")
     rig.run(1.2)
@@ -91,7 +103,7 @@ def test_the_accelerometer_is_calibrated_as_level() -> None:
 
 
 def test_the_yaw_of_the_imu_follows_the_robot() -> None:
-    """The yaw of the IMU is that of the robot, since the gyro in this test has no bias."""
+    """The gyro has no bias, and the robot drives a curve. The IMU reports the robot's yaw."""
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 0.0)).booted()
     rig.drive("rc 2 0.3 20", 4.0)
     yaw = float(rig.ask(DRIVE, "imuposei")[0].split()[3])
@@ -102,7 +114,10 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """After ``eer`` and ``setid 0`` the gyro has no offset, so the yaw drifts with its bias."""
+    """The host calibrates the gyro, and then ``eer`` or ``setid 0`` loads a configuration.
+
+    It has no offset of the gyro, so the yaw drifts with the gyro's bias.
+    """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
     rig.run(1.2)
@@ -114,7 +129,7 @@ def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_load
 
 
 def test_the_answer_to_confs_has_the_steering_first() -> None:
-    """Both halves take ``confs TRACK STEERING`` but reply with ``confs STEERING TRACK``."""
+    """Both halves receive ``confs TRACK STEERING``, but report ``confs STEERING TRACK``."""
     rig = Rig().booted()
     for port in (DRIVE, FRONT):
         rig.say(port, "confs 0.5 0.6")
@@ -123,7 +138,7 @@ def test_the_answer_to_confs_has_the_steering_first() -> None:
 
 
 def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
-    """``eew`` saves the configuration; ``eer`` and a restart load the saved configuration."""
+    """``eew`` saves the configuration. ``eer`` and a restart load the saved configuration."""
     rig = Rig().booted()
     rig.say(DRIVE, "confw 0.08 0.081 20 64 0.41")
     rig.run(0.01)
@@ -139,7 +154,7 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 
 
 def test_id_zero_erases_the_configuration() -> None:
-    """``setid 0`` erases the configuration, which can be saved only after another ``setid``."""
+    """``setid 0`` erases the configuration. It can be saved again only after another ``setid``."""
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
     rig.run(0.01)
@@ -154,7 +169,7 @@ def test_id_zero_erases_the_configuration() -> None:
 
 
 def test_gains_of_the_steering_count() -> None:
-    """``cssteer`` sets gains in the order in which ``cpsteer`` reports them.
+    """``cssteer`` sets the gains of the steering, in the order in which ``cpsteer`` reports them.
 
     With a lower gain, the steering is slower.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated robot moves by the manual's equations, not with the v and w of an ``rc`` line."""
+"""Tests that the simulated robot moves by the manual's equations, not just as ``rc`` commands."""
 
 from math import atan2, degrees, hypot, radians
 
@@ -31,14 +31,20 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """Speed and turn rate are as calculated by hand; they differ from an ``rc`` line's v and w."""
+    """The robot's speed and turn rate are those of the manual's equations, calculated here by hand.
+
+    They differ from the v and w of the ``rc`` line.
+    """
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)
     assert (right - left) / B == pytest.approx(turn, abs=1e-4)
 
 
 def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
-    """Once its front wheel is at 90°, the robot turns five times as fast as ``rc`` commands."""
+    """``rc`` commands a turn on the spot.
+
+    With its front wheel at 90°, the robot turns five times as fast.
+    """
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 4.0)
     truth = rig.board.truth
@@ -47,14 +53,17 @@ def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
 
 
 def test_from_straight_ahead_a_turn_on_the_spot_surges_forward() -> None:
-    """Until the front wheel is at 90°, both drive wheels turn forward."""
+    """``rc`` commands a turn on the spot while the front wheel is straight.
+
+    Until the front wheel has reached 90°, both drive wheels turn forward.
+    """
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 2.0)
     assert hypot(rig.board.truth.x_m, rig.board.truth.y_m) > 0.15
 
 
 def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
-    """If only the front half gets the ``rc`` line, only the front wheel moves."""
+    """Only the front half gets the ``rc`` line. The front wheel moves, and the robot is at rest."""
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0 20")
     rig.run(2.0)
@@ -63,7 +72,10 @@ def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
 
 
 def test_without_the_angle_drive_goes_straight() -> None:
-    """If the host does not relay the front angle, the drive half assumes a straight front wheel."""
+    """The host does not relay the front angle.
+
+    The drive half assumes that the front wheel is straight.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.5 30")
     rig.run(1.0)
@@ -71,7 +83,7 @@ def test_without_the_angle_drive_goes_straight() -> None:
 
 
 def test_no_command_ends_by_itself() -> None:
-    """The board has no watchdog: without its host, the robot still drives after 20 s."""
+    """The host sends one command and then no more. After 20 s the robot still drives."""
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
     rig.relays = False
@@ -81,7 +93,7 @@ def test_no_command_ends_by_itself() -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
-    """In reverse, mirroring firmware turns the front wheel as for the same curve forward."""
+    """Firmware that mirrors reverse drives steers the front wheel as for the same curve forward."""
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -96,7 +108,7 @@ def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
-    """In reverse, clamping firmware sets the front wheel to 90°, and the robot spins."""
+    """In reverse, firmware that clamps the angle sets the front wheel to 90°. The robot spins."""
     rig = Rig(firmware=Firmware(sums=False, reverse="clamped")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -106,7 +118,7 @@ def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
 
 
 def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
-    """As in the manual, the steering angle reaches 63 % of a small step in 1/12 s."""
+    """The steering angle reaches 63 % of a small step after about 1/12 s, as in the manual."""
     rig = Rig(angle_noise_deg=0.0).booted()
     rig.say(FRONT, "rc 2 1 10")
     wanted = steered_degrees(1.0, radians(10))
@@ -121,7 +133,7 @@ def test_the_steering_follows_a_small_step_at_12_radians_a_second() -> None:
 
 
 def test_the_odometry_of_the_board_is_where_the_robot_is() -> None:
-    """The board's odometry is right here, as the wheels have the sizes that the board assumes."""
+    """The wheels have the sizes that the board assumes. So the board's odometry is right."""
     rig = Rig().booted()
     for text in ("rc 2 0.3 0", "rc 2 0.2 20", "rc 2 0.2 -40"):
         rig.drive(text, 2.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated boards share no code with the driver."""
+"""Test that the simulated Fejemis shares no code with the driver."""
 
 import ast
 from pathlib import Path
@@ -14,7 +14,10 @@ MODULES = sorted(Path(fejemis.__file__).parent.glob("*.py"))
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.name)
 def test_no_module_imports_the_core(path: Path) -> None:
-    """If the simulator used the driver's decoder, no test could detect a misread manual."""
+    """No module of the simulated board imports the driver's core.
+
+    If both had the same decoder, no test could find a manual that was read wrongly.
+    """
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             assert node.module is not None

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the two halves of the simulated Fejemis: functions besides driving, and faults."""
+"""Tests of the two halves of the simulated Fejemis: their functions besides driving, and faults."""
 
 import json
 
@@ -15,7 +15,10 @@ MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def angle_line(rig: Rig) -> tuple[float, int, int]:
-    """Return the angle line: degrees, error flags, and diagnosis without the frame counter."""
+    """Return the front angle in degrees, the error flags, and the diagnosis.
+
+    The diagnosis is without the frame counter.
+    """
     _, degrees, errors, bits = rig.ask(FRONT, "fwli")[0].split()
     return float(degrees), int(errors, 16), int(bits, 16) & 0x7FF
 
@@ -24,7 +27,7 @@ def angle_line(rig: Rig) -> tuple[float, int, int]:
 
 
 def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
-    """After ``stop``, rcSource is -1 in heartbeats, and commands have no effect until ``start``."""
+    """After ``stop``, ``rc`` has no effect until ``start``. The heartbeats show the source -1."""
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.3 0")
     rig.run(0.5)
@@ -40,7 +43,7 @@ def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
 
 
 def test_some_firmware_goes_on_after_start() -> None:
-    """After ``start``, some firmware continues the last command; the manual does not say so."""
+    """Some firmware continues the last command after ``start``. The manual does not mention it."""
     rig = Rig(firmware=Firmware(sums=False, start_resumes=True)).booted()
     rig.say(DRIVE, "rc 2 0.3 0", "stop")
     rig.run(0.5)
@@ -54,9 +57,10 @@ def test_some_firmware_goes_on_after_start() -> None:
 
 
 def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
-    """A restart of the drive half resets its pose, subscriptions, source and time.
+    """The drive half restarts.
 
-    The front half continues.
+    It loses its pose, subscriptions, source and time, and the motors stop. The front half
+    continues.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "sub pose 20")
@@ -79,7 +83,10 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
     boot_s: float, *, says_start: bool
 ) -> None:
-    """The time in the lines of a half counts from the beginning of its boot."""
+    """A half ignores input until its boot ends, and then may send a start line.
+
+    The time in its lines counts from the beginning of the boot.
+    """
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now
     rig.board.befall("drive", "restart")
@@ -97,7 +104,10 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """After a restart the front half sends no angle; the drive half keeps the last one received."""
+    """The front half restarts. Brush and lift are off, and it sends no angle.
+
+    The drive half keeps the last angle.
+    """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 4")
     rig.drive("rc 2 0.3 20", 1.0)
@@ -111,7 +121,7 @@ def test_front_that_restarts_switches_brush_and_lift_off() -> None:
 
 
 def test_what_is_sent_while_a_half_boots_is_lost() -> None:
-    """Lines that are sent to a half during its boot of 0.4 s are lost."""
+    """The host sends ``stop`` to a half during its boot of 0.4 s. The line is lost."""
     rig = Rig()
     rig.say(DRIVE, "stop")
     rig.run(1.0)
@@ -121,7 +131,10 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """While one half is lost, the other half sends as usual, and the robot still drives."""
+    """One half is lost and later comes back.
+
+    The other half sends as usual, and the robot drives on.
+    """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
     port = DRIVE if half == "drive" else FRONT
@@ -136,7 +149,10 @@ def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
 
 
 def test_sums_can_begin_and_end_in_each_half() -> None:
-    """A running half can begin or cease to use checksums."""
+    """One half begins to send checksums while it runs, and ends them later.
+
+    The other half does not.
+    """
     rig = Rig().booted()
     rig.board.befall("front", "sums-begin")
     said = dict(rig.run(0.5))
@@ -147,7 +163,7 @@ def test_sums_can_begin_and_end_in_each_half() -> None:
 
 
 def test_faults_can_be_planned() -> None:
-    """Planned faults occur at their times, even if the options list them in another order."""
+    """Faults are planned for certain times, in any order. They occur at these times."""
     late = Fault(at_s=2.0, half="front", what="well")
     rig = Rig(faults=(late, Fault(at_s=1.0, half="front", what="silent")))
     rig.run(0.99)
@@ -158,7 +174,7 @@ def test_faults_can_be_planned() -> None:
 
 
 def test_ports_can_be_swapped_and_ids_be_others() -> None:
-    """If the ports are swapped, a host can identify each half only by its heartbeat."""
+    """The two ports are swapped, or a half has another id. The heartbeats show it."""
     rig = Rig(swapped=True)
     rig.run(1.0)
     assert any(port == FRONT and " 90 " in text for _, port, text in rig.lines)
@@ -172,7 +188,10 @@ def test_ports_can_be_swapped_and_ids_be_others() -> None:
 
 
 def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
-    """The diagnosis of a healthy sensor is ``0x3c2`` or ``0x13c2``, as in the manual's list."""
+    """The diagnosis of a healthy angle sensor is ``0x3c2`` or ``0x13c2``, as in the manual's list.
+
+    The two differ only in the frame counter.
+    """
     rig = Rig().booted()
     bits = [rig.ask(FRONT, "fwli")[0].split()[3] for _ in range(8)]
     assert set(bits) == {"0x3c2", "0x13c2"}
@@ -195,7 +214,7 @@ def test_a_healthy_sensor_says_so_with_a_frame_counter() -> None:
     ],
 )
 def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> None:
-    """Each fault of the sensor sets the bit of the diagnosis that the manual lists for it."""
+    """Each fault of the angle sensor changes its bit of the diagnosis, as listed in the manual."""
     rig = Rig().booted()
     rig.board.befall("front", what)
     assert angle_line(rig)[1:] == (0, diagnosis)
@@ -204,9 +223,9 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 
 
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
-    """A frozen angle sensor reports no error, so the steering runs to its end stop.
+    """The angle sensor freezes without an error, so the steering runs to its end stop.
 
-    An absent sensor and one in error can be seen in the angle line.
+    An absent sensor, or one in error, can be seen in the angle line.
     """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")
@@ -225,7 +244,10 @@ def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
 
 
 def test_the_offset_of_the_sensor_is_configured() -> None:
-    """``fwoffset`` sets the zero of the angle; if its second number is 1, the sign is reversed."""
+    """``fwoffset`` sets the zero of the front angle.
+
+    If its second number is 1, it reverses the sign.
+    """
     rig = Rig(sensor_zero_deg=7.0, angle_noise_deg=0.0).booted()
     assert angle_line(rig)[0] == 0.0
     rig.say(FRONT, "fwoffset 0 1")
@@ -238,7 +260,7 @@ def test_the_offset_of_the_sensor_is_configured() -> None:
 
 
 def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
-    """``off`` cuts the power after its delay, unless ``on`` comes before that."""
+    """``off`` cuts the power of both halves after a delay, unless ``on`` comes before that."""
     rig = Rig().booted()
     rig.say(FRONT, "brush 1")
     rig.say(DRIVE, "off 2")
@@ -255,7 +277,7 @@ def test_power_goes_off_after_its_delay_and_both_are_gone() -> None:
 
 
 def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> None:
-    """A restart of the drive half cancels an ``off`` whose delay has not ended."""
+    """The drive half restarts during the delay of ``off``. The power then stays on."""
     rig = Rig().booted()
     rig.say(DRIVE, "off 2")
     rig.run(0.5)
@@ -268,7 +290,7 @@ def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> 
 
 
 def test_options_reach_the_board_by_a_url() -> None:
-    """The names of the faults in a URL are those of the command line."""
+    """A URL has the same options and names of faults as the command line. They reach the board."""
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
         "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100&boot=0.05&no-start-line"
@@ -287,11 +309,11 @@ def test_options_reach_the_board_by_a_url() -> None:
     "wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b", "boot=-1"]
 )
 def test_a_wrong_option_is_refused(wrong: str) -> None:
-    """A wrong option is refused, such as a fault of the angle sensor in the drive half."""
+    """A wrong option is refused. An example is a fault of the angle sensor in the drive half."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{wrong}", options.load(MODULE))
 
 
 def test_the_names_of_faults_are_unique() -> None:
-    """A fault of a half and a fault of its sensor must not have the same name."""
+    """No fault of a half has the same name as a fault of the angle sensor."""
     assert not FAULTS.keys() & SENSOR_FAULTS.keys()

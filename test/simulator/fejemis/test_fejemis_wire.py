@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines of the simulated Teensys: checksums, comments, subscriptions, variants of the firmware."""
+"""Tests of the simulated halves' lines: checksums, comments, subscriptions, firmware variants."""
 
 from itertools import pairwise
 
@@ -24,13 +24,19 @@ SUMS = Firmware(sums=True)
     ],
 )
 def test_sums_are_those_of_the_public_hosts(line: str) -> None:
-    """The checksum of each line is copied from the public host programs."""
+    """Lines with checksums are copied from the public host programs.
+
+    The simulator agrees with them.
+    """
     assert wire.checked(line)[0] is wire.Check.GOOD
     assert wire.line(line[3:], sums=True, carriage_return=False) == line.encode() + b"\n"
 
 
 def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
-    """The layout of heartbeats is that of the manual."""
+    """Each half sends a heartbeat every 400 ms without a request, laid out as in the manual.
+
+    The drive half has the id 90, and the front half 91.
+    """
     rig = Rig()
     rig.run(2.5)
     beats = [(at, text) for at, port, text in rig.lines if text.startswith("hbt") and port == DRIVE]
@@ -43,7 +49,10 @@ def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
 
 
 def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
-    """A line with a wrong checksum is discarded and answered by a comment."""
+    """The host sends a line with a wrong checksum.
+
+    The half discards it and answers with a comment.
+    """
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, ";20rc 2 0.5 0")
     assert "# CRC failed" in answer
@@ -52,7 +61,10 @@ def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
 
 
 def test_a_line_without_a_sum_is_executed_under_protest() -> None:
-    """Firmware with checksums obeys a line that has no checksum, and answers it by a comment."""
+    """The host sends a line without a checksum to firmware that uses checksums.
+
+    The half obeys the line and answers with a comment.
+    """
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, "rc 2 0.5 0")
     assert answer.endswith("# processing under protest - no CRC")
@@ -61,7 +73,10 @@ def test_a_line_without_a_sum_is_executed_under_protest() -> None:
 
 
 def test_firmware_without_sums_does_not_know_them() -> None:
-    """Firmware without checksums takes a line with a checksum for an unknown command."""
+    """The host sends a line with a checksum to firmware that uses none.
+
+    The half reports an unknown command.
+    """
     rig = Rig().booted()
     (answer,) = rig.ask(DRIVE, ";19rc 1 0.5 65")
     assert answer.startswith("# 1.0")
@@ -70,7 +85,7 @@ def test_firmware_without_sums_does_not_know_them() -> None:
 
 
 def test_an_unknown_command_is_a_comment() -> None:
-    """The comment on an unknown command has a checksum and names the command."""
+    """The host sends an unknown command. The half answers with a comment that names the command."""
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(FRONT, ";35fly")
     assert wire.checked(answer)[0] is wire.Check.GOOD
@@ -86,7 +101,10 @@ def test_the_front_half_does_not_know_stop_and_start(text: str) -> None:
 
 
 def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
-    """Older firmware treats ``!stop`` as an unknown command."""
+    """The host sends ``!stop``.
+
+    Newer firmware obeys and confirms it. For older firmware it is unknown.
+    """
     newer = Rig(firmware=Firmware(sums=False, confirms=True)).booted()
     assert newer.ask(DRIVE, "!stop") == ["confirm !stop"]
     assert newer.board.drive.source == -1
@@ -96,7 +114,10 @@ def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
 
 
 def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
-    """A subscription is not acknowledged; its messages come until the period is set to zero."""
+    """The host subscribes to a message. It comes in its period until the period is set to zero.
+
+    The half does not acknowledge a subscription.
+    """
     rig = Rig().booted()
     assert rig.ask(FRONT, "sub fwl 15") == []
     assert sum("fwl" in text for _, text in rig.run(1.5)) == 100
@@ -126,9 +147,9 @@ KEYS = {
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
-    """A request for each value, and a subscription, use its key in the help text.
+    """Each value can be requested once, or subscribed to, by its key in the help text.
 
-    Replies begin with the same key, except that of the infrared sensors.
+    The replies begin with the same key, except that of the infrared sensors.
     """
     rig = Rig().booted()
     rig.say(port, "leave")
@@ -140,7 +161,7 @@ def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key
 
 
 def test_help_is_a_flood_of_text_without_comment_marks() -> None:
-    """Each half prints the text of the manual, so a host receives many lines without ``#``."""
+    """After ``help`` each half prints the text of the manual, in many lines without ``#``."""
     rig = Rig().booted()
     drive, front = rig.ask(DRIVE, "help"), rig.ask(FRONT, "help")
     assert len(drive) > 55
@@ -150,7 +171,7 @@ def test_help_is_a_flood_of_text_without_comment_marks() -> None:
 
 
 def test_a_line_of_more_than_200_characters_is_cut() -> None:
-    """The rest of a line of more than 200 characters is read as a new line, here as a command."""
+    """A line has more than 200 characters. Its rest is read as a new line, here as ``stop``."""
     rig = Rig().booted()
     rig.say(DRIVE, "x" * 200 + "stop")
     rig.run(0.01)
@@ -168,7 +189,7 @@ def test_a_line_of_more_than_200_characters_is_cut() -> None:
     ],
 )
 def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: float) -> None:
-    """A number that is missing in a line is read as zero."""
+    """A half reads the numbers of a line one after the other. A missing number is zero."""
     rig = Rig().booted()
     rig.say(DRIVE, line)
     rig.run(0.01)
@@ -177,7 +198,7 @@ def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: flo
 
 
 def test_lines_end_with_or_without_a_carriage_return() -> None:
-    """A carriage return is optional in both directions; the manual does not show line ends."""
+    """The manual does not show line ends. A carriage return is accepted, and can also be sent."""
     rig = Rig().booted()
     rig.board.receive(b"stop\r\n", 0.0, DRIVE)
     rig.run(0.01)
@@ -189,7 +210,7 @@ def test_lines_end_with_or_without_a_carriage_return() -> None:
 
 
 def test_variants_of_messages() -> None:
-    """Some firmware adds a time to the wheel speeds and a tilt to the pose, or measures in g."""
+    """Some firmware adds a time to the wheel speeds, adds a tilt to the pose, or measures in g."""
     usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
     assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
     assert len(usual.ask(DRIVE, "posei")[0].split()) == 5
@@ -202,7 +223,10 @@ def test_variants_of_messages() -> None:
 
 
 def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
-    """If the board keeps time in single precision, it has steps of about 0.5 ms after two hours."""
+    """The board keeps its time in single precision.
+
+    After two hours it has steps of about 0.5 ms.
+    """
     firmware = Firmware(sums=False, single_precision=True)
     rig = Rig(firmware=firmware, uptime_s=8000.0)
     times = []
@@ -212,7 +236,7 @@ def test_single_precision_makes_steps_of_the_time_after_hours() -> None:
 
 
 def test_the_two_clocks_run_apart() -> None:
-    """The clocks of the two Teensys differ, as each has a crystal of its own."""
+    """Each half has its own crystal, so the clocks of the two halves differ more and more."""
     rig = Rig(clock_ppm=(200.0, -300.0))
     rig.run(20.0)
     assert rig.board.drive.clock_s == pytest.approx(20.004)
@@ -220,7 +244,7 @@ def test_the_two_clocks_run_apart() -> None:
 
 
 def test_bytes_to_the_boards_can_be_lost() -> None:
-    """Bytes sent to the boards can be lost; the seed determines which."""
+    """Some bytes to the halves are lost. The seed determines which."""
     heard = []
     for _ in range(2):
         rig = Rig(firmware=SUMS, lose_inbound=0.05, seed=3).booted()
@@ -233,9 +257,10 @@ def test_bytes_to_the_boards_can_be_lost() -> None:
 
 
 def test_three_lost_characters_leave_a_valid_command() -> None:
-    """A command that loses ``c``, ``2`` and ``1`` has the same checksum, so it is still valid.
+    """A command loses the characters ``c``, ``2`` and ``1``, and its checksum is still right.
 
-    The checksum is a sum modulo 99, to which ``c`` adds 0, and ``2`` and ``1`` together add 0.
+    The checksum is a sum modulo 99, and these characters add 0 to it. So the half obeys the
+    command.
     """
     rig = Rig(firmware=SUMS).booted()
     whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"
@@ -247,7 +272,10 @@ def test_three_lost_characters_leave_a_valid_command() -> None:
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_word_with_a_space_behind_it_is_unknown_to_some_firmware(*, exact: bool) -> None:
-    """``stop`` with a space after it is unknown to firmware that compares complete lines."""
+    """The host sends ``stop`` with a space after it.
+
+    Firmware that compares whole lines does not know it.
+    """
     rig = Rig(firmware=Firmware(sums=False, exact_words=exact)).booted()
     rig.ask(DRIVE, "stop ")
     assert rig.board.drive.source == (10 if exact else -1)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated LOIS ECU, commanded and read through the driver's codec, in simulated time."""
+"""A simulated LOIS ECU in simulated time.
+
+The driver's codec makes its commands and reads its reports.
+"""
 
 from omnibot_driver.core.lois_ecu import (
     BoardOdometry,
@@ -18,7 +21,10 @@ LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
 
 
 class Rig:
-    """A board and its host; ``heard`` has all reports, each with the time of its last byte."""
+    """A simulated board and its host.
+
+    ``heard``: all reports of the board, each with the time of its last byte.
+    """
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
         self.board = SimulatedLois(LoisSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
@@ -27,7 +33,6 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated time, in s."""
         return self.board.now_s
 
     def run(self, seconds: float) -> list[Report]:
@@ -53,7 +58,7 @@ class Rig:
                 raise AssertionError(f"{command} was not obeyed")
 
     def drive(self, left: int, right: int, seconds: float) -> list[Report]:
-        """Command these wheel speeds, in RPM, for ``seconds``; return the reports received."""
+        """Command these wheel speeds in RPM for ``seconds``; return the reports of that time."""
         self.say(SetRpm(left, right))
         return self.run(seconds)
 
@@ -66,10 +71,8 @@ class Rig:
 
 
 def ticks_in(reports: list[Report]) -> list[Ticks]:
-    """Return the reports of encoder ticks, in order."""
     return [report for report in reports if isinstance(report, Ticks)]
 
 
 def odometry_in(reports: list[Report]) -> list[BoardOdometry]:
-    """Return the reports of the board's odometry, in order."""
     return [report for report in reports if isinstance(report, BoardOdometry)]

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detectors of quirks in motion: how a board counts ticks, and measures and controls speeds.
+"""Detectors of quirks in motion: how a board counts ticks, and how it measures and controls speeds.
 
-Each function has the name of a quirk, and returns whether a board with these quirks shows it.
+A quirk is a deviation from the manual. Each function has the name of a quirk. It returns whether a
+board with the given quirks shows that one.
 """
 
 import math
@@ -24,14 +25,17 @@ STRAIGHT = 20
 
 
 def ticks_of_forward_targets(quirks: Quirks) -> bool:
-    """No ticks are counted while the robot drives backward."""
+    """Return whether no ticks are counted while the robot drives backward."""
     rig = Rig(quirks).booted()
     rig.drive(-STRAIGHT, -STRAIGHT, 4.0)
     return ticks_in(rig.run(1.0))[-1].left == 0
 
 
 def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
-    """With equal controllers, message 0x20 reports less than 75 % of a straight drive."""
+    """Return whether message 0x20 reports less than 75 % of a straight drive.
+
+    The controllers of both wheels are equal here.
+    """
     rig = Rig(quirks).booted()
     rig.say(WriteSetting(Setting.RIGHT_KP, 0.4412), WriteSetting(Setting.RIGHT_TN, 0.2865))
     rig.drive(STRAIGHT, STRAIGHT, 10.0)
@@ -40,7 +44,7 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 
 
 def velocity_may_be_nan(quirks: Quirks) -> bool:
-    """In a straight drive, some reported velocities are not finite."""
+    """Return whether some velocities that are reported in a straight drive are not finite."""
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60))
     rig.drive(40, 40, 30.0)
@@ -49,7 +53,10 @@ def velocity_may_be_nan(quirks: Quirks) -> bool:
 
 
 def sign_of_command(quirks: Quirks) -> bool:
-    """After a backward command, the measured speed is negative before the wheel reverses."""
+    """Return whether the measured speed is negative before the wheel reverses.
+
+    The robot drives forward, and gets a command to drive backward.
+    """
     rig = Rig(quirks).booted()
     rig.drive(30, 40, 6.0)
     rig.say(SetRpm(-30, -40))
@@ -61,7 +68,7 @@ def sign_of_command(quirks: Quirks) -> bool:
 
 
 def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
-    """A wheel that has been blocked for 3 s still has a measured speed."""
+    """Return whether a wheel that has been blocked for 3 s still has a measured speed."""
     rig = Rig(quirks).booted()
     rig.drive(20, 30, 6.0)
     rig.board.hold(left=True, right=True)
@@ -70,7 +77,7 @@ def keeps_speed_of_stalled_wheel(quirks: Quirks) -> bool:
 
 
 def duty_drags_target(quirks: Quirks) -> bool:
-    """After a negative duty, a positive duty gives a negative measured speed."""
+    """Return whether, after a negative duty, a positive duty gives a negative measured speed."""
     rig = Rig(quirks).booted()
     rig.say(SetDuty(-40, -30))
     rig.run(3.0)
@@ -82,7 +89,7 @@ def duty_drags_target(quirks: Quirks) -> bool:
 
 
 def reverse_runs_fast(quirks: Quirks) -> bool:
-    """At a target of -30 RPM the wheel turns at more than 31.2 RPM."""
+    """Return whether the wheel turns at more than 31.2 RPM backward when 30 RPM are commanded."""
     rig = Rig(quirks).booted()
     rig.drive(-30, -30, 12.0)
     speeds = []
@@ -93,7 +100,7 @@ def reverse_runs_fast(quirks: Quirks) -> bool:
 
 
 def low_pass_starts_at_zero(quirks: Quirks) -> bool:
-    """No speed target moves the robot until the low-pass filter is set."""
+    """Return whether the robot obeys no speed command before the low-pass filter is set."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.drive(30, 30, 5.0)
@@ -101,7 +108,7 @@ def low_pass_starts_at_zero(quirks: Quirks) -> bool:
 
 
 def slow_timer(quirks: Quirks) -> bool:
-    """The measured speed is 0.7 % too high."""
+    """Return whether the measured speed is about 0.7 % too high."""
     rig = Rig(quirks).booted()
     rig.drive(30, 30, 0.5)
     rig.say(SetDuty(50, 50))
@@ -115,7 +122,7 @@ def slow_timer(quirks: Quirks) -> bool:
 
 
 def limits_rpm(quirks: Quirks) -> bool:
-    """With a target of 58 RPM, the wheel turns at less than 55 RPM."""
+    """Return whether the wheel turns at less than 55 RPM when 58 RPM are commanded."""
     rig = Rig(quirks).booted()
     rig.drive(58, 58, 30.0)
     speeds = []
@@ -126,7 +133,7 @@ def limits_rpm(quirks: Quirks) -> bool:
 
 
 def fast_control(quirks: Quirks) -> bool:
-    """A set point takes effect within 110 ms."""
+    """Return whether each set-point takes effect within 110 ms."""
     delays = []
     rig = Rig(quirks).booted()
     for _ in range(12):

@@ -2,7 +2,8 @@
 
 """Detectors of quirks in communication: what a board receives, sends and records.
 
-Each function has the name of a quirk, and returns whether a board with these quirks shows it.
+A quirk is a deviation from the manual. Each function has the name of a quirk. It returns whether a
+board with the given quirks shows that one.
 """
 
 from dataclasses import replace
@@ -36,7 +37,7 @@ from omnibot_driver.simulator.lois_ecu import Quirks
 
 
 def with_sum(text: bytes) -> bytes:
-    """Return the text with its checksum (XOR of its characters) and a line feed."""
+    """Return the text with its checksum, the XOR of its characters, and a line feed."""
     total = 0
     for character in text:
         total ^= character
@@ -44,7 +45,7 @@ def with_sum(text: bytes) -> bytes:
 
 
 def extra_settings(quirks: Quirks) -> bool:
-    """The feed-forward setting exists: with Kp = 0, it alone turns the wheel."""
+    """Return whether the feed-forward setting exists: with Kp = 0, it alone turns the wheel."""
     rig = Rig(replace(quirks, low_pass_starts_at_zero=False))
     rig.run(2.1)
     for setting in (Setting.LEFT_KP, Setting.RIGHT_KP):
@@ -55,19 +56,19 @@ def extra_settings(quirks: Quirks) -> bool:
 
 
 def appends_odometry(quirks: Quirks) -> bool:
-    """Messages 0x12 contain the odometry."""
+    """Return whether the messages 0x12 contain the odometry."""
     return any(group.appended for group in odometry_in(Rig(quirks).run(4.0)))
 
 
 def clock_in_ms(quirks: Quirks) -> bool:
-    """The driver's decoder finds that the board's timestamps are in ms, not in ns."""
+    """Return whether the driver's decoder finds that the board's times are in ms, not in ns."""
     rig = Rig(quirks)
     rig.run(6.0)
     return rig.decoder.clock_unit == "ms"
 
 
 def clock_stops_while_sending(quirks: Quirks) -> bool:
-    """The board's clock is more than 3 % slow, because it stops during each message."""
+    """Return whether the board's clock is more than 3 % slow, as it stops during each message."""
     rig = Rig(quirks)
     rig.run(3.0)
     began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]
@@ -78,7 +79,7 @@ def clock_stops_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_sending(quirks: Quirks) -> bool:
-    """The board loses more than 5 of 300 lines that are sent once."""
+    """Return whether the board loses more than 5 of 300 lines that are each sent once."""
     rig = Rig(quirks)
     rig.run(2.1)
     for number in range(300):
@@ -90,7 +91,7 @@ def deaf_while_sending(quirks: Quirks) -> bool:
 
 
 def deaf_while_counting(quirks: Quirks) -> bool:
-    """At full speed, the board loses more than 10 % of lines that are sent once."""
+    """Return whether the board, at full speed, loses over 10 % of lines that are sent once."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(100, 100))
@@ -103,7 +104,7 @@ def deaf_while_counting(quirks: Quirks) -> bool:
 
 
 def button_waits_while_sending(quirks: Quirks) -> bool:
-    """The button does not cut the power while the board sends a record, here for 0.12 s."""
+    """Return whether the button does not cut the power while the board sends a record."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetDuty(50, 50), RecordTorque(100, 100))
@@ -116,7 +117,7 @@ def button_waits_while_sending(quirks: Quirks) -> bool:
 
 
 def odometry_period_is_fixed(quirks: Quirks) -> bool:
-    """The periodic message 0x20 cannot be switched off."""
+    """Return whether the periodic message 0x20 cannot be switched off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.ODOMETRY, PERIOD_OFF))
@@ -125,7 +126,7 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 
 
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
-    """Command 0x11 sets the short correction to zero, even if it does not change the mode."""
+    """Return whether command 0x11 sets the short correction to zero, even in an unchanged mode."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST))
@@ -133,7 +134,7 @@ def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
 
 
 def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
-    """A press in a terminal mode is not reported, not even after the mode ends."""
+    """Return whether a press of the button in a terminal mode is never reported."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.GPS))
@@ -144,7 +145,7 @@ def button_is_lost_in_terminal_mode(quirks: Quirks) -> bool:
 
 
 def terminal_mixes_sensors(quirks: Quirks) -> bool:
-    """In the GPS mode, sentences of the compass are forwarded, too."""
+    """Return whether sentences of the compass are forwarded in the GPS mode, too."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.GPS))
@@ -152,7 +153,10 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 
 
 def terminal_passes_input_on(quirks: Quirks) -> bool:
-    """In compass mode the board obeys only as many lines as the compass reads: 34 a second."""
+    """Return whether the board obeys fewer than 20 of 100 lines in compass mode.
+
+    The board forwards each line to the compass at 4800 baud, and reads no input in that time.
+    """
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.COMPASS))
@@ -163,7 +167,7 @@ def terminal_passes_input_on(quirks: Quirks) -> bool:
 
 
 def one_ball_in_six_seconds(quirks: Quirks) -> bool:
-    """A second request for a ball is ignored; a third one, 6 s later, is obeyed."""
+    """Return whether a second request for a ball is ignored, but a third one 6 s later is not."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(DistributeBall(), DistributeBall())
@@ -173,7 +177,7 @@ def one_ball_in_six_seconds(quirks: Quirks) -> bool:
 
 
 def reset_clears_ticks_only(quirks: Quirks) -> bool:
-    """After command 0x18 the odometry is kept, and the robot still drives."""
+    """Return whether, after command 0x18, the odometry is kept and the robot still drives."""
     rig = Rig(quirks).booted()
     rig.drive(20, 30, 4.0)
     rig.say(Reset())
@@ -183,12 +187,12 @@ def reset_clears_ticks_only(quirks: Quirks) -> bool:
 
 
 def gps_is_ignored(quirks: Quirks) -> bool:
-    """The reported position is latitude 0, longitude 0."""
+    """Return whether the reported position is latitude 0, longitude 0."""
     return GpsPosition(0.0, 0.0) in Rig(quirks).run(4.0)
 
 
 def headings_average_over_north(quirks: Quirks) -> bool:
-    """While the robot turns through north, the reported heading jumps to the south."""
+    """Return whether the reported heading jumps to the south as the robot turns through north."""
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.HEADING, 40), SetPeriod(Stream.TICKS, PERIOD_OFF))
     rig.drive(-20, 20, 12.0)
@@ -209,7 +213,10 @@ def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | 
 
 
 def records_in_100_us(quirks: Quirks) -> bool:
-    """Records have times in units of 100 µs: at 20 RPM, ticks are about 500 units apart."""
+    """Return whether records have times in units of 100 µs.
+
+    At 20 RPM, ticks are then about 500 units apart.
+    """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 5.0)
     record = _record(rig, RecordKind.RPM, 20, 4.0)
@@ -219,7 +226,7 @@ def records_in_100_us(quirks: Quirks) -> bool:
 
 
 def torque_comes_as_rpm(quirks: Quirks) -> bool:
-    """The board replies to the request 0x17 (torque) with the command number 0x04 (RPM)."""
+    """Return whether the board answers the request 0x17 (torque) with the number 0x04 (RPM)."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(encode_command(RecordTorque(5, 5)))
@@ -229,14 +236,14 @@ def torque_comes_as_rpm(quirks: Quirks) -> bool:
 
 
 def record_waits_for_one_more(quirks: Quirks) -> bool:
-    """The board does not send a record of 3 headings after the third sample."""
+    """Return whether a record of 3 headings is not sent after the third sample."""
     rig = Rig(quirks, compass_period_s=1.0)
     rig.run(2.5)
     return _record(rig, RecordKind.HEADING, 3, 3.1) is None
 
 
 def large_records_never_end(quirks: Quirks) -> bool:
-    """The board never sends a record of 1025 torque samples, not even after 93 s or 205 s."""
+    """Return whether a record of 1025 torque samples is never sent, not even after all samples."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.board.receive(with_sum(b":1704010401"))
@@ -248,7 +255,7 @@ def large_records_never_end(quirks: Quirks) -> bool:
 
 
 def lenient_hex(quirks: Quirks) -> bool:
-    """A payload with characters that are not digits is accepted if the checksum is right."""
+    """Return whether a payload that is not hexadecimal is accepted if the checksum is right."""
     rig = Rig(quirks)
     rig.run(2.1)
     for _ in range(5):
@@ -258,7 +265,7 @@ def lenient_hex(quirks: Quirks) -> bool:
 
 
 def slow_boot(quirks: Quirks) -> bool:
-    """After power-up the board is silent for 2 s; then it reads what has arrived in that time."""
+    """Return whether the board is silent for 2 s after power-up, and reads its input only then."""
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))
     early = rig.run(1.9)

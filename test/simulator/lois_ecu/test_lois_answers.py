@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A table that names a test of the driver for each deviation of the firmware from the manual."""
+"""A table that names a test of the driver for each quirk of the LOIS ECU's firmware.
+
+A quirk is a deviation from the manual.
+"""
 
 import ast
 from dataclasses import fields
@@ -55,7 +58,7 @@ ANSWERS: dict[str, str] = {
 
 
 def test_every_quirk_has_an_answer() -> None:
-    """The table ``ANSWERS`` names an existing test for each quirk."""
+    """The table ``ANSWERS`` has an entry for each quirk, and the tests that it names exist."""
     assert set(ANSWERS) == {field.name for field in fields(Quirks)}
     there = {
         node.name

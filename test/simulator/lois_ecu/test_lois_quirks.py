@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each deviation of the public firmware from the manual can be observed, and be switched off."""
+"""Tests that each quirk of the simulated LOIS ECU can be observed, and can be switched off.
+
+A quirk is a deviation of the public firmware from the manual.
+"""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -30,7 +33,10 @@ def test_every_quirk_has_its_sight() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """A detector finds its quirk if the quirk is on, and not if only this quirk is off."""
+    """The detector of a quirk finds it on the public firmware.
+
+    It finds nothing if only this quirk is switched off.
+    """
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
@@ -38,12 +44,12 @@ def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in SEEN if name != "extra_settings"])
 def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
-    """A detector finds nothing on a board as in the manual, where all quirks are off."""
+    """On a board as in the manual, all quirks are off. No detector finds its quirk."""
     assert not SEEN[name](DOCUMENTED)
 
 
 def test_ticks_are_reported_as_they_are() -> None:
-    """The board reports its ticks, on which the other tests of this module rely."""
+    """The board reports its ticks. Other tests of this module rely on that."""
     rig = Rig().booted()
     rig.drive(20, 20, 3.0)
     assert isinstance(ticks_in(rig.run(0.5))[-1], Ticks)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated LOIS ECU: periodic messages, commands, and behaviour of both firmware variants."""
+"""Tests of the simulated LOIS ECU: periodic messages and commands, with both firmware variants."""
 
 import math
 from functools import reduce
@@ -39,7 +39,10 @@ BOTH = pytest.mark.parametrize("quirks", [DOCUMENTED, FIRMWARE], ids=["documente
 
 @BOTH
 def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
-    """All periodic messages but the date come, about every 400 ms, 1 s and 1.2 s, undamaged."""
+    """Without a request, the board sends all periodic messages but the date, undamaged.
+
+    Their periods are about 400 ms, 1 s and 1.2 s.
+    """
     rig = Rig(quirks)
     heard = rig.run(22.0)
     counts = dict.fromkeys((Ticks, Heading, BoardOdometry, GpsTime, GpsPosition, GpsDate), 0)
@@ -54,7 +57,7 @@ def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
 
 
 def test_periods_stretch_with_the_load() -> None:
-    """The public firmware sends a message with a period of 400 ms only every 422 ms."""
+    """On the public firmware, a message with a period of 400 ms comes only every 422 ms."""
     rig = Rig()
     rig.run(3.0)
     assert len(ticks_in(rig.run(42.2))) in range(98, 103)
@@ -62,7 +65,10 @@ def test_periods_stretch_with_the_load() -> None:
 
 @BOTH
 def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -> None:
-    """Both wheels reach about 20 RPM and keep this speed, because set points never expire."""
+    """20 RPM are commanded once.
+
+    Both wheels reach that speed and keep it, as set-points never expire.
+    """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 10.0)
     speeds = []
@@ -76,7 +82,10 @@ def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -
 @pytest.mark.slow
 @BOTH
 def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
-    """Zero RPM and zero duty both stop the robot within 0.5 s."""
+    """The robot drives by a speed or a duty command.
+
+    Both zero RPM and zero duty stop it within 0.5 s.
+    """
     rig = Rig(quirks).booted()
     for drive in (SetRpm(30, 30), SetRpm(-30, 30), SetDuty(45, 45), SetDuty(-45, 45)):
         for stop in (SetRpm(0, 0), SetDuty(0, 0)):
@@ -93,7 +102,7 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
     """A press of the button stops the robot, and a release does not move it.
 
-    A new set point moves the robot, even while the button is pressed.
+    The board reports both. A new set-point moves the robot, even while the button is pressed.
     """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 4.0)
@@ -110,7 +119,7 @@ def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
 
 @BOTH
 def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks: Quirks) -> None:
-    """In a terminal mode the board sends only lines of the sensor, and still obeys commands."""
+    """In a terminal mode the board sends only lines of the sensor. It still obeys commands."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.decoder.terminal = True
@@ -130,7 +139,10 @@ def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks
 
 @BOTH
 def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
-    """If checksums are off, the board rejects lines with a checksum, but still sends its own."""
+    """Checksums are switched off.
+
+    The board rejects lines that have one, but still sends its own.
+    """
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM))
@@ -148,7 +160,10 @@ def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
 
 @BOTH
 def test_junk_before_a_colon_is_harmless(quirks: Quirks) -> None:
-    """A colon always begins a new line, so characters before the colon do no harm."""
+    """Other characters come before a colon.
+
+    The colon begins a new line, so the command is obeyed.
+    """
     rig = Rig(quirks)
     rig.run(2.1)
     for line in (b"\xffx:030000000138\n", b":19000000003200:190000000032\n"):
@@ -162,7 +177,7 @@ def test_junk_before_a_colon_is_harmless(quirks: Quirks) -> None:
 
 @BOTH
 def test_a_carriage_return_makes_a_line_too_long(quirks: Quirks) -> None:
-    """Every line has exactly 14 characters, so a line that ends with CR LF is rejected."""
+    """A command ends with CR LF, so it has one character too many. The board rejects it."""
     rig = Rig(quirks)
     rig.run(2.1)
     for _ in range(4):
@@ -173,7 +188,10 @@ def test_a_carriage_return_makes_a_line_too_long(quirks: Quirks) -> None:
 
 @pytest.mark.parametrize("payload", [b"0000 +01", b"00000x01", b"0000-fff"])
 def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
-    """The firmware reads numbers as ``strtol`` does, which allows a space, a sign and a prefix."""
+    """A payload has a space, a sign or a prefix.
+
+    The firmware accepts it, because ``strtol`` does.
+    """
     rig = Rig(FIRMWARE)
     rig.run(2.1)
     text = b":03" + payload
@@ -185,7 +203,7 @@ def test_the_firmware_reads_numbers_as_strtol_does(payload: bytes) -> None:
 
 @BOTH
 def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
-    """A period of 0xfffe requests the report once, and 0xffff turns it off."""
+    """A period of 0xfffe requests a message once. A period of 0xffff turns it off."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetPeriod(Stream.TICKS, PERIOD_OFF), SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
@@ -198,7 +216,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 
 
 def test_the_gps_moves_with_the_robot() -> None:
-    """A drive along x changes the longitude, because x points east."""
+    """The robot drives along x, which points east. The reported longitude changes accordingly."""
     rig = Rig(DOCUMENTED)
     rig.drive(40, 40, 20.0)
     fixes = [report for report in rig.run(3.0) if isinstance(report, GpsPosition)]
@@ -208,7 +226,10 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """After a reboot the ticks are zero and the low-pass filter is not set; the true pose stays."""
+    """The board reboots and is silent for 2 s. Its ticks are zero and its filter is not set.
+
+    The robot's true pose stays.
+    """
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)
     place = rig.board.truth
@@ -222,9 +243,9 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
 
 
 def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
-    """A restarted board gives a ball at once, as it does not know when it gave the last one.
+    """The board gives a ball and reboots. The LED is off, and another ball is given at once.
 
-    Otherwise the firmware refuses a second ball within 6 s.
+    Without a reboot, the firmware refuses a second ball for 6 s.
     """
     rig = Rig().booted()
     rig.say(SetLed(True), DistributeBall())
@@ -236,7 +257,7 @@ def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> No
 
 
 def test_input_while_booting_is_kept_up_to_600_characters() -> None:
-    """Of 700 characters that arrive during the boot, the last 100 are lost."""
+    """700 characters arrive during the boot. The last 100 are lost, and the others are obeyed."""
     rig = Rig()
     rig.board.receive(encode_command(LOW_PASS) * 50)
     rig.run(2.3)
@@ -245,7 +266,10 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 
 
 def test_planted_errors_are_in_the_truth_alone() -> None:
-    """The board computes its odometry with the nominal wheel radius, not with the true one."""
+    """The true wheel radius is 5 % too large.
+
+    The board does not know it, so its odometry is too short.
+    """
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)
     rig.say(SetRpm(0, 0))
@@ -257,7 +281,7 @@ def test_planted_errors_are_in_the_truth_alone() -> None:
 @given(st.lists(st.binary(max_size=200), max_size=6))
 @settings(max_examples=30)
 def test_any_bytes_are_taken(chunks: list[bytes]) -> None:
-    """No input raises an exception, and the same bytes give the same output."""
+    """The board receives any bytes. No exception is raised, and equal input gives equal output."""
     sent = []
     for _ in range(2):
         board = SimulatedLois()

@@ -18,7 +18,12 @@ INCH_M = 0.0254
 
 
 class Rig:
-    """A controller and its host; ``replies`` has all replies, each with its time."""
+    """A simulated controller and its host.
+
+    ``replies``: all replies of the controller, each with its time.
+
+    ``took_s``: how long the last reply took, in s.
+    """
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
         self.server = MartServer(MartSettings(quirks=quirks, **settings))  # type: ignore[arg-type]
@@ -27,16 +32,14 @@ class Rig:
 
     @property
     def now(self) -> float:
-        """Simulated time, in s."""
         return self.server.now_s
 
     def say(self, *texts: str) -> None:
-        """Send these requests to the command port, without waiting for replies."""
+        """Send these requests to the command port; do not wait for replies."""
         for text in texts:
             self.server.receive(text.encode("latin-1"), COMMAND, "us", self.now)
 
     def stop(self, text: str) -> None:
-        """Send this request to the stop port."""
         self.server.receive(text.encode("latin-1"), STOP, "us", self.now)
 
     def run(self, seconds: float) -> list[str]:
@@ -46,7 +49,7 @@ class Rig:
         return [reply.data.decode("latin-1") for reply in found]
 
     def wait(self, limit_s: float = 20.0) -> str | None:
-        """Return the next reply, or None after ``limit_s``; store its delay in ``took_s``."""
+        """Return the next reply, or None after ``limit_s``; store its time in ``took_s``."""
         began_s, until_s = self.now, self.now + limit_s
         while self.now < until_s:
             found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))
@@ -72,26 +75,25 @@ class Rig:
         return float(number)
 
     def drive(self, text: str, seconds: float = 1.0) -> None:
-        """Start an uncontrolled motion and let the robot move for ``seconds``."""
+        """Start an uncontrolled motion, and let the robot move for ``seconds``."""
         assert self.ask(text) == "ok"
         self.run(seconds)
 
     @property
     def x_in(self) -> float:
-        """True distance forward, in inches."""
+        """Return the true distance forward, in inches."""
         return self.server.chassis.x_m / INCH_M
 
     @property
     def yaw_deg(self) -> float:
-        """True heading, in degrees."""
+        """Return the true heading, in degrees."""
         return self.server.chassis.yaw_rad * 57.29577951308232
 
     @property
     def moving(self) -> bool:
-        """Whether the robot truly moves."""
         return self.server.chassis.moving
 
     @property
     def in_progress(self) -> Kind | None:
-        """The motion that the server believes to be in progress."""
+        """Return the motion that the server regards as in progress. The robot may be at rest."""
         return self.server.motion

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Controlled moves of the public server: TF, TB, MCR and MCL."""
+"""Tests of the public server's controlled moves: TF, TB, MCR and MCL."""
 
 from dataclasses import replace
 
@@ -12,7 +12,10 @@ from omnibot_driver.simulator.mart import FIRMWARE
 
 @pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
 def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) -> None:
-    """The reply is "ok 12" after 15.8 inches, as the server computes the distance from time."""
+    """The reply to TF 12 is "ok 12", although the robot has driven 15.8 inches.
+
+    The server computes the distance from the time.
+    """
     rig = Rig()
     assert rig.ask(text) == "ok 12"
     assert sign * rig.x_in == pytest.approx(15.8, abs=0.2)
@@ -21,14 +24,17 @@ def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) ->
 
 @pytest.mark.parametrize("volts", [20.0, 26.0])
 def test_it_echoes_it_at_any_voltage(volts: float) -> None:
-    """The reply to TF 24 is "ok 24" at any voltage, whatever the true distance is."""
+    """At any battery voltage the reply to TF 24 is "ok 24", whatever the true distance is."""
     rig = Rig(volts=volts)
     assert rig.ask("TF 24") == "ok 24"
     assert abs(rig.x_in - 30.3) > 2
 
 
 def test_tf_24_slow_runs_at_normal_speed() -> None:
-    """TF 24 SLOW is not slow, because the speed must precede the distance: TF SLOW 24."""
+    """In TF 24 SLOW the speed comes after the distance.
+
+    The server ignores it and drives normally.
+    """
     fast, normal, slow = Rig(), Rig(), Rig()
     assert fast.ask("TF 24 SLOW") == normal.ask("TF NORMAL 24") == "ok 24"
     assert slow.ask("TF SLOW 24") == "ok 24"
@@ -37,7 +43,7 @@ def test_tf_24_slow_runs_at_normal_speed() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
 def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
-    """If the distance of TF or TB is 0 or a word, the robot drives until it is stopped."""
+    """The distance of TF or TB is 0 or a word. The robot drives until it is stopped."""
     rig = Rig()
     assert rig.ask(text, 60.0) is None
     assert rig.moving
@@ -46,9 +52,9 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """SDR sets the distance, counted from the start, at which an unlimited move ends.
+    """During an unlimited move, SDR sets the distance from the start at which the move ends.
 
-    It has no effect on a move with a distance.
+    SDR has no effect on a move that has a distance.
     """
     rig = Rig()
     rig.say("TF 0")
@@ -69,9 +75,9 @@ def test_a_negative_distance_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TB 0", "MCF 0", "MCB 0", "MCF far"])
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
-    """A distance of zero is unlimited in the public server, but refused without this quirk.
+    """A distance of zero, or a word, is unlimited on the public server.
 
-    A word is read as zero.
+    With this quirk off, the server refuses it.
     """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
@@ -91,7 +97,7 @@ def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     ],
 )
 def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
-    """The reply to a command without a distance is a failure; the server spells it in two ways."""
+    """A command has no distance. The server answers with a failure, which it spells in two ways."""
     assert Rig().ask(text) == answer
 
 
@@ -99,7 +105,10 @@ def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
 def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
     front_in: float, driven_in: float
 ) -> None:
-    """Near an obstacle the robot moves 0.3 inches before the server reads the sonar."""
+    """TF begins near an obstacle.
+
+    The robot moves 0.3 inches before the server reads the front sonar.
+    """
     rig = Rig(front_m=front_in * INCH_M)
     assert rig.ask("TF 24") == "fail Insufficient front clearance."
     assert rig.took_s == pytest.approx(0.55, abs=0.06)
@@ -107,21 +116,27 @@ def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
 
 
 def test_near_an_obstacle_tb_fails_likewise() -> None:
-    """Near an obstacle behind, TB fails, as it reads the rear sonar."""
+    """TB begins near an obstacle behind the robot.
+
+    The server reads the rear sonar, and TB fails.
+    """
     rig = Rig(rear_m=12 * INCH_M)
     assert rig.ask("TB 24") == "fail Insufficient rear clearance."
 
 
 @pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
 def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
-    """The options NCC and DOCK switch the obstacle check off, so the robot hits the wall."""
+    """NCC and DOCK switch the obstacle check off, so the robot hits the wall."""
     rig = Rig(front_m=20 * INCH_M)
     assert rig.ask(text, 60.0) == "ok 30"
     assert rig.server.hit_wall
 
 
 def test_tf_dock_stops_at_the_dock() -> None:
-    """TF DOCK stops at the dock; its reply has a distance computed from time, not measured."""
+    """TF DOCK ends at the dock.
+
+    The distance in its reply is computed from the time, not measured.
+    """
     rig = Rig(dock_m=20 * INCH_M)
     assert rig.ask("DOCKED") == "ok false"
     answer = rig.ask("TF DOCK 60", 60.0)
@@ -132,7 +147,7 @@ def test_tf_dock_stops_at_the_dock() -> None:
 
 
 def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
-    """TFSFC sets the clearance of the next TF only; then the clearance is 19 inches again."""
+    """TFSFC sets the clearance of the next TF only. For the TF after that it is 19 inches again."""
     rig = Rig(front_m=60 * INCH_M)
     assert rig.ask("TFSFC 40") == "ok"
     assert rig.ask("TF 60") == "fail Insufficient front clearance."
@@ -142,7 +157,7 @@ def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
 
 
 def test_tf_holds_its_course_with_unequal_motors() -> None:
-    """TF corrects its course by the gyro; F does not."""
+    """The motors are unequal. TF corrects its course by the gyro, but F does not."""
     rig = Rig(motor_inequality=0.05)
     assert rig.ask("TF 80", 60.0) == "ok 80"
     assert abs(rig.yaw_deg) < 4
@@ -152,7 +167,10 @@ def test_tf_holds_its_course_with_unequal_motors() -> None:
 
 
 def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
-    """If one wheel stops, TF turns away and ends with "fail excessive gyro correct"."""
+    """One wheel stops during TF, and the robot turns away.
+
+    TF ends with "fail excessive gyro correct".
+    """
     rig = Rig()
     rig.say("TF 80")
     rig.run(1.0)
@@ -169,7 +187,10 @@ def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
 
 
 def test_mcr_normal_90_parses_as_0() -> None:
-    """MCR NORMAL 90 is answered by ok, but the robot does not turn."""
+    """The server reads MCR NORMAL 90 as an angle of 0.
+
+    It answers ok, and the robot does not turn.
+    """
     rig = Rig()
     assert rig.ask("MCR NORMAL 90") == "ok"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -186,14 +207,14 @@ def test_less_than_10_degrees_are_turned_slowly() -> None:
 
 @pytest.mark.parametrize("text", ["PTF 12 4 0.05 10", "PTF SLOW 12 4 0 10", "MCF 12", "MCB 12"])
 def test_undocumented_moves_answer_ok(text: str) -> None:
-    """Undocumented moves are answered by ok, without a distance."""
+    """The server answers undocumented moves with ok, without a distance."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert abs(rig.x_in) > 8
 
 
 def test_the_port_is_silent_during_a_controlled_move() -> None:
-    """TF SLOW 80 takes 20 s; requests that are sent meanwhile are answered after it."""
+    """TF SLOW 80 takes 20 s. Requests that come in this time are answered after it."""
     rig = Rig()
     rig.say("TF SLOW 80", "ENC", "RMRA")
     assert rig.run(15.0) == []

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Uncontrolled motion of the public server (F, B, RM, R, L): speeds, signs, limits, obstacles."""
+"""Tests of the public server's uncontrolled motions: F, B, RM, R and L."""
 
 import pytest
 from mart_rig import INCH_M, Rig
@@ -27,9 +27,9 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """If RM fails although the robot moves, only a write to the motors ends the motion.
+    """RM fails on some servers although the robot moves. The server then knows of no motion.
 
-    For the server no motion is in progress, so SRM fails and SL has no effect.
+    So SRM fails and SL has no effect. Only a write to the motors stops the robot.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -49,7 +49,10 @@ def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
 
 @pytest.mark.parametrize("change", ["1 1", "-1 -1", "5 -5", "0 1", "40 40"])
 def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(change: str) -> None:
-    """After RM -20, RMCS 0 0 has no effect; any other RMCS stops a motor or drives it forward."""
+    """RM -20 drives backward.
+
+    RMCS 0 0 changes nothing, but another RMCS stops a motor or drives it forward.
+    """
     rig = Rig()
     rig.drive("RM -20")
     assert rig.x_in < -1
@@ -67,7 +70,10 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """RM 200 drives backward at 56 units; the smallest RMCS then drives full speed forward."""
+    """RM 200 drives backward at 56 units.
+
+    Even the smallest RMCS then drives at full speed forward.
+    """
     rig = Rig()
     rig.drive("RM 200")
     assert rig.server.chassis.right == 128 + 56
@@ -78,7 +84,7 @@ def test_rm_200_drives_backward_at_56() -> None:
 
 @pytest.mark.parametrize("speed", [1, 30, 127])
 def test_rm_1_to_127_drives_forward(speed: int) -> None:
-    """After RM, the motor register is 128 minus the speed."""
+    """RM drives forward at speeds from 1 to 127. The motor register is 128 minus the speed."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.server.chassis.right == 128 - speed
@@ -86,7 +92,10 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 
 
 def test_a_stuck_motor_can_hang_rm() -> None:
-    """After a fast drive, RM hangs if a motor is stuck; meanwhile the other motor turns."""
+    """After a fast drive, one motor is stuck.
+
+    The next RM hangs the server while the other motor turns.
+    """
     rig = Rig()
     rig.drive("RM 110")
     assert rig.ask("SRM") == "ok"
@@ -101,7 +110,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """If a motor is stuck, the first RM fails without a reason; an RM after F gives a reason."""
+    """A motor is stuck. The first RM fails without a reason, and an RM after F gives one."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)
@@ -112,7 +121,7 @@ def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
 
 
 def test_rm_0_is_a_motor_that_does_not_turn() -> None:
-    """RM fails if its speed is zero or within the dead zone of the motors."""
+    """RM fails if its speed is zero, or too low to turn the motors."""
     assert Rig().ask("RM 0") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 3") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 5") == "ok"
@@ -122,7 +131,7 @@ def test_rm_0_is_a_motor_that_does_not_turn() -> None:
     ("text", "seconds"), [("R", 0.6), ("L", 0.6), ("MCR 20", 0.6), ("F", 0.76), ("TF 12", 0.76)]
 )
 def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
-    """After a start that fails because of a stuck motor, motors are off and the server is idle."""
+    """A motor is stuck, so a start fails. Then the motors are off, and no motion is in progress."""
     rig = Rig(stuck="right")
     assert rig.ask(text) == "fail start timedout"
     assert rig.took_s == pytest.approx(seconds, abs=0.02)
@@ -132,7 +141,10 @@ def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
 
 
 def test_a_stuck_left_motor_is_not_noticed() -> None:
-    """A stuck left motor is not noticed, as only the right wheel has an encoder."""
+    """The left motor is stuck.
+
+    The server does not notice it, as only the right wheel has an encoder.
+    """
     rig = Rig(stuck="left")
     rig.drive("F")
     assert rig.yaw_deg > 20
@@ -140,9 +152,9 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """The numbers of CS and RMCS are for the right and left motor; positive is more forward.
+    """CS and RMCS change the speeds of the right and the left motor, in this order.
 
-    This is also true during B, which drives backward.
+    A positive number is more forward, also during B, which drives backward.
     """
     rig = Rig()
     rig.drive(start)
@@ -178,7 +190,10 @@ def test_cs_5_minus_5_turns_left() -> None:
     ],
 )
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
-    """CS and RMCS cannot reverse a motor; at full speed they slow down the other motor."""
+    """CS and RMCS cannot reverse a motor.
+
+    If a motor is already at full speed, they slow down the other one instead.
+    """
     rig = Rig()
     rig.drive(start, 0.5)
     rig.ask(change)
@@ -186,7 +201,7 @@ def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int
 
 
 def test_rmcs_0_0_just_reads_the_angle() -> None:
-    """RMCS 0 0 changes nothing and returns the angle, as RMRA does."""
+    """RMCS 0 0 changes no speed. It returns the angle, as RMRA does."""
     rig = Rig()
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -198,7 +213,7 @@ def test_rmcs_0_0_just_reads_the_angle() -> None:
 
 @pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
 def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
-    """RMRA returns the angle turned since RM, positive to the left, with only the gyro's noise."""
+    """RMRA returns the angle since the start of RM. It is positive to the left."""
     rig = Rig(gyro_bias_dps=0.0)
     rig.drive("L")
     rig.ask("SM")
@@ -227,7 +242,7 @@ def test_rmra_works_at_any_time(start: str) -> None:
 
 
 def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
-    """ENC returns the signed count of the right wheel, within 5 ms."""
+    """ENC returns the count of the right wheel, with its sign, within 5 ms."""
     rig = Rig(metres_per_count=0.001)
     rig.drive("R")
     spun = rig.number("ENC")
@@ -241,7 +256,7 @@ def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R", "L", "TF 2", "MCR 5", "MCR 0"])
 def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
-    """The encoder count stays after a motion; the start of the next motion sets it to zero."""
+    """The encoder keeps its count after a motion. The start of the next motion sets it to zero."""
     rig = Rig()
     rig.drive("F")
     rig.ask("SM")
@@ -254,7 +269,7 @@ def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
 
 @pytest.mark.parametrize(("start", "side"), [("F", "front_m"), ("B", "rear_m")])
 def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str) -> None:
-    """An obstacle ends F and B without a message; only the reply to the next SM reports it."""
+    """An obstacle ends F or B without a message. Only the reply to the next SM reports it."""
     rig = Rig(**{side: 45 * INCH_M})
     rig.drive(start, 10.0)
     assert not rig.moving
@@ -266,9 +281,9 @@ def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str
 
 
 def test_an_obstacle_ends_rm_and_srm_tells() -> None:
-    """After an obstacle has ended RM, RMCS and SRM fail with "insufficient clearance".
+    """An obstacle ends RM. RMCS and SRM then fail with "insufficient clearance".
 
-    The reply to SM spells it differently.
+    The reply to SM would spell it differently.
     """
     rig = Rig(front_m=45 * INCH_M)
     rig.drive("RM 30", 10.0)
@@ -279,7 +294,10 @@ def test_an_obstacle_ends_rm_and_srm_tells() -> None:
 
 
 def test_backward_rm_and_spins_see_no_obstacle() -> None:
-    """The server does not read the rear sonar during a backward RM or a spin."""
+    """The robot drives backward with RM.
+
+    The server does not read the rear sonar, and the robot hits the wall.
+    """
     rig = Rig(rear_m=20 * INCH_M)
     rig.drive("RM -20", 6.0)
     assert rig.server.hit_wall
@@ -287,7 +305,7 @@ def test_backward_rm_and_spins_see_no_obstacle() -> None:
 
 @pytest.mark.parametrize(("front_in", "stops"), [(19.5, False), (18.5, True)])
 def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
-    """The front threshold is 19 inches; the sonar measures whole inches."""
+    """RM ends if an obstacle in front is nearer than 19 inches. The sonar measures whole inches."""
     rig = Rig(front_m=front_in * INCH_M)
     rig.drive("RM 1", 0.3)
     assert rig.server.chassis.powered is not stops
@@ -295,7 +313,10 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 
 @pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.5, True)])
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
-    """The rear threshold is 15 inches, but the robot moves 2 inches before the first look."""
+    """B ends if an obstacle behind is nearer than 15 inches.
+
+    The robot moves 2 inches before the server reads the sonar for the first time.
+    """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)
     assert rig.server.chassis.powered is not stops
@@ -306,7 +327,10 @@ def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
 def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
     volts: float, inequality: float
 ) -> None:
-    """A register value gives a speed that depends on voltage and motor: the regulator is off."""
+    """The motors have no speed regulator.
+
+    The speed of a unit depends on the voltage and the motor.
+    """
     rig = Rig(volts=volts, motor_inequality=inequality)
     rig.drive("RM 40")
     chassis = rig.server.chassis
@@ -317,7 +341,10 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 
 
 def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
-    """MCS sets the motor registers, the right one first; then all but MSM is refused."""
+    """MCS sets the motor registers, the right one first.
+
+    Then the server refuses all else until MSM.
+    """
     rig = Rig()
     assert rig.ask("MCS 100 120") == "ok"
     assert (rig.server.chassis.right, rig.server.chassis.left) == (100, 120)
@@ -330,5 +357,5 @@ def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
 
 
 def test_the_firmware_is_what_is_played_by_default() -> None:
-    """By default the simulated controller behaves as the public server, not as its manual."""
+    """By default the simulated controller behaves like the public server, not as in its manual."""
     assert Rig().server.quirks == FIRMWARE

@@ -1,13 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""File downloads from the public server, and how EXIT ends the server."""
+"""Tests of file downloads from the public server, and of EXIT, which ends the server."""
 
 import pytest
 from mart_rig import Rig
 
 
 def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
-    """Return the name, the size and the blocks of the file that the server sends for ``text``."""
+    """Request a file with ``text``; return its name, its size and its blocks."""
     before = len(rig.replies)
     rig.say(text)
     rig.run(0.1)
@@ -31,7 +31,7 @@ def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
 def test_a_file_comes_in_datagrams_of_512_bytes(
     start: str, end: str | None, text: str, name: str
 ) -> None:
-    """A download begins with name and size; SRM also writes the file of LAST MOVE."""
+    """After a motion, its file is downloaded: first name and size, then blocks of 512 bytes."""
     rig = Rig()
     answer = rig.ask(start)
     assert answer is not None
@@ -49,7 +49,10 @@ def test_a_file_comes_in_datagrams_of_512_bytes(
 
 
 def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
-    """Files are in Latin-1 and have the byte 0xB0 (°), so they are not valid UTF-8."""
+    """Files are in Latin-1 and contain the byte 0xB0, the degree sign.
+
+    So they are not valid UTF-8.
+    """
     rig = Rig()
     rig.ask("TF 12")
     content = b"".join(download(rig, "LAST MOVE")[2])
@@ -60,7 +63,10 @@ def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
 
 
 def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
-    """The first LOG deletes earlier files; a second LOG deletes nothing."""
+    """The first LOG deletes earlier files, so a download of them fails.
+
+    A second LOG deletes nothing.
+    """
     rig = Rig()
     rig.ask("TF 5")
     assert rig.ask("LOG") == "ok"
@@ -72,7 +78,7 @@ def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
 
 
 def test_exit_downloads_the_log_if_log_was_given() -> None:
-    """EXIT sends the log if LOG was given, and ends the server."""
+    """After LOG, EXIT sends the log file and ends the server."""
     rig = Rig()
     rig.ask("LOG")
     rig.ask("HELLO")

@@ -10,7 +10,10 @@ LOST = "fail MPU6050 connection lost"
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
 def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
-    """With a dead IMU the request is never answered, nor is any later request."""
+    """The IMU is dead, and a request that needs it comes. The robot does not move.
+
+    The server answers neither this request nor any later one.
+    """
     rig = Rig(imu_dies_s=0.0)
     rig.say(text, "HELLO", "SM")
     rig.stop("SL")
@@ -22,7 +25,7 @@ def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24"])
 def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: str) -> None:
-    """A move that waits for a dead IMU starts when the IMU responds again, even after minutes."""
+    """A move waits for a dead IMU. Minutes later the IMU works again, and the move starts."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=300.0)
     rig.say(text)
     rig.run(299.0)
@@ -36,7 +39,7 @@ def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: 
 def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
     text: str, stops: tuple[str, ...]
 ) -> None:
-    """With a dead IMU, RM, R and L start the motors, but are never answered; no stop works."""
+    """The IMU is dead. RM, R and L start the motors and are never answered, and no stop works."""
     rig = Rig(imu_dies_s=0.0)
     rig.say(text)
     rig.run(0.5)
@@ -52,21 +55,27 @@ def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
 
 @pytest.mark.parametrize("text", ["RM 30", "R"])
 def test_the_start_timeout_is_dead_without_an_imu(text: str) -> None:
-    """Without samples of the IMU, the server does not notice that a motor is stuck."""
+    """The IMU is dead and the motors are stuck.
+
+    The server does not notice it and keeps the power on.
+    """
     rig = Rig(imu_dies_s=0.0, stuck="both")
     assert rig.ask(text) is None
     assert rig.server.chassis.powered
 
 
 def test_the_obstacle_check_is_dead_without_an_imu() -> None:
-    """Without samples of the IMU, the server does not check for obstacles during RM."""
+    """The IMU is dead.
+
+    The server does not check for obstacles during RM, and the robot hits the wall.
+    """
     rig = Rig(imu_dies_s=0.0, front_m=50 * INCH_M)
     rig.ask("RM 30")
     assert rig.server.hit_wall
 
 
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
-    """An RM without an IMU, and the requests after it, are answered when the IMU responds again."""
+    """RM and SRM come while the IMU is dead. Both are answered when it works again."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
     assert rig.run(29.0) == []
@@ -75,7 +84,10 @@ def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> 
 
 
 def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() -> None:
-    """If the IMU dies during RM, SRM stops the motors, but is not answered."""
+    """The IMU dies during RM. The angle of RMRA stays constant, and obstacles are ignored.
+
+    SRM then stops the motors, but is not answered.
+    """
     rig = Rig(imu_dies_s=1.0, front_m=60 * INCH_M)
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -93,7 +105,10 @@ def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() ->
 
 
 def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
-    """While the IMU works, RMRA changes throughout a drive; a constant value shows a dead IMU."""
+    """While the IMU works, the angle of RMRA changes throughout a drive.
+
+    A constant one shows a dead IMU.
+    """
     for seed in range(8):
         rig = Rig(seed=seed)
         rig.drive("RM 30", 0.0)
@@ -113,7 +128,10 @@ def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
 
 
 def test_rst_imu_proves_it_in_0_13_s() -> None:
-    """RST IMU shows in 0.13 s whether the IMU works; it is refused while the robot moves."""
+    """RST IMU shows in 0.13 s whether the IMU works.
+
+    The server refuses it while the robot moves.
+    """
     rig = Rig()
     assert rig.ask("RST IMU") == "ok"
     rig.server.imu.alive = False
@@ -126,7 +144,10 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 
 
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
-    """After the IMU has failed, the server uses it again only after a successful RST IMU or SB."""
+    """The server has given up a dead IMU, and the IMU works again.
+
+    The server uses it only after a successful RST IMU or SB.
+    """
     for cure in ("RST IMU", "SB"):
         rig = Rig()
         rig.server.imu.alive = False
@@ -139,7 +160,7 @@ def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -
 
 
 def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
-    """With a dead IMU, MCR fails after half a second, and the motors stop."""
+    """The IMU is dead. MCR fails after half a second, and the motors stop."""
     rig = Rig(imu_dies_s=0.0)
     assert rig.ask("MCR 90") == LOST
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -149,7 +170,7 @@ def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
 
 @pytest.mark.parametrize("text", ["TF 200", "TB 200", "MCR 1000", "MCL 1000"])
 def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
-    """If the IMU dies during a controlled move, the move continues for 1.5 s and then fails."""
+    """The IMU dies during a controlled move. The move continues for 1.5 s and then fails."""
     rig = Rig(imu_dies_s=2.0)
     assert rig.ask(text) == LOST
     assert rig.took_s == pytest.approx(3.5, abs=0.05)
@@ -159,7 +180,10 @@ def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> None:
-    """If the IMU dies during F or R, SM stops the robot; its reply comes when the IMU is back."""
+    """The IMU dies during F or R.
+
+    SM stops the robot, but is answered only when the IMU works again.
+    """
     rig = Rig(imu_dies_s=1.0, imu_returns_s=40.0)
     rig.drive(start, 2.0)
     assert rig.ask("SM") is None
@@ -169,7 +193,7 @@ def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> 
 
 
 def test_the_bias_drifts_until_sb_finds_it() -> None:
-    """The gyro's bias drifts until SB measures it, which takes 0.53 s."""
+    """The gyro's bias makes the angle drift. SB measures the bias in 0.53 s, and the drift ends."""
     rig = Rig(gyro_bias_dps=0.5)
     rig.run(100.0)
     assert rig.number("RMRA") == pytest.approx(50.0, abs=1.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Properties of the simulated controller: time, copies, seeds, networks, ports, options."""
+"""Tests of the simulated controller itself: time, copies, seeds, networks and options."""
 
 import copy
 import random
@@ -25,7 +25,7 @@ TEXTS = (
 
 
 def walk(rig: Rig, seed: int, steps: int) -> None:
-    """Send random requests and stops, and disconnect and reconnect the IMU."""
+    """Send random requests and stops; at times switch the IMU on or off, or restart the server."""
     dice = random.Random(seed)
     for _ in range(steps):
         rig.run(dice.choice((0.0, 0.01, 0.1, 0.5, 2.0)))
@@ -42,7 +42,10 @@ def walk(rig: Rig, seed: int, steps: int) -> None:
 
 @pytest.mark.parametrize("seed", range(15))
 def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -> None:
-    """A copy of the server replies as the original does, for steps of time of any size."""
+    """A server is copied in the middle of random requests.
+
+    The copy then replies like the original.
+    """
     rig = Rig(seed=seed, front_m=3.0, rear_m=3.0)
     walk(rig, seed, 40)
     twins = [rig.server.copy(), copy.deepcopy(rig.server)]
@@ -59,7 +62,10 @@ def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -
 
 
 def test_the_size_of_the_steps_does_not_matter() -> None:
-    """Steps of time of 1 ms and of 2 s give the same replies."""
+    """The same requests are simulated in time steps of 1 ms, 13 ms and 2 s.
+
+    The replies are the same.
+    """
     found = []
     for step_s in (0.001, 0.013, 2.0):
         rig = Rig(motor_inequality=0.03)
@@ -90,7 +96,7 @@ def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
 
 
 def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
-    """Datagrams are lost, doubled and reordered in both directions, in simulated time."""
+    """A bad network loses, doubles and reorders datagrams in both directions, by its seed."""
 
     def talk(seed: int) -> tuple[list[bytes], list[bytes]]:
         faults = NetworkFaults(lose=0.2, duplicate=0.2, delay_s=0.3)
@@ -115,7 +121,7 @@ def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
 
 
 def test_options_choose_the_robot_and_its_faults() -> None:
-    """A sim:// URL has the same options as the command line."""
+    """The options of a sim:// URL, the same as those of the command line, reach the controller."""
     board, lines = options.from_url(
         "sim://?firmware=documented&volts=21.5&imu-dies=3&stuck=left&speed-per-unit=0.01"
         "&metres-per-count=0.001&motor-inequality=0.05&front=2&rear=1&dock=4&encoder-inverted"
@@ -137,7 +143,7 @@ def test_options_choose_the_robot_and_its_faults() -> None:
 
 @pytest.mark.parametrize("word", ["volts=x", "volts=99", "motor-status=256", "stuck=front"])
 def test_options_that_make_no_sense_are_refused(word: str) -> None:
-    """Each wrong option is refused with a message for the user."""
+    """A user gives a wrong option. It is refused with a message."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{word}", mart)
 
@@ -165,7 +171,7 @@ def test_it_answers_on_two_udp_ports() -> None:
 
 
 def test_it_answers_in_process() -> None:
-    """A sim:// URL runs the controller in the driver's process, where it can also be rebooted."""
+    """A sim:// URL runs the controller in the driver's process, and it answers."""
     transport = SimulatedTransport("sim://?volts=25", "omnibot_driver.simulator.mart")
     try:
         transport.write([(0, b"VOLTS")])
@@ -178,7 +184,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The controller's facts are those that the console and the tests use."""
+    """The controller has the facts that the console and the tests use. They show its state."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

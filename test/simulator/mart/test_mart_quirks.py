@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Each deviation of the public server from its manual can be observed, and be switched off."""
+"""Tests that each quirk of the simulated MART server can be observed, and can be switched off.
+
+A quirk is a deviation of the public server from its manual. A function with the name of a quirk
+returns whether a server with the given quirks shows that one.
+"""
 
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -15,7 +19,7 @@ IN_SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_st
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """After SL alone, every motion is refused as a conflict, and SM hangs the command port."""
+    """Return whether, after SL alone, the server refuses motions, and SM hangs the command port."""
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SL")
@@ -29,7 +33,7 @@ def stop_port_keeps_motion(quirks: Quirks) -> bool:
 
 
 def spin_stop_ends_drives(quirks: Quirks) -> bool:
-    """SS stops the drive that F has started."""
+    """Return whether SS stops the drive that F has started."""
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SS")
@@ -38,7 +42,7 @@ def spin_stop_ends_drives(quirks: Quirks) -> bool:
 
 
 def early_stop_is_ignored(quirks: Quirks) -> bool:
-    """An SL that comes 0.1 s after F, before the ok of F, does not stop the robot."""
+    """Return whether an SL 0.1 s after F, before the ok of F, does not stop the robot."""
     rig = Rig(quirks)
     rig.say("F")
     rig.run(0.1)
@@ -47,7 +51,7 @@ def early_stop_is_ignored(quirks: Quirks) -> bool:
 
 
 def left_spin_in_reference_move(quirks: Quirks) -> bool:
-    """The command L during RM starts a spin, and the server no longer answers."""
+    """Return whether the command L during RM starts a spin, and the server no longer answers."""
     rig = Rig(quirks)
     rig.drive("RM 30")
     if rig.ask("L") == CONFLICT:
@@ -57,7 +61,7 @@ def left_spin_in_reference_move(quirks: Quirks) -> bool:
 
 
 def moves_wait_for_imu(quirks: Quirks) -> bool:
-    """Without an IMU, F is not answered; the motion starts when the IMU is back."""
+    """Return whether, without an IMU, F is not answered, and starts when the IMU is back."""
     rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
     rig.say("F")
     answer = rig.wait(59.0)
@@ -66,20 +70,23 @@ def moves_wait_for_imu(quirks: Quirks) -> bool:
 
 
 def drives_trust_imu(quirks: Quirks) -> bool:
-    """Without an IMU, RM moves the robot and is not answered."""
+    """Return whether, without an IMU, RM moves the robot and is not answered."""
     rig = Rig(quirks, imu_dies_s=0.0)
     silent = rig.ask("RM 30") is None
     return silent and rig.moving
 
 
 def reference_speed_wraps(quirks: Quirks) -> bool:
-    """RM with a negative speed, -20, drives backward."""
+    """Return whether RM with a negative speed, -20, drives backward."""
     rig = Rig(quirks)
     return rig.ask("RM -20") == "ok" and rig.server.chassis.right_mps < 0
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """If a stop took 0.57 s, the next RM fails at once; the RM after that succeeds."""
+    """Return whether, after a stop that took 0.57 s, the next RM fails at once.
+
+    The RM after that succeeds.
+    """
     rig = Rig(quirks)
     rig.drive("RM 66")
     assert rig.ask("SRM") == "ok"
@@ -93,7 +100,7 @@ def reference_start_counts_on(quirks: Quirks) -> bool:
 
 
 def speed_word_first(quirks: Quirks) -> bool:
-    """TF 24 SLOW is as fast as TF 24."""
+    """Return whether TF 24 SLOW is as fast as TF 24."""
     rig, normal = Rig(quirks), Rig(quirks)
     rig.ask("TF 24 SLOW")
     normal.ask("TF 24")
@@ -101,13 +108,13 @@ def speed_word_first(quirks: Quirks) -> bool:
 
 
 def zero_distance_is_unlimited(quirks: Quirks) -> bool:
-    """TF 0 drives without end."""
+    """Return whether TF 0 drives without end."""
     rig = Rig(quirks)
     return rig.ask("TF 0", 60.0) is None and rig.moving
 
 
 def echoes_distance(quirks: Quirks) -> bool:
-    """The reply to a move of 12 inches is 12, although 16 inches were driven."""
+    """Return whether the reply to a move of 12 inches is 12, although 16 inches were driven."""
     rig = Rig(quirks)
     answer = rig.ask("TF 12")
     assert round(rig.x_in) == 16
@@ -115,13 +122,13 @@ def echoes_distance(quirks: Quirks) -> bool:
 
 
 def crashes_on_missing_numbers(quirks: Quirks) -> bool:
-    """TIME with five numbers crashes the server."""
+    """Return whether TIME with five numbers crashes the server."""
     rig = Rig(quirks)
     return rig.ask("TIME 7 4 2024 12 30") is None and bool(rig.server.crashed)
 
 
 def crashes_early(quirks: Quirks) -> bool:
-    """VOLTS crashes a server that has just started, but not one that has run for a while."""
+    """Return whether VOLTS crashes a server that has just started."""
     rig = Rig(quirks)
     rig.server.restart(boot_s=0.0)
     early = rig.ask("VOLTS")
@@ -132,19 +139,19 @@ def crashes_early(quirks: Quirks) -> bool:
 
 
 def empty_datagram_ends(quirks: Quirks) -> bool:
-    """Requests after an empty datagram are not answered."""
+    """Return whether requests after an empty datagram are not answered."""
     rig = Rig(quirks)
     rig.say("")
     return rig.ask("HELLO") is None
 
 
 def exit_is_silent(quirks: Quirks) -> bool:
-    """EXIT without a LOG before it is not answered."""
+    """Return whether EXIT is not answered if there was no LOG before it."""
     return Rig(quirks).ask("EXIT") is None
 
 
 def log_deletes_files(quirks: Quirks) -> bool:
-    """After LOG, the server knows the name of the last file, but the file is deleted."""
+    """Return whether LOG deletes the last file, although the server still knows its name."""
     rig = Rig(quirks)
     rig.ask("MCR SLOW 20")
     rig.ask("LOG")
@@ -153,14 +160,14 @@ def log_deletes_files(quirks: Quirks) -> bool:
 
 
 def unknown_reset_repeats(quirks: Quirks) -> bool:
-    """RST x repeats the previous reply, which in this test is the voltage."""
+    """Return whether RST x repeats the previous reply, which is the voltage here."""
     rig = Rig(quirks)
     rig.ask("VOLTS")
     return rig.ask("RST x") == "ok 24.00"
 
 
 def clock_moves_heading(quirks: Quirks) -> bool:
-    """If the clock is set ahead by an hour while the robot turns, the heading jumps."""
+    """Return whether the heading jumps when the clock is set ahead by an hour during a turn."""
     rig = Rig(quirks)
     rig.ask("TIME 1 1 2024 0 0 0")
     rig.drive("RM 30")
@@ -171,19 +178,19 @@ def clock_moves_heading(quirks: Quirks) -> bool:
 
 
 def undocumented_commands(quirks: Quirks) -> bool:
-    """TFSFC, an undocumented command, is understood."""
+    """Return whether the server understands TFSFC, an undocumented command."""
     return Rig(quirks).ask("TFSFC 30") == "ok"
 
 
 def heading_in_reference_moves_only(quirks: Quirks) -> bool:
-    """The heading that RMRA returns does not change in a spin."""
+    """Return whether the heading that RMRA returns does not change in a spin."""
     rig = Rig(quirks)
     rig.drive("R")
     return rig.number("RMRA") == 0.0
 
 
 def probe_turns(quirks: Quirks) -> bool:
-    """MCR SLOW 0 with a dead IMU turns the robot."""
+    """Return whether MCR SLOW 0 with a dead IMU turns the robot."""
     rig = Rig(quirks, imu_dies_s=0.0)
     assert rig.ask("MCR SLOW 0") == "fail MPU6050 connection lost"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -191,7 +198,7 @@ def probe_turns(quirks: Quirks) -> bool:
 
 
 def heading_starts_off(quirks: Quirks) -> bool:
-    """The second RM, a long time after the first, begins with a heading that is not zero."""
+    """Return whether a second RM, long after the first, begins with a heading that is not zero."""
     rig = Rig(quirks)
     for _ in range(2):
         rig.drive("RM 30", 0.0)
@@ -215,26 +222,29 @@ def test_every_quirk_has_its_sight() -> None:
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """A detector finds its quirk if the quirk is on, and not if only this quirk is off."""
+    """The detector of a quirk finds it if it is on. It finds nothing if only this quirk is off."""
     assert SEEN[name](replace(FIRMWARE, **{name: True}))
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
-    """A detector finds nothing in a server as in the manual, where all quirks are off."""
+    """On a server as in the manual, all quirks are off. No detector finds its quirk."""
     assert not SEEN[name](DOCUMENTED)
 
 
 @pytest.mark.parametrize("name", IN_SOURCE_ALONE)
 def test_what_only_the_source_says_is_played_only_if_it_is_asked_for(name: str) -> None:
-    """Quirks that only the published source has are off unless this variant is selected."""
+    """Some quirks are only in the published source.
+
+    They are off unless that variant is selected.
+    """
     assert SEEN[name](SOURCE)
     assert not SEEN[name](FIRMWARE)
 
 
 def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
-    """By the published source, SS has no effect on F, which SM ends as usual."""
+    """In the published source, SS has no effect on F. SM ends F as usual."""
     rig = Rig(SOURCE)
     rig.drive("F")
     rig.stop("SS")
@@ -245,7 +255,10 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """A server without the crashes answers that a number is missing, and continues."""
+    """A command has too few numbers, and this crash is switched off.
+
+    The server refuses the command.
+    """
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
         rig.drive("F")
@@ -254,7 +267,7 @@ def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> No
 
 
 def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
-    """A server as in the manual stops every motion when its IMU dies."""
+    """The IMU dies during a motion. A server as in the manual stops the robot."""
     for start in ("F", "RM 30", "R"):
         rig = Rig(DOCUMENTED, imu_dies_s=1.0, front_m=200 * INCH_M)
         rig.drive(start, 5.0)
@@ -263,7 +276,7 @@ def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """On a server as in the manual, a stopped move is answered within 1 s of the stop."""
+    """A controlled move is stopped at any time. A server as in the manual answers it within 1 s."""
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):
             rig = Rig(DOCUMENTED)
@@ -278,12 +291,12 @@ def test_a_documented_move_is_cancelled_at_any_time() -> None:
 
 
 def test_the_ports_are_numbered_as_they_stand() -> None:
-    """Channel 0 is the command port."""
+    """The command port is channel 0."""
     assert COMMAND == 0
 
 
 def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
-    """By the published source, MCR SLOW 0 turns the robot by 1 to 2.5 degrees to the right."""
+    """In the published source, MCR SLOW 0 turns the robot to the right by 1 to 2.5 degrees."""
     rig = Rig(SOURCE)
     for probes in (1, 2, 3):
         assert rig.ask("MCR SLOW 0") == "ok"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The requests that the public server understands, and its replies at rest."""
+"""Tests of the requests that the public server understands, and of its replies at rest."""
 
 import pytest
 from mart_rig import INCH_M, Rig
@@ -34,7 +34,7 @@ NOT_SUPPORTED = "fail command not supported"
     ],
 )
 def test_a_question_is_answered_in_its_time(text: str, answer: str, seconds: float) -> None:
-    """At rest, the request is answered by ``answer`` after ``seconds``."""
+    """The robot is at rest. The server answers the request with ``answer`` after ``seconds``."""
     rig = Rig(gyro_bias_dps=0.0)
     assert rig.ask(text) == answer
     assert rig.took_s == pytest.approx(seconds, abs=0.001)
@@ -73,7 +73,7 @@ def test_a_question_is_answered_in_its_time(text: str, answer: str, seconds: flo
     ],
 )
 def test_what_is_not_a_command_is_refused(text: str) -> None:
-    """Unknown words, and commands in lower case or with a line feed, are refused."""
+    """The server refuses unknown words, and commands in lower case or with a line feed."""
     rig = Rig()
     assert rig.ask(text) == NOT_SUPPORTED
     assert not rig.moving
@@ -81,14 +81,17 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
-    """RMCS with one number is refused; no other command checks how many numbers it gets."""
+    """RMCS comes with one number, and the server refuses it.
+
+    No other command checks its numbers.
+    """
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == "fail improper command format"
 
 
 def test_only_49_bytes_are_taken_of_a_request() -> None:
-    """The bytes of a request after the 49th are discarded."""
+    """A request is longer than 49 bytes. The server discards the rest."""
     rig = Rig()
     assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 40 + "7") == "ok"
     assert rig.ask("HELLO" + "\0" * 60) == "ok BBB"
@@ -108,7 +111,7 @@ def test_only_49_bytes_are_taken_of_a_request() -> None:
     ],
 )
 def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str | None) -> None:
-    """A command with too few numbers crashes the server; the motors keep their speed."""
+    """A command has too few numbers. The server crashes, and the motors keep their speed."""
     rig = Rig()
     if start:
         rig.drive(start)
@@ -121,7 +124,10 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 
 
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
-    """At rest, the server refuses CS without reading its numbers; a missing one does no harm."""
+    """The robot is at rest, so the server refuses CS without reading its numbers.
+
+    It does not crash.
+    """
     assert Rig().ask("CS 5") == "fail"
 
 
@@ -138,7 +144,11 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """A restarted server does not know of the old motion, which only a power cycle stops."""
+    """The server is restarted while the robot moves.
+
+    It knows of no motion and cannot stop the robot. Only a power cycle of the controller stops the
+    motors.
+    """
     rig = Rig()
     rig.drive("RM 30")
     rig.say("")
@@ -158,14 +168,14 @@ def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
     ("inches", "seen"), [(100.7, 100), (254.5, 254), (255.5, -1), (300, -1), (0.5, -1)]
 )
 def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen: int) -> None:
-    """Both sonars report whole inches, and -1 above 254 inches."""
+    """Both sonars report whole inches. Below 1 inch and above 254 inches they report -1."""
     rig = Rig(front_m=inches * INCH_M, rear_m=inches * INCH_M)
     assert rig.number("SFC") == seen
     assert rig.number("SRC") == seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """If something is near, a sonar measures three times, so its reply takes longer."""
+    """Something is near the front sonar. It measures three times, so its reply takes longer."""
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"
     assert rig.took_s == pytest.approx(0.165)
@@ -174,7 +184,7 @@ def test_a_sonar_measures_three_times_what_is_near() -> None:
 
 
 def test_sonars_turn_with_the_robot() -> None:
-    """After half a turn of the robot, each sonar measures what the other one measured before."""
+    """The robot makes half a turn. Each sonar then measures what the other one measured before."""
     rig = Rig(front_m=100 * INCH_M, rear_m=40 * INCH_M)
     rig.ask("MCL 174")
     assert rig.yaw_deg == pytest.approx(178, abs=5)
@@ -194,21 +204,27 @@ def test_sonars_turn_with_the_robot() -> None:
 def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
     changes: dict[str, float], bits: int
 ) -> None:
-    """MCSTAT has bits: 4, 8: tripped; 16, 32: short circuit; 64: above 30 V; 128: below 16 V."""
+    """Each bit of MCSTAT is one fault of the motor board.
+
+    Bits 4 and 8 are a trip, 16 and 32 a short circuit, 64 more than 30 V, and 128 less than 16 V.
+    """
     rig = Rig()
     rig.server.chassis.change(**changes)  # type: ignore[arg-type]
     assert rig.number("MCSTAT") == bits
 
 
 def test_a_motor_that_tripped_does_not_turn() -> None:
-    """A motor that has tripped does not turn; the other motor turns."""
+    """The left motor has tripped and does not turn. The right motor turns."""
     rig = Rig(motor_status=8)
     rig.drive("RM 30")
     assert rig.server.chassis.left_mps == 0.0 < rig.server.chassis.right_mps
 
 
 def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> None:
-    """If the motor board is silent, ENC fails after 0.2 s, MCSTAT is 255, and no motor obeys."""
+    """The motor board does not answer the server. ENC fails after 0.2 s, and MCSTAT is 255.
+
+    No motor obeys.
+    """
     rig = Rig(motor_board_silent=True)
     assert rig.ask("ENC") == "fail"
     assert rig.took_s == pytest.approx(0.2)
@@ -219,7 +235,7 @@ def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> No
 
 
 def test_an_unknown_reset_repeats_the_previous_reply() -> None:
-    """RST with an unknown word repeats the previous reply; RST MC is known."""
+    """RST with an unknown word makes the server repeat its previous reply. RST MC is known."""
     rig = Rig()
     assert rig.ask("RST x") is None
     assert rig.ask("RST MC") == "ok"
@@ -249,14 +265,17 @@ def test_an_unknown_reset_repeats_the_previous_reply() -> None:
     ],
 )
 def test_undocumented_commands_are_known(text: str, answer: str) -> None:
-    """Undocumented commands are understood; those listed here do not switch the motors on."""
+    """The server understands undocumented commands.
+
+    Those in this list do not switch the motors on.
+    """
     rig = Rig()
     assert rig.ask(text) == answer
     assert not rig.server.chassis.powered
 
 
 def test_a_record_refuses_motions_until_it_is_stopped() -> None:
-    """From REC START to REC STOP, motions are refused."""
+    """From REC START to REC STOP, the server refuses motions."""
     rig = Rig()
     assert rig.ask("REC START") == "ok"
     assert rig.ask("F") == "fail conflicting action in progress"
@@ -280,7 +299,7 @@ def test_parameters_that_are_set_change_the_next_f_and_r_custom() -> None:
 
 
 def test_a_reply_goes_to_the_sender_of_its_request() -> None:
-    """A reply goes to the sender of its request, even if another host has sent one meanwhile."""
+    """Two hosts send requests one after the other. Each gets the reply to its own request."""
     rig = Rig()
     rig.server.receive(b"SFC", COMMAND, "one", 0.0)
     rig.server.receive(b"VOLTS", COMMAND, "other", 0.01)
@@ -292,7 +311,7 @@ def test_a_reply_goes_to_the_sender_of_its_request() -> None:
 
 
 def test_time_sets_the_clock_in_utc_and_ignores_seconds() -> None:
-    """TIME sets the clock for file names and dates, in UTC; the seconds are ignored."""
+    """TIME sets the clock for file names and dates, in UTC. The server ignores the seconds."""
     rig = Rig()
     rig.ask("TIME 7 4 2024 12 30 59")
     assert rig.server.clock_s == pytest.approx(1_720_096_200, abs=0.01)

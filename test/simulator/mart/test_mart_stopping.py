@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of stops of the public server: which stop ends which motion, and which makes it hang."""
+"""Tests of stops on the public server: which motion each one ends, and which one hangs it."""
 
 import pytest
 from mart_rig import Rig
@@ -12,7 +12,7 @@ CONFLICT = "fail conflicting action in progress"
 
 @pytest.mark.parametrize("start", ["F", "F SLOW", "F FAST", "B", "B SLOW", "B FAST", "B NORMAL"])
 def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
-    """SM ends F and B in 0.4 s; when its reply comes, the robot is at rest."""
+    """SM ends F and B in about 0.4 s. The robot is at rest when the reply comes."""
     rig = Rig()
     rig.drive(start)
     assert rig.moving
@@ -25,7 +25,7 @@ def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
 
 @pytest.mark.parametrize("speed", [45, 50, 60])
 def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
-    """SM fails during RM; only SRM ends it."""
+    """During RM, SM fails. Only SRM ends RM."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.ask("SM") == "fail no motion"
@@ -38,7 +38,7 @@ def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
 
 @pytest.mark.parametrize(("start", "degrees"), [("R", -1), ("L", 1), ("R SLOW", -1), ("L SLOW", 1)])
 def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> None:
-    """The reply to the SM that ends a spin has the angle, negative to the right."""
+    """SM ends a spin. Its reply has the angle of the spin, negative to the right."""
     rig = Rig()
     rig.drive(start)
     answer = rig.ask("SM")
@@ -49,7 +49,7 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """SS and then SM also end a spin; the reply to SM has the angle."""
+    """SS stops a spin on the stop port, and SM then ends it. The reply to SM has the angle."""
     rig = Rig()
     rig.drive("R")
     rig.stop("SS")
@@ -61,7 +61,10 @@ def test_ss_then_sm_ends_a_spin_too() -> None:
 
 @pytest.mark.parametrize("start", ["TF 100", "TB 100", "TF SLOW 100", "TF 0"])
 def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
-    """SL ends a controlled move, whose reply has the computed distance; the port is free again."""
+    """SL ends a controlled move. The reply to the move has the computed distance.
+
+    The command port is free again.
+    """
     rig = Rig()
     rig.say(start)
     rig.run(2.0)
@@ -77,7 +80,7 @@ def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
 
 @pytest.mark.parametrize("start", ["MCR 170", "MCL 170", "MCR SLOW 170"])
 def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
-    """SS ends a controlled spin, whose reply is ok although the turn is incomplete."""
+    """SS ends a controlled spin. The reply to the spin is ok, although the turn is incomplete."""
     rig = Rig()
     rig.say(start)
     rig.run(0.8)
@@ -93,9 +96,9 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """SM or SRM after a stop on the stop port hangs the command port for ever.
+    """A command on the stop port stops a motion without control.
 
-    The motors are off.
+    SM or SRM then hangs the command port. The port hangs for ever, and the motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -115,7 +118,10 @@ def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
 @pytest.mark.parametrize("stop", ["SL", "SS"])
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 30", "SRM")])
 def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str) -> None:
-    """SM or SRM together with a stop on the stop port hangs the command port, too."""
+    """A command on the stop port and SM or SRM come at the same time.
+
+    The command port hangs, too.
+    """
     rig = Rig()
     rig.drive(start)
     rig.stop(stop)
@@ -125,7 +131,7 @@ def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str
 
 
 def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
-    """SL directly after SM hangs the stop port; SM is still answered."""
+    """SL comes directly after SM, and hangs the stop port. SM is still answered."""
     rig = Rig()
     rig.drive("F")
     rig.say("SM")
@@ -142,7 +148,10 @@ def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30"])
 def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
-    """After SL alone, motions are refused until the server is restarted; queries are answered."""
+    """SL alone has stopped a motion.
+
+    Until a restart, the server refuses motions, but answers queries.
+    """
     rig = Rig()
     rig.drive(start)
     rig.stop("SL")
@@ -162,7 +171,7 @@ def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
 @pytest.mark.parametrize("start", ["F", "B SLOW", "RM 30"])
 @pytest.mark.parametrize("after_s", [0.001, 0.03, 0.06])
 def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: float) -> None:
-    """SL and SS have no effect before the ok of a start, and the robot drives on."""
+    """SL and SS come before the ok of a start. They have no effect, and the robot drives on."""
     rig = Rig()
     rig.say(start)
     rig.run(after_s)
@@ -175,10 +184,10 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 
 
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
-    """In the first moments of a controlled move, SL is ignored.
+    """A controlled move begins with a measurement of the gyro's bias, and SL comes in this time.
 
-    The server then measures the bias of the gyro. An SL in this time ends the move late, and the
-    move is answered as failed.
+    After 0.03 s SL is ignored. After 0.1 s it ends the move late, and the move is answered as
+    failed.
     """
     rig = Rig()
     rig.say("TF 24")
@@ -195,7 +204,10 @@ def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() 
 
 
 def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinning() -> None:
-    """L during RM hangs the command port while the robot spins; later requests are not answered."""
+    """L comes during RM.
+
+    The robot spins, and the command port hangs, so no later request is answered.
+    """
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask("L") is None
@@ -208,7 +220,7 @@ def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinn
 
 @pytest.mark.parametrize("text", ["R", "F", "B", "TF 12", "MCR 20", "RM 20", "SB", "RST IMU"])
 def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
-    """R and F are refused during RM, which continues."""
+    """Other motions than L are refused during RM, which continues."""
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == CONFLICT
@@ -219,7 +231,7 @@ def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
 @pytest.mark.parametrize("text", ["R", "L", "F", "RM 20", "TF 12", "MCR 20", "SB"])
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
-    """During F and R every motion is refused, even L, and so is SB."""
+    """During F and R the server refuses every motion, even L, and also SB."""
     rig = Rig()
     rig.drive(start)
     assert rig.ask(text) == CONFLICT
@@ -227,7 +239,10 @@ def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
 
 
 def test_a_command_port_that_is_busy_executes_later_in_order() -> None:
-    """A busy command port executes queries and motions later, in the order of arrival."""
+    """Requests come while the command port is busy.
+
+    It executes them later, in the order of arrival.
+    """
     rig = Rig()
     rig.say("TF 12", "VOLTS", "R", "HELLO")
     assert rig.run(1.0) == []
@@ -236,7 +251,7 @@ def test_a_command_port_that_is_busy_executes_later_in_order() -> None:
 
 
 def test_nothing_stops_by_itself_when_the_host_is_lost() -> None:
-    """The server has no watchdog: 120 s after the loss of its host, the robot still moves."""
+    """The host is lost during a motion. After 120 s the robot still moves."""
     for start in ("F", "RM 30", "R"):
         rig = Rig()
         rig.drive(start, 120.0)
@@ -254,7 +269,10 @@ def test_the_stop_port_is_never_answered() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
-    """A stop that takes over 0.75 s is reported as a failure; after a fast RM, over 1.88 s."""
+    """A stop of F takes more than 0.75 s, and the server reports a failure.
+
+    For RM the limit is higher: a stop of 1.5 s to 1.88 s is still ok.
+    """
     rig = Rig()
     rig.ask("SLMP 1 60")
     rig.drive(start)
@@ -268,7 +286,10 @@ def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> N
 
 @pytest.mark.parametrize("start", ["TF 0", "TF 24"])
 def test_sdr_without_a_number_crashes_the_server(start: str) -> None:
-    """SDR without a number crashes the server in a controlled move; the motors keep their speed."""
+    """SDR without a number comes during a controlled move.
+
+    The server crashes, and the robot moves on.
+    """
     rig = Rig()
     rig.stop("SDR")
     assert not rig.server.crashed

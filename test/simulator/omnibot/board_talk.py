@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Helpers to command a simulated board and to read its output, in simulated time."""
+"""Helpers that command a simulated board and read its output, in simulated time."""
 
 import struct
 
@@ -30,7 +30,10 @@ def run(board: SimulatedBoard, seconds: float) -> bytes:
 
 
 def mode_of(board: SimulatedBoard) -> BoardMode:
-    """Return the board's mode by a call, so that a type checker does not assume it unchanged."""
+    """Return the board's mode.
+
+    It is a function so that a type checker does not assume an unchanged mode.
+    """
     return board.mode
 
 
@@ -48,10 +51,10 @@ def sent(board: SimulatedBoard, header: bytes) -> list[bytes]:
 
 
 def deltas(board: SimulatedBoard) -> list[tuple[int, int, int, int]]:
-    """Return the values of the 25 Hz frames sent so far: 0.1 mm, 0.1 mm, 0.1 mrad, SEQ."""
+    """Return the values of the deltas sent so far: x and y in 0.1 mm, turn in 0.1 mrad, SEQ."""
     return [struct.unpack(">3hB", frame[2:]) for frame in sent(board, DELTA)]
 
 
 def poses(board: SimulatedBoard) -> list[tuple[float, float, float, int]]:
-    """Return the values of the 5 Hz frames sent so far: mm, mm, mrad, SEQ."""
+    """Return the values of the poses sent so far: x and y in mm, heading in mrad, SEQ."""
     return [struct.unpack(">3fB", frame[2:]) for frame in sent(board, POSE)]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated MPU6050: gravity, motion, bias, noise, range."""
+"""Tests of the simulated MPU6050: gravity, motion, bias, noise and range."""
 
 import struct
 from math import degrees
@@ -30,12 +30,10 @@ def readings(board: SimulatedBoard, seconds: float) -> list[tuple[float, ...]]:
 
 
 def mean(values: list[tuple[float, ...]]) -> tuple[float, ...]:
-    """Return the mean of each column."""
     return tuple(sum(column) / len(values) for column in zip(*values, strict=True))
 
 
 def rms(values: list[tuple[float, ...]]) -> tuple[float, ...]:
-    """Return the standard deviation of each column."""
     means = mean(values)
     return tuple(
         (sum((value - middle) ** 2 for value in column) / len(values)) ** 0.5
@@ -44,7 +42,10 @@ def rms(values: list[tuple[float, ...]]) -> tuple[float, ...]:
 
 
 def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
-    """At rest, gravity is on -z of the sensor; bias and noise are those of the settings."""
+    """The robot is at rest. The sensor, mounted upside down, measures gravity on -z.
+
+    Its bias and noise are those of the settings.
+    """
     board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(1.0, -2.0, 3.0)))
     values = readings(board, 20.0)
     assert mean(values) == pytest.approx((0.0, 0.0, -1.0, 1.0, -2.0, 3.0), abs=0.005)
@@ -53,13 +54,13 @@ def test_at_rest_the_upside_down_sensor_feels_minus_one_g() -> None:
 
 
 def test_the_gyro_at_rest_reads_like_frame_headers_by_default() -> None:
-    """At rest, the mean raw counts are -6, -5 and -4, whose bytes look like frame headers."""
+    """By default the gyro at rest reads -6, -5 and -4, whose bytes look like frame headers."""
     values = mean(readings(SimulatedBoard(RUNNING), 20.0))
     assert [rate * 131 for rate in values[3:]] == pytest.approx([-6, -5, -4], abs=0.5)
 
 
 def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
-    """A yaw rate of 0.5 rad/s reads -0.5 on z of a gyro that is mounted upside down."""
+    """The robot turns left at 0.5 rad/s. The gyro, mounted upside down, reads -0.5 on z."""
     board = SimulatedBoard(BoardSettings(running=True, gyro_bias_dps=(0.0, 0.0, 0.0)))
     board.receive(velocity(0, 0, 250))
     run(board, 2.0)
@@ -68,9 +69,10 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """The integral of the measured acceleration is the speed that the robot has gained.
+    """The robot accelerates forward and to the left.
 
-    Its sign is reversed on y, because the sensor is mounted upside down.
+    The measured accelerations add up to its speed. On y the sign is reversed, because the sensor is
+    mounted upside down.
     """
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
@@ -85,7 +87,7 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """At 0.5 m/s and 1 rad/s the IMU measures 0.5 m/s² to the left of the motion.
+    """The robot drives a left curve. The IMU measures 0.5 m/s² to the left of the motion.
 
     On y the sign is reversed, because the sensor is mounted upside down.
     """
@@ -97,7 +99,7 @@ def test_a_curve_is_felt_as_centripetal_acceleration(
 
 
 def test_readings_saturate_at_the_range_of_the_sensor() -> None:
-    """Beyond 250 °/s the gyro reads the limit of int16."""
+    """The robot turns faster than 250 °/s. The gyro reads the largest 16-bit value."""
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(60, 60, 60))
     run(board, 1.0)
@@ -105,7 +107,10 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
 
 
 def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
-    """After a second, the rms of a walking bias over sixty robots is that of the settings."""
+    """The gyro's bias walks at random.
+
+    After a second, its rms over sixty robots is as in the settings.
+    """
     ends = []
     for seed in range(60):
         board = SimulatedBoard(
@@ -122,7 +127,10 @@ def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
 
 
 def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
-    """A stuck gyro has constant values, while the accelerometer's values still vary."""
+    """A gyro is stuck at given counts.
+
+    It reads them also in a turn, while the accelerometer varies.
+    """
     board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))
     board.receive(velocity(0, 0, 250))
     run(board, 1.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The manual's state machine (booting, paused, nominal, IMU only) and what each mode obeys."""
+"""Tests of the manual's state machine: the modes of a board, and which bytes each mode obeys."""
 
 import pytest
 from board_talk import (
@@ -31,7 +31,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
-    """A booting board sends and obeys nothing; at the end of its boot it sends a text at once."""
+    """A booting board sends and obeys nothing. At the end of its boot it sends a paused text."""
     board = SimulatedBoard(BoardSettings(boot_time_s=0.3))
     board.receive(WAKE_UP + b"S")
     assert run(board, 0.29) == b""
@@ -41,14 +41,17 @@ def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
 
 
 def test_a_paused_board_counts_once_a_second() -> None:
-    """A paused board sends a number once a second: a uint8 that ascends from zero and wraps."""
+    """A paused board sends a text once a second.
+
+    Its number counts up from 0 to 255 and then wraps.
+    """
     board = booted(BoardSettings())
     assert run(board, 2.0) == b"Paused: 1 \nPaused: 2 \n"
     assert run(board, 254.0).endswith(b"Paused: 255 \nPaused: 0 \n")
 
 
 def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
-    """The first three bytes after the boot are lost, even if they are letters such as S."""
+    """A board has booted. The first three bytes are lost, even if they are letters such as S."""
     board = booted(BoardSettings())
     board.receive(b"SSS")
     assert mode_of(board) is BoardMode.PAUSED
@@ -57,7 +60,10 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """If the board gets three bytes during the boot, it obeys the first S after the boot."""
+    """With a setting, the three bytes to wake the board may also come during the boot.
+
+    The board then obeys the first S after the boot.
+    """
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
     run(board, 0.3)
@@ -66,7 +72,10 @@ def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
 
 
 def test_p_pauses_and_unpauses() -> None:
-    """The letter P pauses the board and un-pauses it again; each pause begins with a text."""
+    """The letter P pauses a board, and a second P starts it again.
+
+    Each pause begins with a text.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(b"P")
     assert mode_of(board) is BoardMode.PAUSED
@@ -77,7 +86,7 @@ def test_p_pauses_and_unpauses() -> None:
 
 
 def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
-    """The letter S starts a paused board, and does not disturb the motion of a running one."""
+    """The letter S starts a paused board. It does not disturb the motion of a running one."""
     board = booted(BoardSettings())
     board.receive(WAKE_UP + b"SS" + velocity(35, 0, 0))
     run(board, 1.0)
@@ -88,9 +97,9 @@ def test_s_starts_a_paused_board_and_leaves_a_running_one_alone() -> None:
 
 
 def test_r_reboots_the_board_but_not_the_robot() -> None:
-    """R sets odometry and SEQ of the board to zero; the board must then be woken again.
+    """R sets the board's odometry and SEQ to zero. The board must then be woken again.
 
-    The true pose of the robot does not change.
+    The robot's true pose stays.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
@@ -111,7 +120,7 @@ def test_r_reboots_the_board_but_not_the_robot() -> None:
 
 
 def test_a_power_cycle_does_what_r_does() -> None:
-    """``reboot`` and the letter R lead to the same state."""
+    """A power cycle and the letter R have the same effect."""
     by_letter, by_power = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     by_letter.receive(b"R")
     by_power.reboot()
@@ -120,7 +129,10 @@ def test_a_power_cycle_does_what_r_does() -> None:
 
 
 def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
-    """A paused board takes bytes of a motion frame for letters: 0x52 resets it, 0x50 starts it."""
+    """A paused board reads the bytes of a motion frame as letters.
+
+    0x52 resets it, and 0x50 starts it.
+    """
     board = booted(BoardSettings())
     board.receive(WAKE_UP + velocity(0x52, 0, 0))
     assert mode_of(board) is BoardMode.BOOTING
@@ -132,9 +144,9 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """A board that is not yet woken loses the first three bytes of a motion frame.
+    """A motion frame comes to a board that is not woken yet. Its first three bytes are lost.
 
-    It reads the rest of the frame as letters, here as a reset.
+    The board reads the rest of the frame as letters, here as a reset.
     """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
@@ -143,7 +155,10 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
 
 
 def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
-    """On a board that obeys letters within frames, the first 0x50 pauses, and the second starts."""
+    """A board that obeys letters within frames gets a frame with two 0x50.
+
+    It pauses and starts again.
+    """
     board = SimulatedBoard(BoardSettings(running=True, receiver=ReceiverKind(letters="anywhere")))
     board.receive(wheels(0x50, 0, 0x50))
     assert [command.kind for command in board.commands] == ["pause", "pause"]
@@ -151,7 +166,10 @@ def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -
 
 
 def test_a_running_board_takes_no_letters_out_of_frames() -> None:
-    """On a running board, 0x50, 0x52 and 0x53 within a control frame are numbers, not letters."""
+    """A running board gets a frame that contains 0x50, 0x52 and 0x53.
+
+    They are numbers, not letters.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(0x50, 0x52, 0x53))
     assert list(board.commands) == [ReceivedCommand(0, "wheels", (0x50, 0x52, 0x53))]
@@ -159,7 +177,10 @@ def test_a_running_board_takes_no_letters_out_of_frames() -> None:
 
 
 def test_an_unknown_control_mode_is_ignored() -> None:
-    """A frame of an unknown control mode is ignored, and a 0x50 in it is not a letter."""
+    """A frame has an unknown control mode.
+
+    The board ignores it, and a 0x50 in it is not a letter.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(bytes.fromhex("FF FE 03 00 50 00 50 00 50"))
     assert not board.commands
@@ -167,7 +188,7 @@ def test_an_unknown_control_mode_is_ignored() -> None:
 
 
 def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
-    """A board that has no emergency stop ignores the frame and drives on."""
+    """A board without an emergency stop gets one. It ignores the frame, and the robot drives on."""
     board = SimulatedBoard(BoardSettings(running=True, obeys_estop=False))
     board.receive(velocity(35, 0, 0) + ESTOP)
     assert [command.kind for command in board.commands] == ["velocity"]
@@ -176,7 +197,7 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 
 
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
-    """A pause in the input ends an incomplete frame on a board that looks for pauses.
+    """A pause comes after an incomplete frame. A board that looks for pauses discards the frame.
 
     The pause is measured by the caller's times or, without them, by the ticks in between.
     """
@@ -192,7 +213,7 @@ def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() ->
 
 
 def test_what_was_received_and_obeyed_is_on_record() -> None:
-    """The logs have all bytes received, and each command with its tick, kind and values."""
+    """The board records all bytes received, and each command with its tick, kind and values."""
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     data = velocity(1, -2, 3) + b"x" + STOP
@@ -206,7 +227,7 @@ def test_what_was_received_and_obeyed_is_on_record() -> None:
 
 @pytest.mark.slow
 def test_the_record_of_received_bytes_is_bounded() -> None:
-    """The log keeps at most about a million of the received bytes: the newest ones."""
+    """The board receives millions of bytes. Its record keeps about the newest million."""
     board = SimulatedBoard(RUNNING)
     for _ in range(30):
         board.receive(bytes(100_000))
@@ -227,7 +248,7 @@ command_bytes = st.lists(
 @given(command_bytes, st.data())
 @settings(max_examples=60)
 def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:
-    """The same bytes within one tick, in any chunks, have the same effects and replies."""
+    """The same bytes come within one tick, in different chunks. The board does the same."""
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))
     whole, cut = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     whole.receive(stream)

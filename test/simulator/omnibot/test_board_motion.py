@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Control frames: velocities, wheel speeds, stops, and poses (with the switch on position)."""
+"""Tests of control frames: velocities, wheel speeds, stops and poses.
+
+A board takes poses if its switch is on "position".
+"""
 
 from math import hypot
 
@@ -28,7 +31,10 @@ from omnibot_driver.simulator.omnibot import (
     ],
 )
 def test_a_commanded_velocity_is_reached(command: bytes, twist: tuple[float, float, float]) -> None:
-    """A velocity command is reached after 2 s: 70 LSB are 1 m/s, and 500 LSB are 1 rad/s."""
+    """A velocity is commanded: 70 LSB are 1 m/s, and 500 LSB are 1 rad/s.
+
+    After 2 s it is reached.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(command)
     run(board, 2.0)
@@ -57,7 +63,7 @@ def test_a_wheel_command_drives_that_wheel_alone() -> None:
 
 
 def test_a_motion_goes_on_without_further_commands() -> None:
-    """The board has no command timeout: after 60 s the robot still drives."""
+    """One command is sent, and then no more. After 60 s the robot still drives."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 60.0)
@@ -65,7 +71,7 @@ def test_a_motion_goes_on_without_further_commands() -> None:
 
 
 def test_stop_stops() -> None:
-    """The appendix's stop frame brings the robot to rest."""
+    """The stop frame of the manual's appendix brings the robot to rest."""
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 1.0)
@@ -76,7 +82,10 @@ def test_stop_stops() -> None:
 
 @pytest.mark.parametrize("latches", [False, True])
 def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
-    """An emergency stop switches the motors off within the tick; the robot is at rest in 0.3 s."""
+    """An emergency stop comes during a drive. The motors are off within the tick.
+
+    The robot is at rest within 0.3 s and stays at rest.
+    """
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=latches))
     board.receive(velocity(35, 0, 0))
     run(board, 1.0)
@@ -90,7 +99,7 @@ def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
 
 
 def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> None:
-    """If the emergency stop does not latch, the next motion command moves the robot again."""
+    """The emergency stop of this board does not latch. The next motion command moves the robot."""
     board = SimulatedBoard(RUNNING)
     board.receive(ESTOP + velocity(35, 0, 0))
     assert not board.estopped
@@ -99,9 +108,10 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 
 
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
-    """Only a reset releases a latched emergency stop: no command, pause or start does.
+    """The emergency stop of this board latches.
 
-    The board does not log motion commands that it refuses.
+    Only a reset ends it, not a command, pause or start. The board does not record motion commands
+    that it refuses.
     """
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
@@ -124,10 +134,9 @@ POSITION = BoardSettings(running=True, control="position")
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],
 ) -> None:
-    """With the switch on position, a command is a pose in the board's earth frame, in mm and mrad.
+    """With the switch on "position", a command is a pose in the earth frame, in mm and mrad.
 
-    The robot stops at this pose; if its yaw exceeds a full turn, the robot makes that full turn,
-    too.
+    The robot stops at this pose. If the heading exceeds a full turn, the robot makes that turn too.
     """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))
@@ -141,7 +150,7 @@ def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
 
 
 def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
-    """On the way to a pose, the speed is limited to 0.3 m/s, however far away the pose is."""
+    """The robot drives to a pose far away, at no more than 0.3 m/s."""
     board = SimulatedBoard(POSITION)
     board.receive(velocity(5000, 5000, 0))
     run(board, 5.0)
@@ -149,9 +158,9 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """With the switch on position, zeros in mode 1 are the pose of the origin, not a stop.
+    """The switch is on "position". Zeros in mode 1 then send the robot to the origin.
 
-    For this reason the stop frame has mode 2.
+    They do not stop it. For this reason the stop frame has mode 2.
     """
     board = SimulatedBoard(
         BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))
@@ -167,7 +176,10 @@ def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> Non
 
 @pytest.mark.parametrize("ending", [ESTOP, b"P", b"PS"])
 def test_an_emergency_stop_or_a_pause_forgets_the_pose_to_drive_to(ending: bytes) -> None:
-    """After an emergency stop or a pause, the robot does not continue to the commanded pose."""
+    """An emergency stop or a pause comes on the way to a pose.
+
+    The robot does not continue afterwards.
+    """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(1000, 0, 0))
     run(board, 1.0)
@@ -179,7 +191,10 @@ def test_an_emergency_stop_or_a_pause_forgets_the_pose_to_drive_to(ending: bytes
 
 
 def test_a_pause_stops_the_motors_and_forgets_the_command() -> None:
-    """After un-pausing, the robot is at rest until the next command."""
+    """The board is paused during a drive, and starts again.
+
+    The robot is at rest until the next command.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 1.0)

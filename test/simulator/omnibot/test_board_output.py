@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The output of a running board, its timing, and its odometry from the encoders."""
+"""Tests of a running board's output, its timing, and its odometry from the encoders."""
 
 from math import hypot, pi
 from random import Random
@@ -42,7 +42,7 @@ def test_a_nominal_board_sends_at_100_25_and_5_hz() -> None:
 
 
 def test_a_board_may_send_its_deltas_at_10_hz() -> None:
-    """After every ten IMU frames comes a delta with the motion of ten ticks, as in the manual."""
+    """With a delta period of 0.1 s, a delta covers ten ticks and comes after ten IMU frames."""
     board = SimulatedBoard(BoardSettings(running=True, delta_period_s=0.1))
     board.receive(velocity(35, 0, 0))
     run(board, 10.0)
@@ -53,7 +53,7 @@ def test_a_board_may_send_its_deltas_at_10_hz() -> None:
 
 
 def test_an_imu_only_board_sends_imu_frames_alone_and_obeys_motion() -> None:
-    """In IMU-only mode the board sends only IMU frames, and obeys commands as in nominal mode."""
+    """In IMU-only mode the board sends only IMU frames. It obeys commands as in nominal mode."""
     board = booted(BoardSettings(imu_only=True))
     board.receive(WAKE_UP + b"S" + velocity(35, 0, 0))
     data = run(board, 2.0)
@@ -72,7 +72,7 @@ def test_within_a_tick_the_order_is_imu_delta_pose() -> None:
 
 
 def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
-    """The recorded frames, joined in order, are all bytes that ``step`` has returned."""
+    """The board's record of sent frames has all bytes that ``step`` has returned, in order."""
     board = SimulatedBoard(BoardSettings())
     first = run(board, 1.0)
     board.receive(WAKE_UP + b"S")
@@ -80,7 +80,7 @@ def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
 
 
 def test_both_sequences_count_by_themselves_and_wrap() -> None:
-    """Deltas and poses each have a SEQ of their own: a uint8 that counts from zero and wraps."""
+    """Deltas and poses each have their own SEQ. It counts from 0 to 255 and then wraps."""
     board = SimulatedBoard(RUNNING)
     run(board, 52.0)
     assert [seq for *_, seq in deltas(board)] == [n % 256 for n in range(1300)]
@@ -88,7 +88,10 @@ def test_both_sequences_count_by_themselves_and_wrap() -> None:
 
 
 def test_a_sequence_goes_on_after_a_pause() -> None:
-    """A pause does not change SEQ; the first delta after the pause has the motion during it."""
+    """The board is paused during a drive and starts again. SEQ continues.
+
+    The first delta after the pause has the motion of the pause.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(35, 0, 0))
     run(board, 2.0)
@@ -104,7 +107,10 @@ def test_a_sequence_goes_on_after_a_pause() -> None:
 
 
 def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
-    """Ticks are counted in every mode, so a pause does not shift the times of deltas and poses."""
+    """The board is paused and starts again.
+
+    Deltas and poses keep their ticks, as ticks always count.
+    """
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)
     board.receive(b"P")
@@ -134,7 +140,7 @@ def drive_square(board: SimulatedBoard) -> None:
 
 
 def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
-    """Without slip and scale errors, pose and truth agree to 1 mm after 4 m."""
+    """Without slip and scale errors, the board's odometry is right within 1 mm after 4 m."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     truth, odometry = board.truth, board.odometry
@@ -146,7 +152,7 @@ def test_the_odometry_is_the_truth_but_for_quantisation() -> None:
 
 
 def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
-    """With slip and scale errors, the board's odometry differs from the true pose."""
+    """With slip and a wheel of another size, the board's odometry differs from the true pose."""
     board = SimulatedBoard(
         BoardSettings(running=True, slip=0.05, wheel_radius_scale=(1.0, 1.01, 1.0))
     )
@@ -158,7 +164,7 @@ def test_slip_and_scale_errors_part_the_odometry_from_the_truth() -> None:
 
 
 def test_earth_frame_deltas_add_up_to_the_pose() -> None:
-    """The sum of earth-frame deltas is the board's pose, within half an LSB per delta."""
+    """Deltas in the earth frame add up to the board's pose, within half an LSB for each delta."""
     board = SimulatedBoard(RUNNING)
     drive_square(board)
     run(board, 0.2 - 0.01 * (board.tick % 20))
@@ -176,7 +182,10 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """At 0.5 m/s along the earth's y axis, a delta has 20 mm in y (earth) or in x (body frame)."""
+    """The robot drives along the earth's y axis.
+
+    A delta has 20 mm in y, or in x of the body frame.
+    """
     board = SimulatedBoard(
         BoardSettings(
             running=True,
@@ -190,7 +199,7 @@ def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
 
 
 def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
-    """A board with an initial pose sends it, while its deltas and the true pose are zero."""
+    """A board begins with an initial pose and sends it. Its deltas and the true pose are zero."""
     board = SimulatedBoard(
         BoardSettings(running=True, initial_pose=BoardPose(1500.0, -250.0, 8000.0))
     )
@@ -201,7 +210,10 @@ def test_an_initial_pose_is_the_boards_own_and_not_a_movement() -> None:
 
 
 def test_the_heading_is_sent_unwrapped() -> None:
-    """After more than two turns, the heading that the board sends exceeds 4 pi, in mrad."""
+    """The robot turns more than twice.
+
+    The heading that the board sends grows beyond 4 pi, in mrad.
+    """
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(-40, -40, -40))
     run(board, 4.0)
@@ -217,7 +229,7 @@ def test_the_pose_can_be_sent_little_endian() -> None:
 
 
 def test_equal_settings_and_input_give_equal_bytes() -> None:
-    """The seed determines all random numbers."""
+    """Equal settings and commands give equal bytes. Another seed gives other bytes."""
 
     def stream(seed: int) -> bytes:
         board = SimulatedBoard(BoardSettings(seed=seed, running=True, slip=0.1))

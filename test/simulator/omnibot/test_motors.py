@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One wheel: step responses of motor and controller."""
+"""Tests of a single wheel: how motor and controller respond to a step of the commanded speed."""
 
 import pytest
 from hypothesis import given, settings
@@ -10,7 +10,7 @@ from omnibot_driver.simulator.omnibot.motors import DEAD_ZONE_PWM, PWM_LIMIT, Mo
 
 
 class Wheel:
-    """A motor and its controller, which measures the speed by the encoder as in the firmware."""
+    """A motor and its controller, which measures the speed by the encoder, as the firmware does."""
 
     def __init__(self) -> None:
         self.motor = Motor()
@@ -33,7 +33,10 @@ class Wheel:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, -41.6])
 def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target: float) -> None:
-    """The speed reaches 90 % in 0.2 s, overshoots by at most 5 %, and is within 0.5 % after 2 s."""
+    """After a step the speed reaches 90 % in 0.2 s. It overshoots by at most 5 %.
+
+    After 2 s it is within 0.5 %.
+    """
     speeds = [speed / target for speed in Wheel().hold(target, 300)]
     assert speeds[20] > 0.9
     assert max(speeds) < 1.05
@@ -42,7 +45,7 @@ def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, 300.0])
 def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
-    """Two seconds after the stop the wheel is at rest, and no limit cycle moves it again."""
+    """A wheel is stopped. After 2 s it is at rest, and the controller does not move it again."""
     wheel = Wheel()
     wheel.hold(target, 200)
     wheel.hold(0.0, 200)
@@ -50,7 +53,10 @@ def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
 
 
 def test_saturation_does_not_wind_up_the_integrator() -> None:
-    """The wheel reaches a slow speed as soon after 10 s of saturation as after 1 s."""
+    """A speed that cannot be reached is commanded for 10 s, or for 1 s, and then a slow one.
+
+    The wheel reaches the slow speed equally soon.
+    """
     long, short = Wheel(), Wheel()
     long.hold(300.0, 1000)
     short.hold(300.0, 100)
@@ -64,7 +70,10 @@ def test_the_effort_saturates() -> None:
 
 
 def test_efforts_within_the_dead_zone_move_nothing() -> None:
-    """A resting wheel turns only at efforts beyond the dead zone."""
+    """A resting wheel gets an effort within the dead zone and does not turn.
+
+    Beyond it, it turns.
+    """
     motor = Motor()
     assert motor.advance(DEAD_ZONE_PWM) == 0.0
     assert motor.advance(-DEAD_ZONE_PWM) == 0.0
@@ -78,7 +87,7 @@ def test_efforts_within_the_dead_zone_move_nothing() -> None:
 )
 @settings(max_examples=50)
 def test_friction_never_drives_a_wheel(efforts: list[float]) -> None:
-    """A wheel never turns against both its own motion and its effort."""
+    """Whatever the efforts, a wheel never turns against both its motion and its effort."""
     motor = Motor()
     for effort in efforts:
         before = motor.speed
@@ -89,7 +98,7 @@ def test_friction_never_drives_a_wheel(efforts: list[float]) -> None:
 @given(st.floats(-90, 90))
 @settings(max_examples=50)
 def test_a_motor_without_power_stops_within_a_third_of_a_second(speed: float) -> None:
-    """Friction ends every motion without reversing it."""
+    """A turning motor loses its power. Friction stops it within 0.33 s, without reversing it."""
     motor = Motor()
     motor.speed = speed
     turned = [motor.advance(0.0) for _ in range(33)]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Old names of the simulator that can still be imported for one release."""
+"""Tests of the simulator's old names, which can still be imported for one release."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 def test_a_name_is_found_where_it_was_with_a_warning(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The old name gives the same object as the new one, and the warning gives the new name."""
+    """An old name gives the same object as the new one. A warning says the new name."""
     monkeypatch.delitem(vars(simulator), name, raising=False)
     with pytest.warns(DeprecationWarning, match=r"from omnibot_driver\.simulator\.omnibot"):
         assert getattr(simulator, name) is getattr(omnibot, name)
@@ -32,7 +32,7 @@ def test_a_name_that_never_was_there_is_not_found() -> None:
 
 
 def test_no_board_is_imported_before_it_is_asked_for() -> None:
-    """A program that simulates another board does not load the OmniBot."""
+    """A program imports the simulator, but no board. The OmniBot is not loaded."""
     program = "import sys, omnibot_driver.simulator; print(*sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=ROOT

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated OmniBot as a separate program."""
+"""Tests of the simulated OmniBot as a separate program."""
 
 import json
 import os
@@ -10,9 +10,9 @@ from simulator_program import PATIENCE_S, line, say, simulator
 
 
 def test_the_first_line_is_the_path_and_nothing_else() -> None:
-    """The first line on stdout is the path alone, so a script can read and open it.
+    """The first line on stdout is only the path of the port, so that a script can read and open it.
 
-    The hints for people are on stderr.
+    Hints for people are on stderr.
     """
     with simulator() as process:
         path = line(process)
@@ -37,7 +37,7 @@ def test_the_console_tells_the_truth() -> None:
 
 
 def test_the_console_reboots_the_board() -> None:
-    """After the console command ``reboot``, a running board is booting, or already paused."""
+    """A user types ``reboot`` on the console. The running board boots, and is then paused."""
     with simulator("--running") as process:
         line(process)
         say(process, "reboot\ntruth")
@@ -48,7 +48,7 @@ def test_the_console_reboots_the_board() -> None:
 
 
 def test_the_end_of_the_input_does_not_end_it() -> None:
-    """With /dev/null as stdin, the program still runs after the boot of the board."""
+    """The program runs with /dev/null as its input. It does not end."""
     with simulator(stdin=subprocess.DEVNULL) as process:
         port = os.open(line(process), os.O_RDONLY | os.O_NOCTTY)
         try:
@@ -59,7 +59,10 @@ def test_the_end_of_the_input_does_not_end_it() -> None:
 
 
 def test_the_options_reach_the_board() -> None:
-    """With ``--running`` and ``--imu-only``, the board starts in IMU-only mode."""
+    """A user starts the program with ``--running`` and ``--imu-only``.
+
+    The board is in IMU-only mode.
+    """
     with simulator("--running", "--imu-only") as process:
         line(process)
         say(process, "truth")

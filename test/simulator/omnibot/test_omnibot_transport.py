@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated OmniBot in the driver's own process."""
+"""Tests of the simulated OmniBot in the driver's own process."""
 
 import time
 from contextlib import closing
@@ -17,7 +17,6 @@ PATIENCE_S = 20.0
 
 
 def read(transport: SimulatedTransport) -> bytes:
-    """Return the next bytes that arrive."""
     deadline_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline_s:
         if data := transport.read()[1]:
@@ -26,7 +25,7 @@ def read(transport: SimulatedTransport) -> bytes:
 
 
 def test_a_board_boots_and_obeys() -> None:
-    """The board sends its paused text, and data frames after it is woken and started."""
+    """The board boots and sends its paused text. It is woken and started, and sends data frames."""
     with closing(SimulatedTransport("sim://", OMNIBOT)) as transport:
         assert read(transport) == b"Paused: 0 \n"
         transport.write([(0, bytes(8)), (0, b"S")])
@@ -45,7 +44,10 @@ def test_a_board_boots_and_obeys() -> None:
     ],
 )
 def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
-    """The error message says what is wrong and names the command that lists the options."""
+    """A URL has a wrong option.
+
+    The error message says why, and names the command that lists the options.
+    """
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, OMNIBOT)
     assert why in str(refusal.value)

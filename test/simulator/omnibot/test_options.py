@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Options of a simulated OmniBot in a URL."""
+"""Tests of the options of a simulated OmniBot in a URL."""
 
 import pytest
 
@@ -25,7 +25,7 @@ def board_from_url(url: str) -> tuple[SimulatedBoard, Line]:
 
 
 def test_every_option_reaches_the_board_and_its_line() -> None:
-    """Each option of the URL reaches the board or its line; the seed reaches both."""
+    """A URL has all options. Each reaches the board or its line, and the seed reaches both."""
     board, line = board_from_url(
         "sim://?seed=7&imu_only&frame=body&delta_period=0.1&control=position&latching_estop&running"
         "&receiver=idle_gap&letters=anywhere&wakes_while_booting&ignore_estop"
@@ -48,7 +48,10 @@ def test_every_option_reaches_the_board_and_its_line() -> None:
 
 @pytest.mark.parametrize("period", ["0", "-0.04", "0.045", "nan", "inf", "fast", "11"])
 def test_deltas_are_sent_every_so_many_ticks(period: str) -> None:
-    """The period of deltas must be a positive multiple of the tick, and at most 10 s."""
+    """The delta period in a URL is not a multiple of the tick, or not between 0 and 10 s.
+
+    It is refused.
+    """
     with pytest.raises(OptionError, match="not a period of the board"):
         board_from_url(f"sim://?delta_period={period}")
 

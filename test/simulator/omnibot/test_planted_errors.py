@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Errors for a calibration to find: each can be set in the simulator and has a visible effect."""
+"""Tests of errors that the simulator can have, so that a calibration can find them."""
 
 import struct
 from math import pi, radians
@@ -23,7 +23,7 @@ WHEEL_B = bytes.fromhex("FF FE 02 00 00 00 08 00 00")
 
 
 def driven(command: bytes, seconds: float = 1.0, **settings: object) -> SimulatedBoard:
-    """Return a running board, ``seconds`` after it has received a command."""
+    """Return a running board that received ``command`` ``seconds`` ago."""
     board = SimulatedBoard(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
     board.receive(command)
     for _ in range(round(seconds * 100)):
@@ -44,7 +44,7 @@ def last(board: SimulatedBoard, header: bytes, count: int) -> tuple[int, ...]:
 def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_know(
     command: bytes, signs: tuple[int, int, int], axis: int
 ) -> None:
-    """On a reversed axis, the robot moves in the direction opposite to the command.
+    """One axis of the board is reversed, so the robot moves opposite to the command.
 
     The board's odometry is reversed too, so its own pose agrees with the command.
     """
@@ -58,14 +58,20 @@ def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_kn
 
 
 def test_wheel_counts_are_those_of_the_wheels() -> None:
-    """If wheel B moves at 8 / 70 m/s, a delta has 39 counts for it, and none for the others."""
+    """Only wheel B turns, and deltas are in wheel counts.
+
+    A delta has 39 counts for B and 0 for the others.
+    """
     a, b, c = last(driven(WHEEL_B, 2.0, frame="wheel_counts"), DELTA, 3)
     assert (a, c) == (0, 0)
     assert b == pytest.approx(8 / 70 * 0.04 * 1560 / (2 * pi * 0.029), abs=1.5)
 
 
 def test_each_motor_has_its_own_constants() -> None:
-    """A motor with a longer time constant is slower at first; the other motors are unchanged."""
+    """One motor has a longer time constant.
+
+    It is slower at first, and the other motors are unchanged.
+    """
     slow = MotorConstants(time_constant_ticks=30.0)
     board = driven(FORWARD, 0.15, motors=(slow, MotorConstants(), MotorConstants()))
     a, b, _ = board.rim_speeds_mps
@@ -73,14 +79,14 @@ def test_each_motor_has_its_own_constants() -> None:
 
 
 def test_a_motors_delay_holds_its_effort_back() -> None:
-    """A motor with a delay moves like one without, but three ticks later."""
+    """A motor with a delay of three ticks moves like one without it, but three ticks later."""
     prompt, late = Motor(), Motor(MotorConstants(delay_ticks=3))
     turned = [prompt.advance(500.0) for _ in range(10)]
     assert [late.advance(500.0) for _ in range(10)] == [0.0, 0.0, 0.0, *turned[:7]]
 
 
 def test_the_controllers_gains_are_those_given() -> None:
-    """One tick after a step of 10, the effort is 5·10 + 2·10 + 1·10, calculated by hand."""
+    """One tick after a step of 10, the effort is 5·10 + 2·10 + 1·10 by the given gains."""
     gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
     assert WheelController(gains).update(10.0, 0.0) == 80.0
 
@@ -99,9 +105,9 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """The accelerometer of a held robot shows the roll and pitch of robot and sensor.
+    """A robot is held at an angle. The accelerometer shows this angle and that of its own mounting.
 
-    By REP-103, pitch is negative if the front is up; roll is positive if the left side is up.
+    By REP-103, pitch is negative if the front is up, and roll is positive if the left side is up.
     """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)
@@ -110,7 +116,10 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 
 
 def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
-    """A turn by hand to the left is negative on a gyro that is mounted upside down."""
+    """A robot is turned to the left by hand. Its gyro, mounted upside down, reads a negative rate.
+
+    Its wheels do not turn.
+    """
     board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
     board.hold(yaw_rate=radians(30))
     board.step()

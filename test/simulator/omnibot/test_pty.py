@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot in real time behind a real pseudo-terminal."""
+"""Tests of the simulated OmniBot in real time behind a real pseudo-terminal."""
 
 import os
 import select
@@ -14,7 +14,7 @@ RUNNING = BoardSettings(running=True)
 
 
 def read_until(descriptor: int, wanted: bytes) -> bytes:
-    """Return the bytes read from a descriptor, up to the first chunk that completes ``wanted``."""
+    """Return the bytes read from ``descriptor`` until they contain ``wanted``."""
     data = b""
     deadline_s = time.monotonic() + PATIENCE_S
     while wanted not in data:
@@ -30,7 +30,10 @@ def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
 
 
 def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> None:
-    """Bytes pass both ways unchanged, including FF and line feeds."""
+    """A program wakes and starts the board through the terminal.
+
+    Bytes such as FF pass unchanged.
+    """
     with PtyBoard(SimulatedBoard()) as pty:
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
         try:
@@ -46,7 +49,7 @@ def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> N
 
 
 def test_the_stream_read_is_the_stream_sent() -> None:
-    """No byte is changed, added or lost while a program reads."""
+    """A program reads the terminal. No byte is changed, added or lost."""
     with PtyBoard(SimulatedBoard(RUNNING)) as pty:
         port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)
         try:
@@ -62,7 +65,10 @@ def test_the_stream_read_is_the_stream_sent() -> None:
 
 
 def test_the_terminal_outlives_the_program_that_opened_it() -> None:
-    """After one program has closed the terminal, a second one finds the board in the same state."""
+    """One program pauses the board and closes the terminal.
+
+    A second program opens it and starts the board.
+    """
     with PtyBoard(SimulatedBoard(RUNNING)) as pty:
         for letter, mode in ((b"P", BoardMode.PAUSED), (b"S", BoardMode.NOMINAL)):
             port = os.open(pty.path, os.O_RDWR | os.O_NOCTTY)

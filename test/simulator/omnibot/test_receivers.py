@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the simulated receivers with commands typed by hand, some of them damaged."""
+"""Tests of the simulated receivers, with commands typed by hand, some of them damaged."""
 
 import pytest
 from hypothesis import given
@@ -40,7 +40,10 @@ def understood(
     control_frames: bool = True,
     pause_s: float = 0.05,
 ) -> list[Command]:
-    """Return the commands that a new receiver finds in hexadecimal writes, with pauses between."""
+    """Return the commands that a new receiver finds in hexadecimal writes.
+
+    Between two writes there is a pause of ``pause_s``.
+    """
     receiver = CommandReceiver(kind, awake=awake)
     commands: list[Command] = []
     now_s = 0.0
@@ -57,7 +60,7 @@ def understood(
 def test_every_receiver_understands_each_command_of_the_appendix(
     typed: str, mode: int, values: tuple[int, int, int], kind: ReceiverKind
 ) -> None:
-    """Each undamaged frame is understood, with or without zero bytes before it."""
+    """Every receiver understands each undamaged frame, with or without zeros before it."""
     assert understood(typed, kind=kind) == [ControlFrame(mode, values)]
     assert understood("00 00 00" + typed, kind=kind) == [ControlFrame(mode, values)]
 
@@ -66,7 +69,7 @@ def test_every_receiver_understands_each_command_of_the_appendix(
 @every_kind
 @given(typed=st.lists(st.sampled_from([typed for typed, _, _ in APPENDIX.values()]), max_size=20))
 def test_frames_back_to_back_are_all_understood(typed: list[str], kind: ReceiverKind) -> None:
-    """Frames without a gap between them are all understood, in order."""
+    """Frames come without a gap. Every receiver understands all of them, in order."""
     meanings = {typed: ControlFrame(mode, values) for typed, mode, values in APPENDIX.values()}
     assert understood("".join(typed), kind=kind) == [meanings[one] for one in typed]
 
@@ -77,7 +80,7 @@ def test_frames_back_to_back_are_all_understood(typed: list[str], kind: Receiver
 def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
     noise: bytes, awake: bool, control_frames: bool, kind: ReceiverKind
 ) -> None:
-    """After any bytes, eight zeros make every receiver ready for a letter again."""
+    """After any bytes come eight zeros and a letter. Every receiver understands the letter."""
     data = (noise + bytes(8)).hex() + "53"
     commands = understood(data, kind=kind, awake=awake, control_frames=control_frames)
     assert commands[-1] is START
@@ -87,7 +90,7 @@ def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
 
 
 def test_letters_act_between_control_frames_and_not_within() -> None:
-    """A frame that contains P, R and S is one frame; only the letters around it act."""
+    """A frame contains P, R and S, and is read as one frame. Only the letters around it act."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50") == [
         START,
         ControlFrame(0x01, (0x50, 0x52, 0x53)),
@@ -96,7 +99,7 @@ def test_letters_act_between_control_frames_and_not_within() -> None:
 
 
 def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
-    """A letter within a frame acts, and the frame is still completed by its last byte."""
+    """On some boards a letter within a frame acts. The last byte still completes the frame."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50", kind=LETTERS_ANYWHERE) == [
         START,
         PAUSE,
@@ -109,13 +112,16 @@ def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
 
 @every_kind
 def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: ReceiverKind) -> None:
-    """A board that obeys only letters obeys P, R and S even within a motion frame."""
+    """A board obeys only letters. P, R and S act even within a motion frame."""
     frame = "FF FE 01 00 50 00 52 00 53"
     assert understood(frame, kind=kind, control_frames=False) == [PAUSE, RESET, START]
 
 
 def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
-    """After a stray FF, receivers obey the letter S; only the naive receiver loses it."""
+    """The letter S comes after a stray FF.
+
+    The receivers obey it, and only the naive one loses it.
+    """
     assert understood("FF 53") == [START]
     assert understood("FF 53", kind=WINDOW) == [START]
     assert understood("FF 53", kind=NAIVE) == []
@@ -123,7 +129,7 @@ def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
 
 
 def test_the_window_takes_no_letter_soon_after_a_header() -> None:
-    """The window receiver ignores letters while FF FE is among the last nine bytes."""
+    """The window receiver ignores a letter if FF FE is among the last nine bytes."""
     assert understood("FF FE 02 00 00 00 53 00 00 53", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0x0053, 0)),
         START,
@@ -134,26 +140,35 @@ def test_the_window_takes_no_letter_soon_after_a_header() -> None:
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> None:
-    """The FF of the next frame completes a stop that lost a byte: wheel C turns at 255 LSB."""
+    """A stop has lost a byte. The counting receiver completes it with the FF of the next frame.
+
+    So wheel C turns at 255 LSB.
+    """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole) == [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, pause_s=3600.0) == [ControlFrame(0x02, (0, 0, 255))]
 
 
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
-    """If a stop lost a byte, the letter P after it becomes a speed of wheel C, not a pause."""
+    """A stop has lost a byte, and the letter P follows.
+
+    It becomes a speed of wheel C, not a pause.
+    """
     assert understood("FF FE 02 00 00 00 00 00", "50") == [ControlFrame(0x02, (0, 0, 80))]
 
 
 def test_an_idle_gap_ends_half_a_frame() -> None:
-    """After an idle gap the receiver forgets half a frame, and finds the next frame or letter."""
+    """An idle gap comes after half a frame.
+
+    The receiver discards it, and finds the next frame or letter.
+    """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     assert understood(short, whole, kind=IDLE_GAP) == [STOP]
     assert understood(short, "50", kind=IDLE_GAP) == [PAUSE]
 
 
 def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
-    """A pause of less than 5 ms does not end a frame, because bytes may be late."""
+    """A pause within a frame is shorter than 5 ms. The frame continues, as bytes may be late."""
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]
     assert understood(short, whole, kind=IDLE_GAP, pause_s=0.0048) == false
@@ -162,9 +177,9 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A window receiver takes the FF of the next frame as the missing byte of a short stop.
+    """A stop has lost a byte. The window receiver completes it with the FF of the next frame.
 
-    It keeps the byte, so it also finds the next frame.
+    It also keeps this FF, so it finds the next frame.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
@@ -173,7 +188,10 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """The value -2 in a frame is FF FE, so 02 and the six bytes after it form a second frame."""
+    """The value -2 in a frame has the bytes FF FE.
+
+    The window receiver finds a second frame there.
+    """
     data = "FF FE 01 FF FE 02 00 00 08 00 00 00"
     first, second = ControlFrame(0x01, (-2, 0x0200, 8)), ControlFrame(0x02, (0, 0x0800, 0))
     assert understood(data, kind=WINDOW) == [first, second]
@@ -181,7 +199,7 @@ def test_a_window_finds_a_header_within_a_frame() -> None:
 
 
 def test_a_frame_without_its_header_acts_by_its_letters() -> None:
-    """If a frame loses its FF or its FE, a 52 in the payload acts as the letter R."""
+    """A frame has lost its FF or FE. A 52 in its payload acts as the letter R."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         assert understood("FE 01 00 52 00 00 00 00", kind=kind) == [RESET]
         assert understood("FF 01 00 52 00 00 00 00", kind=kind) == [RESET]
@@ -191,14 +209,14 @@ def test_a_frame_without_its_header_acts_by_its_letters() -> None:
 
 
 def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
-    """In FF FF FE, the frame starts with the second FF."""
+    """FF FF FE begins a frame. Most receivers start it with the second FF."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         typed = "FF FF FE 02 00 20 00 00 00 00"
         assert understood(typed, kind=kind) == [ControlFrame(0x02, (32, 0, 0))]
 
 
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
-    """In FF FF FE, a naive receiver discards the second FF; the payload is read as letters."""
+    """FF FF FE begins a frame. The naive receiver discards the second FF and reads letters."""
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
 
@@ -208,21 +226,24 @@ def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None
 
 @every_kind
 def test_the_first_three_bytes_after_power_up_are_swallowed(kind: ReceiverKind) -> None:
-    """After power-up, the serial initialization consumes three bytes, even letters."""
+    """After power-up, the board's serial port loses three bytes, even if they are letters."""
     assert understood("52 50 53 53", kind=kind, awake=False) == [START]
 
 
 @every_kind
 def test_a_frame_that_wakes_the_board_loses_its_header(kind: ReceiverKind) -> None:
-    """A motion frame that wakes the board loses its header, and its rest is read as letters."""
+    """A motion frame wakes the board.
+
+    Its first three bytes are lost, and the rest is read as letters.
+    """
     assert understood("FF FE 01 00 52 00 00 00 00", kind=kind, awake=False) == [RESET]
 
 
 @pytest.mark.parametrize(("counted", "swallowed"), [(False, 3), (True, 1)])
 def test_bytes_during_the_boot_count_for_the_wake_up_or_not(counted: bool, swallowed: int) -> None:
-    """The wake-up takes three bytes.
+    """The board needs three bytes to wake up, and two come during its boot.
 
-    It depends on the receiver whether the bytes received during the boot, here two, count.
+    Whether these two count depends on the receiver.
     """
     receiver = CommandReceiver(ReceiverKind(wakes_while_booting=counted))
     receiver.boot()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulator's codec against bytes typed by hand from the manual."""
+"""Tests of the simulator's codec, with bytes typed by hand from the manual."""
 
 import pytest
 
@@ -31,7 +31,7 @@ APPENDIX = {
 def test_each_command_of_the_appendix_is_understood(
     typed: str, mode: int, values: tuple[int, int, int]
 ) -> None:
-    """The ten useful serial commands of the manual's appendix decode to their printed meaning."""
+    """The ten commands of the manual's appendix are decoded to the meaning printed there."""
     assert control_frame(bytes.fromhex(typed)) == ControlFrame(mode, values)
 
 
@@ -59,7 +59,7 @@ def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
 
 
 def test_the_pose_frame_can_be_little_endian() -> None:
-    """The manual can also mean that the bytes of each float in the pose frame are reversed."""
+    """The manual may also mean that the bytes of each float in a pose frame are reversed."""
     sent = pose_frame(1000.0, -2.5, 1.0, 7, "little")
     assert sent == bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 07")
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Geometry, the true pose, and its deviations from what the board assumes."""
+"""Tests of the robot's geometry and true pose, and of errors that the board does not know."""
 
 from math import cos, pi, sqrt
 
@@ -20,14 +20,14 @@ L = 0.143
 def test_the_odometry_matrix_inverts_the_velocity_equations(
     vx: float, vy: float, yaw_rate: float
 ) -> None:
-    """If a body velocity is converted to rim speeds and back, the result is the same velocity."""
+    """A body velocity is converted to rim speeds and back. The result is the same velocity."""
     assert body_from_rims(rims_from_body(vx, vy, yaw_rate, L), L) == pytest.approx(
         (vx, vy, yaw_rate), abs=1e-12
     )
 
 
 def test_the_velocity_equations_are_those_of_the_manual() -> None:
-    """For motion along x or y, or a turn, each wheel turns in the direction given by the manual."""
+    """For a motion along x or y, or a turn, the rim speeds are those of the manual's equations."""
     c30 = cos(pi / 6)
     assert rims_from_body(1, 0, 0, L) == pytest.approx((-c30, c30, 0))
     assert rims_from_body(0, 1, 0, L) == pytest.approx((-0.5, -0.5, 1))
@@ -35,13 +35,13 @@ def test_the_velocity_equations_are_those_of_the_manual() -> None:
 
 
 def test_a_pose_moves_at_the_mean_heading_of_the_step() -> None:
-    """A forward motion during a quarter turn ends on the diagonal."""
+    """One step has a forward motion and a quarter turn. The pose moves along the diagonal."""
     moved = PlanarPose(1.0, 2.0, 0.0).moved(1.0, 0.0, pi / 2)
     assert moved == pytest.approx((1 + sqrt(0.5), 2 + sqrt(0.5), pi / 2))
 
 
 def drive(settings: BoardSettings, ticks: int = 300) -> World:
-    """Return a world after all wheels have turned forward: the robot turned clockwise in place."""
+    """Return the world after all wheels have turned forward, so that the robot turned clockwise."""
     world = World(settings)
     for _ in range(ticks):
         world.advance((1000.0, 1000.0, 1000.0))
@@ -49,23 +49,24 @@ def drive(settings: BoardSettings, ticks: int = 300) -> World:
 
 
 def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
-    """With wheels 2 % larger, the robot turns 2 % further at the same encoder counts."""
+    """All wheels are 2 % too large. At the same encoder counts, the robot turns 2 % farther."""
     plain, large = drive(BoardSettings()), drive(BoardSettings(wheel_radius_scale=(1.02,) * 3))
     assert large.encoders == plain.encoders
     assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
 
 
 def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
-    """A scale of the base radius divides the true turn and does not change the encoders."""
+    """The base radius is 5 % too large. At the same encoder counts, the robot turns less."""
     plain, wide = drive(BoardSettings()), drive(BoardSettings(base_radius_scale=1.05))
     assert wide.encoders == plain.encoders
     assert wide.truth.yaw_rad == pytest.approx(plain.truth.yaw_rad / 1.05)
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """With a mean slip of 10 %, the robot turns by 90 % of the angle that the encoders give.
+    """The wheels slip by 10 % on average.
 
-    The exact value depends on the seed.
+    The robot turns by 90 % of the angle that the encoders show. The exact angle depends on the
+    seed.
     """
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
@@ -97,7 +98,10 @@ def test_a_force_moves_the_robot_in_its_direction() -> None:
 
 
 def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
-    """A slope pulls the robot along the floor's x axis, whatever its heading is."""
+    """The floor is a slope along its x axis.
+
+    It moves the robot along that axis, whatever the heading.
+    """
     world = World(BoardSettings(slope_pwm=500.0))
     world.gripped = Twist(0.0, 0.0, pi / 2)
     for _ in range(100):
@@ -113,9 +117,10 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """While the robot is gripped and moved, its motors have no effect.
+    """A hand grips and moves the robot.
 
-    Afterwards they move the robot from its new place.
+    Its motors have no effect, and its encoders count the motion. Afterwards the motors move the
+    robot from its new place.
     """
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
@@ -131,7 +136,10 @@ def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> N
 
 
 def test_swapped_motors_get_each_others_effort() -> None:
-    """If motors are swapped, each encoder still counts its own wheel."""
+    """Two motors are swapped, so each gets the effort for the other.
+
+    Each encoder counts its own wheel.
+    """
     world = World(BoardSettings(motor_wiring=(2, -1, 3)))
     for _ in range(50):
         world.advance((1000.0, 500.0, 0.0))
