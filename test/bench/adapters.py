@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
+"""How a USB adapter delivers the bytes of a line: by ticks, in pieces, or in packets with a timer.
 
-The module uses the baud rate of the serial line, but not the format of the frames. Times are in s.
+This module knows the baud rate of the line; it does not know the frames. All times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,9 +14,9 @@ LARGEST_PIECE: Final = 16
 PACKET: Final = 62
 """Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""Rate of the adapter's clock relative to the board's clock.
+"""Rate of the adapter's clock, relative to the board's clock.
 
-Because of the drift, the packets of 8 s end at all phases of the board's tick.
+Within 8 s, the drift makes the packets end at all phases of the board's tick.
 """
 
 Handed = tuple[float, bytes]
@@ -26,12 +26,12 @@ Adapter = Callable[[Ticks, Random], Iterator[Handed]]
 
 
 def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
-    """Deliver all bytes of a tick at its beginning. No real adapter delivers bytes so early."""
+    """Deliver all bytes of a tick at its beginning, which is earlier than any real adapter can."""
     yield from ticks
 
 
 def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
-    """Deliver 1 to 16 bytes at the line's pace, as CDC, CH340 and CP210x adapters do."""
+    """Deliver 1 to 16 bytes at a time, at the line's pace, as CDC, CH340 and CP210x adapters do."""
     for at, data in ticks:
         start = 0
         while start < len(data):
@@ -41,7 +41,10 @@ def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
 
 
 def packets(timer_s: float) -> Adapter:
-    """Make an adapter like FTDI's: it delivers 62 bytes, or fewer when ``timer_s`` has passed."""
+    """Make an adapter like those of FTDI, with a latency timer of ``timer_s``.
+
+    It delivers a packet when it holds 62 bytes, or all that it holds when the timer runs out.
+    """
 
     def handed(ticks: Ticks, random: Random) -> Iterator[Handed]:
         held, out = bytearray(), -1.0

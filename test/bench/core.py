@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of the core alone: decoding time, how it grows with the stream's length, and memory.
+"""Measurements of the core alone: the time to decode a stream, and memory.
 
 The decoding time is compared with that of a loop without checks.
 """
@@ -32,7 +32,7 @@ SECONDS = 120.0
 SETTLED = 400
 """Number of ticks before a measurement begins."""
 OTHERS_BYTES = 24 << 20
-"""Number of bytes to overwrite, enough to displace everything else from the processor's caches."""
+"""Number of bytes to overwrite before a measurement, so that the caches lose all else."""
 FAULTY = "1 byte in 100 lost"
 STREAMS = (("clean", ""), (FAULTY, FAULTY))
 GOALS = {"clean": 1.5, FAULTY: 4.0}
@@ -41,7 +41,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """Decode without checks, as the floor does: whatever looks like a header begins a frame."""
+    """Decode without checks, as the floor does: all bytes that look like a header begin a frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:
@@ -62,9 +62,9 @@ def trust(data: bytes) -> list[Frame]:
 
 
 def trust_all(blocks: Sequence[bytes]) -> int:
-    """Count the frames of all blocks, without keeping the frames.
+    """Return the number of frames in all blocks.
 
-    ``decode`` does not keep its frames either, since keeping them costs time.
+    The frames are not kept, because keeping them costs time.
     """
     return sum(len(trust(block)) for block in blocks)
 
@@ -79,13 +79,13 @@ def decode(chunks: Sequence[bytes]) -> int:
 
 
 def stream(seconds: float, fault: str = "") -> bytes:
-    """Return the stream of a driving robot, undamaged or damaged by ``fault``."""
+    """Return the byte stream of a driving robot, damaged by ``fault`` if one is given."""
     truth = generate(SCENARIOS["driving"], 1, seconds)
     return receive(truth, FAULTS[fault], Random(1)).data if fault else bytes(truth.data)
 
 
 def decoding(times: int) -> list[Figure]:
-    """Measure the decoding time per frame of clean and faulty streams in all chunkings."""
+    """Measure the decoding time of a frame, for clean and damaged streams and all chunk sizes."""
     figures = []
     for name, fault in STREAMS:
         data = stream(SECONDS if not fault else SECONDS / 4, fault)
@@ -106,7 +106,7 @@ def decoding(times: int) -> list[Figure]:
 
 
 def linearity() -> list[str]:
-    """Return rows of a table: time per MB for streams of up to 2.5 hours."""
+    """Return the rows of a table: the decoding time per MB, for streams of up to 2.5 hours."""
     rows = ["| stream | 1 MB | 4 MB | 16 MB |", "|---|---|---|---|"]
     for name, fault in STREAMS:
         block = stream(600.0, fault)[: 1 << 20]
@@ -144,7 +144,7 @@ def cold(ticks: int) -> str:
 
 
 def memory(hours: float = 1.0) -> str:
-    """Play a stream to decoder and session as fast as possible, and report resident memory."""
+    """Play a long stream to a session as fast as possible; return a sentence about its memory."""
     session = _session()
     data, now, events = stream(SECONDS), 0.0, 0
     resident_mb = []
@@ -190,7 +190,6 @@ def _us_per_frame(work: object, data: object, frames: int) -> float:
 
 
 def _seconds(work: object, data: object) -> float:
-    """Return the processor time of ``work(data)`` in s; other processes hardly influence it."""
     assert callable(work)
     gc.collect()
     begun = time.process_time()

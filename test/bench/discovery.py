@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Cost of discovery in a fleet, with and without a Fast DDS discovery server: docs/fleet.md.
+"""Measure the cost of discovery in a fleet, with and without a Fast DDS discovery server.
 
-``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` needs root. The program runs
-in its own network namespace, so that no other traffic is counted. All drivers run on this computer,
-but they use only UDP, as drivers on several computers do. The program prints rows of a table.
+All drivers run on this computer, but they use only UDP, as drivers on several computers do. The
+program prints rows of the table in docs/fleet.md.
+
+``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` runs it in its own network
+namespace, so that no other traffic is counted. This needs root.
 """
 
 import os
@@ -18,11 +20,11 @@ ROOT: Final = Path(__file__).parents[2]
 SERVER: Final = Path(sys.prefix, "bin/fast-discovery-server")
 PORT: Final = "11811"
 WINDOW_S: Final = 30.0
-"""Length of a measurement window in s: a fixed time, not a wait for an event."""
+"""Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Length in s of the start phase, and of the pause after the observer has left.
+"""Time in s for the drivers to start, and then for the traffic of the observer to end.
 
-Both are fixed times, because no event reports the last packet.
+It is a fixed time, because no event reports the last packet.
 """
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """
@@ -37,7 +39,7 @@ print(time.monotonic() - begun)
 
 
 def packets_and_bytes() -> tuple[int, int]:
-    """Return the packets and bytes that have arrived over the loopback so far."""
+    """Return the numbers of packets and bytes that have arrived over the loopback so far."""
     line = next(row for row in Path("/proc/net/dev").read_text().splitlines() if " lo:" in row)
     words = line.partition(":")[2].split()
     return int(words[1]), int(words[0])
@@ -53,7 +55,7 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """Measure the traffic and processor time of ``number`` drivers; return one row of the table."""
+    """Measure the traffic and processor time of ``number`` drivers; return a row of the table."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),

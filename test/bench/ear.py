@@ -1,10 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A subscriber in its own process: it records the time of each message until stdin is closed.
+"""A subscriber in its own process. It records the time of each message until stdin is closed.
 
-Arguments: namespaces. The program prints one JSON object with the lists ``heard`` and
-``odometries``, which have an array per namespace. An item of ``heard`` is a pair: the steady
-clock's time in s, and the acceleration along x. An item of ``odometries`` is only the time.
+The arguments are namespaces. At the end the program prints one JSON object, which has two lists
+with an array for each namespace:
+
+``heard``: for each Imu message, the steady clock's time in s, and the acceleration along x.
+
+``odometries``: for each Odometry message, an array with only the time.
 """
 
 import json

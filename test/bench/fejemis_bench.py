@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make bench``: delay of the front angle on its way to the drive board.
+"""The Fejemis's part of ``make bench``: how long a front angle takes to reach the drive half.
 
-A simulated pair of boards runs on two pseudo-terminals in a process of its own. The driver's link
-runs in this process, without ROS. Busy processes run beside both.
+The two simulated halves run on two pseudo-terminals in their own process. The driver's link runs in
+this process, without ROS. Other processes keep the computer busy.
 """
 
 import contextlib
@@ -37,17 +37,17 @@ from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
 BESIDE: Final = (0, 2, 4)
-"""Numbers of busy processes that run beside the boards, one measurement each."""
+"""Numbers of busy processes. There is one measurement with each number."""
 SETTLES_S: Final = 3.0
 TOLD: Final = re.compile(rb"fwl (-?[0-9.]+) 0x")
 RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both boards in real time, and send the delays of all front angles to ``results``.
+    """Run both halves in real time; send how long each front angle took to ``results``, in s.
 
-    A delay is the time in s that an angle takes to reach the drive board. The wheel swings from
-    side to side, so that recent angles differ.
+    The simulated wheel swings from side to side, so that recent angles differ and can be told
+    apart.
     """
     pair = SimulatedFejemis()
     drive, _ = masters
@@ -79,13 +79,12 @@ def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
 
 
 def compute() -> None:
-    """Compute until the process is killed."""
     while True:
         sum(range(1000))
 
 
 def drive_for(seconds: float, ports: Sequence[str]) -> None:
-    """Run the driver's link with commands at 20 Hz."""
+    """Run the driver's link for ``seconds``, with commands at 20 Hz."""
     settings = SessionSettings(
         limits=SpeedLimits(), commands=CommandSettings(), odometry=OdometrySettings()
     )
@@ -113,7 +112,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return the delays of all angles in ms, sorted, while ``busy`` busy processes run."""
+    """Return how long each angle took, in ms and sorted, while ``busy`` other processes compute."""
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)
@@ -134,7 +133,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return an empty list, because no figure has a floor, and a table of the delays."""
+    """Return an empty list, because nothing here has a floor, and the rows of a table."""
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

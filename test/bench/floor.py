@@ -1,12 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor: the smallest program with the same output as the driver, without any checks.
+"""The floor: the smallest program that has the same output as the driver, without any checks.
 
 ``measurements PORT NAMESPACE`` publishes an Imu for every IMU frame, and an Odometry and a
-JointState for every delta, trusting the second byte of what looks like a frame. ``commands PORT
-NAMESPACE`` writes a frame for every cmd_vel. Each message or frame has one number by which it is
-recognized. ``bare PORT NAMESPACE`` has the driver's topics and services, but does nothing, so it
-needs only the memory that ROS itself takes.
+JointState for every delta. It trusts the second byte of anything that looks like a frame.
+
+``commands PORT NAMESPACE`` writes a frame for every cmd_vel.
+
+Each message or frame has one number, by which the benchmark recognizes it.
+
+``bare PORT NAMESPACE`` has the driver's topics and services, but does nothing. It shows how much
+memory ROS itself needs.
 """
 
 import os
@@ -25,7 +29,7 @@ LENGTHS = {IMU: 14, DELTA: 9, POSE: 15}
 
 
 def measurements(port: int, node: Node) -> None:
-    """Read, and publish prefilled messages for each frame."""
+    """Read frames; publish a prepared message for each of them."""
     imus = node.create_publisher(Imu, "imu/data_raw", 10)
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)
@@ -50,7 +54,7 @@ def measurements(port: int, node: Node) -> None:
 
 
 def commands(port: int, node: Node) -> None:
-    """Write one frame in the callback of each command."""
+    """Write one frame for each command, in the callback of the command."""
     pack = struct.Struct(">BBBhhh").pack
 
     def drive(twist: Twist) -> None:
@@ -61,7 +65,7 @@ def commands(port: int, node: Node) -> None:
 
 
 def bare(_port: int, node: Node) -> None:
-    """Make the driver's topics and services, without any function."""
+    """Make the driver's topics and services, which do nothing."""
     from diagnostic_msgs.msg import DiagnosticArray  # the other floors do not need these
     from rclpy.executors import SingleThreadedExecutor
     from std_msgs.msg import Bool, Float32MultiArray, String

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands two robots in turn, 40 times a second each, for a number of seconds.
+"""Command several robots in turn, 40 times a second each, for a number of seconds.
 
-Arguments: seconds, namespaces. The program prints one JSON array per namespace, of pairs: the
-steady clock's time in s at which a command was published, and the command's forward speed in the
-board's units.
+The arguments are the seconds and the namespaces. The program prints a JSON list with an array for
+each namespace. It has two numbers for each command: the steady clock's time in s, and the forward
+speed in the board's units.
 """
 
 import json
@@ -15,7 +15,10 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 PERIOD_S = 0.0247
-"""Period of the commands in s, not a multiple of the board's tick, so that all phases occur."""
+"""Period of the commands in s.
+
+It is not a multiple of the board's tick, so that all phases occur.
+"""
 FASTEST = 30
 LSB_PER_MPS = 70.0
 

@@ -2,7 +2,8 @@
 
 """The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-Driver and floor each have a board; both boards send the same bytes, recorded at rest.
+The driver and the floor each have a board. Both boards send the same bytes, which were recorded at
+rest.
 """
 
 import bisect
@@ -26,15 +27,20 @@ from omnibot_driver.simulator.lois_ecu import LoisSettings, SimulatedLois
 TICK_S: Final = 0.01
 RECORDED_S: Final = 120.0
 WINDOW_S: Final = 8.0
-"""Length of a measurement window in s: a fixed time, not a wait for an event."""
+"""Length of a measurement window, in s."""
 SETTLING_S: Final = 10.0
-"""How long the programs run before the measurement, in s; no event reports that they are ready."""
+"""Time in s for which the programs run before the measurement.
+
+No event reports that they are ready.
+"""
 
 
 class Stage:
-    """Boards on pseudo-terminals at ``paths``.
+    """Boards on pseudo-terminals, which all send the same recorded stream.
 
-    ``heard``: for each board, a list of its reads of commands, each with time and bytes.
+    ``paths``: the names of the terminals.
+
+    ``heard``: for each board, a list of its reads of commands, each with its time and bytes.
     """
 
     def __init__(self, boards: int) -> None:
@@ -81,7 +87,7 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures that have a floor, and an empty list of further report sections."""
+    """Return the figures that have a floor, and an empty list of further report sections."""
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}

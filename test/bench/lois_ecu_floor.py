@@ -2,8 +2,8 @@
 
 """The floor for a LOIS ECU: the smallest program with the same output, without any checks.
 
-``PORT NAMESPACE``: publish an Odometry and a JointState for every group of odometry reports,
-trusting each line, and write a line for every cmd_vel.
+``PORT NAMESPACE``: the program publishes an Odometry and a JointState for every group of odometry
+reports. It trusts each line. It writes a line for every cmd_vel.
 """
 
 import math
@@ -31,7 +31,7 @@ def rpm_line(speed_mps: float) -> bytes:
 
 
 def relay(port: int, node: Node) -> None:
-    """Read, and publish prefilled messages for each group of odometry reports."""
+    """Read lines; publish prepared messages for each group of odometry reports."""
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)
     odometry = Odometry(child_frame_id="base_link")

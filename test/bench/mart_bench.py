@@ -1,10 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller's part of ``make bench``: latency of commands, and cost of the polls.
+"""The MART's part of ``make bench``: the latency of commands, and the cost of the regular queries.
 
-There are two simulated controllers on UDP: one for the driver, one for the smallest relay that
-polls as often. A new speed waits for the reply to the outstanding query, and is computed from the
-encoder's count; a stop does not wait.
+There are two simulated controllers on UDP. One is for the driver, and one is for the floor, the
+smallest program that sends as many queries.
+
+The driver sends a new speed only after the reply to the current query, and computes it from the
+encoder's count. A stop does not wait.
 """
 
 import time
@@ -20,20 +22,26 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 WINDOW_S: Final = 20.0
-"""Length of a measurement window in s: a fixed time, not a wait for an event."""
+"""Length of a measurement window, in s."""
 SETTLING_S: Final = 8.0
-"""How long the programs run before the measurement, in s; no event reports that they are ready."""
+"""Time in s for which the programs run before the measurement.
+
+No event reports that they are ready.
+"""
 LATEST_S: Final = 0.9
-"""Longest assumed latency in s; a later datagram belongs to the next command."""
+"""Longest latency in s that is expected. A later datagram belongs to the next command."""
 LARGE: Final = 3
-"""Smallest change of a speed that shows a new command, in register units.
+"""Smallest change of a speed, in register units, that shows a new command.
 
 The driver makes smaller changes by itself, to hold the heading.
 """
 
 
 class Heard(SimulatedMart):
-    """A controller that stores the datagrams of its command port in ``heard``, with their times."""
+    """A simulated controller that records what it receives on its command port.
+
+    ``heard``: the datagrams, each with its time, without the regular queries.
+    """
 
     def __init__(self) -> None:
         super().__init__(MartSettings())
@@ -46,7 +54,7 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures that have a floor, and an empty list of further report sections."""
+    """Return the figures that have a floor, and an empty list of further report sections."""
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]
@@ -98,9 +106,9 @@ def _medians(late: list[list[float]], windows: int) -> list[list[float]]:
 def _latencies(
     sent: list[tuple[float, float]], heard: list[tuple[float, bytes]], *, stops: bool
 ) -> list[float]:
-    """Return the time from each command to its datagram, in µs, for commands to a moving robot.
+    """Return how long each command took to reach the controller, in µs.
 
-    ``stops``: whether to measure stops; otherwise changes of speed are measured.
+    Only commands to a moving robot are measured: stops if ``stops``, else changes of speed.
     """
     found = []
     for (_, before), (at, speed) in pairwise(sent):

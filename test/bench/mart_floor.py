@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The floor for a MART controller: the smallest program with the same output, without checks.
+"""The floor for a MART: the smallest program with the same output, without any checks.
 
-``HOST PORT NAMESPACE``: poll encoder and heading 16 times a second each, publish an Odometry and a
-JointState for each count, trusting each datagram, and send RM or RMCS for every cmd_vel.
+``HOST PORT NAMESPACE``: the program asks for the encoder and the heading, 16 times a second each.
+It publishes an Odometry and a JointState for each count, and trusts each datagram. It sends RM or
+RMCS for every cmd_vel.
 """
 
 import socket
@@ -22,8 +23,6 @@ MPS_PER_UNIT = 0.0078
 
 
 class Relay:
-    """A relay that sends and receives everything on one socket."""
-
     def __init__(self, address: tuple[str, int], node: Node) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.connect(address)
@@ -32,7 +31,7 @@ class Relay:
         self._joints = node.create_publisher(JointState, "joint_states", 10)
 
     def command(self, twist: Twist) -> None:
-        """Change the speed of both motors, or start them."""
+        """Change the speed of both motors, or start them if they are at rest."""
         units = round(twist.linear.x / MPS_PER_UNIT)
         if self._units:
             self._socket.send(b"RMCS %d %d" % (units - self._units, units - self._units))
@@ -41,14 +40,14 @@ class Relay:
         self._units = units
 
     def ask(self) -> None:
-        """Poll the encoder and the heading in turn."""
+        """Ask for the encoder and for the heading in turn."""
         while True:
             for word in (b"ENC", b"RMRA"):
                 self._socket.send(word)
                 time.sleep(PERIOD_S)  # the rate of the queries is part of the floor
 
     def listen(self) -> None:
-        """Receive, and publish prefilled messages."""
+        """Receive replies; publish prepared messages for each encoder count."""
         odometry = Odometry(child_frame_id="base_link")
         joint = JointState(name=["left_wheel_joint", "right_wheel_joint"], position=[0.0] * 2)
         while True:

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands two MART robots in turn: another speed once a second, sometimes zero.
+"""Command several MART robots in turn, with another speed every second, which is sometimes zero.
 
-Arguments: seconds, namespaces. The program prints one JSON array per namespace, of pairs: the
-steady clock's time in s at which a speed was first published, and the speed in m/s.
+The arguments are the seconds and the namespaces. The program prints a JSON list with an array for
+each namespace. It has two numbers for each speed: the steady clock's time in s at its first
+publication, and the speed in m/s.
 """
 
 import json
@@ -14,13 +15,13 @@ from geometry_msgs.msg import Twist
 from publishers import connected
 
 SPEEDS = (0.15, 0.35, 0.2, 0.4, 0.15, 0.3, 0.0, 0.0)
-"""Commanded speeds in m/s; the zeros at the end last until the robot can be started anew."""
+"""Commanded speeds in m/s. The zeros at the end last until the robot can be started again."""
 HOLD_S, REPEAT_S = 1.0, 0.1
 AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command each speed to both robots in turn; record when each speed was first published."""
+    """Command each speed to the robots in turn; record when it was published for the first time."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Processes to be measured, and their figures from /proc."""
+"""The processes that the benchmark measures, and their processor time and memory from /proc."""
 
 import json
 import os
@@ -15,7 +15,7 @@ PATIENCE_S = 5.0
 
 
 class Program:
-    """A program of this directory, or a module; it runs as a process in a ``with`` block."""
+    """A program of this directory, or a module, that runs as a process within a ``with`` block."""
 
     def __init__(self, *arguments: str, environment: dict[str, str] | None = None) -> None:
         self.process = subprocess.Popen(
@@ -47,32 +47,32 @@ class Program:
         return self.process.stdout.readline()
 
     def result(self) -> Any:
-        """Close the input of the process; return its output, decoded from JSON."""
+        """Close the process's input; return the value that it then prints as JSON."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return json.loads(self.line())
 
     @property
     def busy_s(self) -> float:
-        """Processor time of the process so far, with its threads and children, in s."""
+        """Return the processor time of the process with its threads and children so far, in s."""
         return _busy_s(self.process.pid)
 
     @property
     def resident_mb(self) -> float:
-        """Resident memory of the process itself, in MB."""
+        """Return the resident memory of the process without its children, in MB."""
         return memory_mb(self.process.pid)[0]
 
     @property
     def children(self) -> list[int]:
-        """Process ids of its children."""
+        """Return the numbers of the process's child processes."""
         tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
         return [int(pid) for task in tasks for pid in (task / "children").read_text().split()]
 
 
 def driver(path: str, namespace: str, before: str = "", **environment: str) -> Program:
-    """Start the driver on this port as users do.
+    """Start the driver on this port, as users do.
 
-    ``before``: Python code that runs in the driver's process before the driver.
+    ``before``: Python code that runs first in the driver's process.
     """
     program = ["-m", "omnibot_driver.driver"]
     if before:
@@ -83,24 +83,24 @@ def driver(path: str, namespace: str, before: str = "", **environment: str) -> P
 
 
 def floor(what: str, path: str, namespace: str) -> Program:
-    """Start the relay of ``floor.py`` on this port; ``what``: the task that it has."""
+    """Start ``floor.py`` on this port with the task ``what``."""
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start a relay of ``steps.py`` on this port; ``what``: the name of its last step."""
+    """Start ``steps.py`` on this port; its last step is ``what``."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 
 def ear(*namespaces: str) -> Program:
-    """Start a process that subscribes in these namespaces; return when the process is ready."""
+    """Start a process that subscribes in these namespaces; wait until it is ready."""
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program
 
 
 def memory_mb(pid: int) -> tuple[float, float]:
-    """Return a process's resident memory and its proportional share, in MB."""
+    """Return the resident memory of a process and its proportional share of it, in MB."""
     rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     kb = {row.split()[0]: float(row.split()[1]) for row in rows[1:]}
     return kb["Rss:"] * 1.024e-3, kb["Pss:"] * 1.024e-3

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Publishers of ``cmd_vel`` for the processes that command robots."""
+"""Publishers of ``cmd_vel`` for the benchmark's processes that command robots."""
 
 import time
 from collections.abc import Sequence

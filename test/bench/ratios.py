@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Comparison of the driver with a floor: each figure is measured for both in turn."""
+"""Comparison of the driver with the floor, which are measured in turn."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,9 +9,13 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """Values of one figure, measured in pairs: one of the driver (``ours``), one of the floor.
+    """The results of one measurement, which was repeated for the driver and the floor in turn.
 
-    ``goal``: largest allowed ratio of ours to the floor.
+    ``ours``: the values of the driver.
+
+    ``floor``: the values of the floor. Values at the same position were measured together.
+
+    ``goal``: the largest allowed ratio of driver to floor.
     """
 
     name: str
@@ -22,7 +26,7 @@ class Figure:
 
     @property
     def ratio(self) -> float:
-        """Median of the ratios of ours to the floor over all pairs."""
+        """Return the median of the ratios of driver to floor."""
         return median(self._ratios)
 
     @property
@@ -31,7 +35,7 @@ class Figure:
 
     @property
     def row(self) -> str:
-        """The figure as a row of the table."""
+        """Return the row of the table for this measurement."""
         low, high = min(self._ratios), max(self._ratios)
         if len(self._ratios) > 3:
             low, _, high = quantiles(self._ratios, n=4, method="inclusive")
@@ -63,11 +67,11 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure driver and floor alternately; return the figure."""
+    """Measure the driver and the floor in turn, ``times`` times."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 
 
 def short(value: float) -> str:
-    """Format a number with three digits; a large one with all digits before the decimal point."""
+    """Return a number as text with three digits. A large one has all digits before the point."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The performance report: ``make bench`` writes it into docs/internals/performance.md.
+"""The performance report, which ``make bench`` writes into docs/internals/performance.md.
 
-Every figure is measured together with its floor on the same machine. ``--quick`` shortens all
-measurements, to test that the program runs. The exit code is 1 when a goal is missed.
+Each figure is measured together with its floor on the same machine. ``--quick`` shortens all
+measurements, to test that the program runs. The exit code is 1 if a goal is missed.
 """
 
 import argparse
@@ -27,7 +27,7 @@ from ratios import Figure, table
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
-"""By the name of each other board, the module that measures the board."""
+"""The modules that measure the other boards, by the name of the board."""
 SCALES = (1, 2, 4, 8)
 
 
@@ -37,7 +37,7 @@ def say(what: str) -> None:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return all figures with a floor, and the sections after their table."""
+    """Return the figures that have a floor, and the report's sections after their table."""
     windows = 2 if quick else 6
     figures: list[Figure] = []
     for adapter in ADAPTERS:
@@ -69,7 +69,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 
 
 def main() -> int:
-    """Run the measurements, and print and write them; return the exit code."""
+    """Run the measurements; print them and write them into the document; return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driver and floor on a small computer: each process group gets a share of one core.
+"""Driver and floor on a small computer, which is simulated by limiting their processor time.
 
-The share is a quota of Linux's cgroups. Its period is the shortest that the kernel permits. The
-processes therefore run slowly but evenly. Only root can set up a cgroup.
+Each gets a share of one core, as a quota of Linux's cgroups. Its period is the shortest that the
+kernel permits, so the processes run slowly but evenly. Only root can set up a cgroup.
 """
 
 import math
@@ -20,23 +20,23 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core to test; driver and floor each get a share of this size."""
+"""Shares of one core to measure. Driver and floor each get a share of this size."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
-"""Processor time in s that a cgroup gets per period; the kernel permits no less."""
+"""Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""
 CGROUP: Final = Path("/sys/fs/cgroup")
 NAMES: Final = ("ours", "floor")
 RELAY: Final = "measurements"
 STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
-"""How long to wait for a Stop after the last command, in s.
+"""Time in s to wait for a Stop after the last command.
 
-The wait is a fixed time, so that it is equal for all shares of a core.
+It is a fixed time, so that it is the same for all shares.
 """
 
 
 class Group:
-    """A group of processes that gets a share of a core, with version 1 or 2 of cgroups.
+    """A group of processes that gets a share of one core, by version 1 or 2 of cgroups.
 
     Raises OSError if the cgroup cannot be set up.
     """
@@ -59,7 +59,10 @@ class Group:
 
     @contextmanager
     def joined(self) -> Iterator[None]:
-        """Put this process and all that it starts in the context into the group."""
+        """Move this process into the group during the context.
+
+        Processes that it starts join, too.
+        """
         self._members.write_text(str(os.getpid()))
         try:
             yield
@@ -67,7 +70,7 @@ class Group:
             self._root.write_text(str(os.getpid()))
 
     def give(self, part: float) -> None:
-        """Give the group this share of a core; 1 means the whole core."""
+        """Give the group this share of one core; 1 is the whole core."""
         run_us, period_us = round(1e6 * RUN_S), round(1e6 * RUN_S / part)
         if self._is_first:
             self._write("cpu.cfs_quota_us", -1)
@@ -81,10 +84,11 @@ class Group:
 
 
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
-    """Return rows of a table: the figures of driver and floor with each share of one core.
+    """Return the rows of a table: the results of driver and floor for each share of one core.
 
-    ``seconds``: length of the measurement with each share. Where cgroups cannot be changed, the
-    result is one sentence.
+    ``seconds``: the length of the measurement for each share.
+
+    If cgroups cannot be changed, return one sentence instead.
     """
     try:
         return _table(parts, seconds)

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Processor time of the driver's reader by stage, measured with timers around the stages.
+"""Timers that measure the processor time of each stage of the driver's reader.
 
-This code runs in the driver's process before the driver starts. At the end of the process it writes
-a JSON object to the file that SPLIT names: seconds per stage, and as ``passed`` how long the reader
-ran, in s.
+This code runs in the driver's process, before the driver. At the end of the process it writes a
+JSON object to the file that the variable SPLIT names. It has the seconds of each stage, and as
+``passed`` the seconds for which the reader ran.
 """
 
 import atexit
@@ -28,9 +28,9 @@ within: list[float] = []
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Replace a method by one that adds its own time to ``stage``.
+    """Replace a method by one that adds its processor time to ``stage``.
 
-    Its own time does not include the stages that the method calls.
+    The time of other stages that the method calls is not included.
     """
     method: Callable[..., Any] = getattr(owner, name)
 

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards that send the nominal stream on pseudo-terminals, each at its own phase of the tick.
+"""Simulated boards on pseudo-terminals that send the nominal stream and record commands.
 
 Within each tick of 10 ms the boards send one after the other, so that their readers are measured in
-alternation. All boards have the same kind of adapter. Every IMU frame has a number in its first
-word. The boards do nothing else.
+turn. All have the same kind of adapter. Every IMU frame has a number in its first word.
 """
 
 import heapq
@@ -29,9 +28,9 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Largest number in IMU frames; the number counts up from 0 to TURN and down again."""
+"""Largest number in IMU frames. The numbers count up from 0 to TURN, and down again."""
 NOISE = 997
-"""Number of different noise readings, which are repeated."""
+"""Number of different noise values. After these, the noise repeats."""
 
 
 _IMU, _DELTA, _POSE = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3fB"))
@@ -54,7 +53,7 @@ def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
 
 
 def imu_ends() -> Iterator[int]:
-    """Yield for each tick the number of bytes after which its IMU frame is complete."""
+    """Yield for each tick the number of bytes sent when its IMU frame is complete."""
     begun = 0
     for tick in count():
         yield begun + IMU_BYTES
@@ -62,11 +61,13 @@ def imu_ends() -> Iterator[int]:
 
 
 class Stage:
-    """Boards on pseudo-terminals at ``paths``; times are of the steady clock, in s.
+    """Boards on pseudo-terminals. All times are of the steady clock, in s.
 
-    ``said[n]``: for board n and each tick, the time at which the last byte of the IMU frame was
-    delivered. ``heard[n]``: the reads in which board n received commands, each with its time and
-    bytes.
+    ``paths``: the names of the terminals, one for each board.
+
+    ``said[n]``: for each tick, the time at which board n delivered the last byte of the IMU frame.
+
+    ``heard[n]``: the reads in which board n received commands, each with its time and bytes.
     """
 
     def __init__(self, boards: int, adapter: Adapter = pieces) -> None:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays of growing size: each step adds one task to the floor, up to what a correct relay needs.
+"""Relays of growing size. Each step adds one task to the floor, up to those of a correct relay.
 
-Arguments: the step (a key of STEPS), port, namespace. The relay publishes serialized messages and
-writes nothing to the port.
+The arguments are the step, which is a key of STEPS, the port and the namespace. The relay publishes
+serialized messages and writes nothing to the port.
 """
 
 import os
@@ -39,7 +39,7 @@ Estimates = list[ImuEstimate | OdometryEstimate]
 
 
 class Relay:
-    """A relay with one method per step; each method publishes what it makes of a read's bytes."""
+    """A relay with one method for each step. It publishes messages from the bytes of one read."""
 
     def __init__(self, node: Node) -> None:
         values = boards.check_all({})
@@ -62,7 +62,7 @@ class Relay:
         self._begun = b""
 
     def publish(self, estimates: Estimates) -> None:
-        """Publish each estimate as a message on its topic, with its own timestamp."""
+        """Publish each estimate as a message on its topic, with the timestamp of the estimate."""
         for estimate in estimates:
             stamp_ns = round(1e9 * estimate.stamp_s)
             if isinstance(estimate, ImuEstimate):
@@ -73,7 +73,10 @@ class Relay:
                 self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
-        """Publish whatever looks like a frame, without checks; only its first word is read."""
+        """Publish all that looks like a frame, without checks.
+
+        Only the first word of a frame is read.
+        """
         estimates: Estimates = []
         at, data = 0, self._begun + data
         while at + 1 < len(data) and at + LENGTHS.get(kind := data[at + 1], 1) <= len(data):
@@ -88,7 +91,7 @@ class Relay:
         self.publish(estimates)
 
     def decode(self, data: bytes) -> None:
-        """Decode and verify the frames, and publish them."""
+        """Decode and check frames, and publish them."""
         estimates: Estimates = []
         for frame in self._decoder.feed(data, time.monotonic()):
             if isinstance(frame, ImuFrame):
@@ -100,7 +103,7 @@ class Relay:
         self.publish(estimates)
 
     def measure(self, data: bytes) -> None:
-        """Decode, stamp, check and integrate the frames, let the session react, and publish."""
+        """Decode, stamp, check and integrate frames in a session, and publish the estimates."""
         now = time.monotonic()
         self.publish(list(self._session.inbound.hear(data, now)))
         self._session.inbound.process(now)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of the driver as a process on a pseudo-terminal, together with the floor."""
+"""Measurements of the driver and the floor as processes on pseudo-terminals."""
 
 import bisect
 import json
@@ -25,24 +25,29 @@ from stage import Stage, number_of
 from steps import STEPS
 
 WINDOW_S = 6.0
-"""Length of a measurement window in s: a fixed time, not a wait for an event."""
+"""Length of a measurement window, in s."""
 COMMANDS_S = 3.0
 SETTLING_S = 8.0
-"""How long the programs run before the measurement, in s; no event reports that they are ready."""
+"""Time in s for which the programs run before the measurement.
+
+No event reports that they are ready.
+"""
 GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "pieces of 1 to 16 bytes": (1.0, 1.0, 1.0, 1.0),
     "1 ms timer": (None, None, None, None),
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios of driver to floor, by adapter; None: without limit. They are those of the
-median latency of measurements, its 99th percentile, processor time, and latency of cmd_vel.
+"""Largest allowed ratios of driver to floor, for each adapter. None is without a limit.
+
+The four ratios are of the median latency of measurements, its 99th percentile, the processor time,
+and the latency of cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 
 
 def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
-    """Measure the latency from line to callback, processor time, and the driver's memory."""
+    """Measure the latency from line to callback, the processor time, and the driver's memory."""
     with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear("ours", "floor"))
         programs = [
@@ -96,7 +101,7 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
 
 
 def memory() -> list[str]:
-    """Return rows of a table: memory of driver, guard, and a bare node with the same interface."""
+    """Return the rows of a table: memory of driver, guard, and a node with the same interface."""
     with Stage(2) as stage, ExitStack() as stack:
         stack.enter_context(ear("ours"))
         ours = stack.enter_context(driver(stage.paths[0], "ours"))
@@ -113,7 +118,7 @@ def memory() -> list[str]:
 
 
 def steps(windows: int) -> list[str]:
-    """Return rows of a table: the floor, then one more step per row, then the driver."""
+    """Return the rows of a table: the floor, then one more step in each row, then the driver."""
     names = ["floor", *STEPS, "ours"]
     with Stage(len(names)) as stage, ExitStack() as stack:
         listener = stack.enter_context(ear(*names))
@@ -148,7 +153,7 @@ def steps(windows: int) -> list[str]:
 
 
 def commands(adapter: str, windows: int) -> Figure:
-    """Measure the time from a published cmd_vel to its bytes on the board's side."""
+    """Measure the time from a published cmd_vel to its bytes at the board."""
     with Stage(2, ADAPTERS[adapter]) as stage, ExitStack() as stack:
         stack.enter_context(driver(stage.paths[0], "ours"))
         stack.enter_context(floor("commands", stage.paths[1], "floor"))
@@ -164,7 +169,7 @@ def commands(adapter: str, windows: int) -> Figure:
 
 
 def imports(times: int) -> Figure:
-    """Measure the time to import the driver, and the packages that any such node needs."""
+    """Measure the time to import the driver, and that of the packages that any such node needs."""
     floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
 
     def seconds(names: str) -> float:
@@ -177,7 +182,7 @@ def imports(times: int) -> Figure:
 
 
 def starts(times: int) -> Figure:
-    """Measure the time from the start command to the first Imu in another process."""
+    """Measure the time from the start of the driver to the first Imu in another process."""
     taken: list[list[float]] = [[], []]
     for _ in range(times):
         for number, name in enumerate(("ours", "floor")):
@@ -192,7 +197,7 @@ def starts(times: int) -> Figure:
 
 
 def scale(counts: Sequence[int], seconds: float) -> list[str]:
-    """Return rows of a table for many drivers, each with its own board."""
+    """Return the rows of a table: the cost of many drivers together, each with its own board."""
     rows = [
         "| drivers | ms per robot and second | of one alone | IMU Hz, least | odom Hz, least |",
         "|---" * 5 + "|",
@@ -224,7 +229,7 @@ def scale(counts: Sequence[int], seconds: float) -> list[str]:
 
 
 def split(seconds: float) -> list[str]:
-    """Return rows of a table: the driver's processor time by stage."""
+    """Return the rows of a table: the driver's processor time in each stage."""
     with TemporaryDirectory() as folder, Stage(1) as stage, ear("ours") as listener:
         told = Path(folder) / "split"
         before = f"import sys; sys.path.insert(0, {str(HERE)!r}); import split"
@@ -250,7 +255,7 @@ def split(seconds: float) -> list[str]:
 def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return for each message the time of its frame's delivery, and the latency in µs."""
+    """Return for each message when its frame was delivered, in s, and the latency, in µs."""
     found = []
     for at, value in heard:
         number = round(value / unit)
@@ -265,7 +270,7 @@ def latencies(
 def command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return the time from each command to the first read with its frame, in µs."""
+    """Return the time from each command to the first read of the board with its frame, in µs."""
     found = []
     frames = [
         (at, struct.unpack_from(">h", data, begin + 3)[0])

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes the kernel's number and the name of each thread to the file that NAMES names.
+"""Write the kernel's number and the name of each thread to a file.
 
-This code runs in the driver's process before the driver starts.
+The variable NAMES has the name of the file. This code runs in the driver's process, before the
+driver.
 """
 
 import os

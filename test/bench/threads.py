@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Processor time and wake-ups of the driver by thread, from the kernel's counts."""
+"""Processor time and wake-ups of each thread of the driver, as counted by the kernel."""
 
 import time
 from contextlib import suppress
@@ -13,14 +13,15 @@ from stage import Stage
 from system import SETTLING_S
 
 LEAST_MS: Final = 0.05
-"""Processor time in ms per second below which a thread has no row of its own."""
+"""Processor time in ms per second. A thread with less than that has no row of its own."""
 
 Counts = dict[str, tuple[float, int]]
-"""Processor time in s and number of wake-ups, by thread."""
+"""By the name of a thread, its processor time in s and its number of wake-ups."""
 
 
 def table(seconds: float) -> list[str]:
-    """Return rows of a table: the threads of the driver and its guard, and page faults."""
+    """Return the rows of a table of the threads of driver and guard, and the rate of page faults.
+    """
     with TemporaryDirectory() as folder, Stage(1) as stage, ear("ours") as listener:
         names = Path(folder) / "names"
         before = f"import sys; sys.path.insert(0, {str(HERE)!r}); import thread_names"
@@ -60,5 +61,5 @@ def _counts(pid: int, named: dict[str, str], guard: int) -> Counts:
 
 
 def _faults(pid: int) -> int:
-    """Return how many page faults of a process needed no disk access (field 10 of ``stat``)."""
+    """Return the number of a process's page faults without disk access (field 10 of ``stat``)."""
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[7])

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Make all pictures of the README and the documents that a tool can make: ``make pictures``.
+"""Make all pictures for the README and the documents that a program can make: ``make pictures``.
 
-Each module here has a ``main(folder)`` that writes pictures into the folder. Each runs in its own
-process, two at once, as most of them wait for robots that drive in real time.
+Each module of this folder has a function ``main(folder)``, which writes pictures into that folder.
+Each runs in its own process, and two run at the same time. Most wait for robots that drive in real
+time.
 """
 
 import os

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of ``calibrate step`` and ``calibrate commission``, on robots with known errors.
+"""Pictures of ``calibrate step`` and ``calibrate commission``, made with robots of known errors.
 
-The robots' errors, and the errors that calibrate finds, are in docs/tools/calibrate.md.
+docs/tools/calibrate.md has these errors, and those that the calibration finds.
 """
 
 import math

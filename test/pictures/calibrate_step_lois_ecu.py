@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The picture of ``calibrate step`` on a LOIS ECU with known motors, in simulated time."""
+"""The picture of ``calibrate step`` on a LOIS ECU with known motors, made in simulated time."""
 
 import sys
 import tempfile

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The picture of the robot's description: its cylinders and boxes, drawn by a small ray tracer."""
+"""The picture of the robot's description. A small ray tracer draws its cylinders and boxes."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,8 +17,11 @@ Array = NDArray[np.float64]
 
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
-"""WIDTH, HEIGHT: size in pixels; BAND: number of rows computed at once; FINER: number of rays per
-pixel in each direction.
+"""``WIDTH`` and ``HEIGHT``: size of the picture in pixels.
+
+``BAND``: the number of rows that are computed at once.
+
+``FINER``: the number of rays for each pixel, in each direction.
 """
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
@@ -49,7 +52,14 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """Places where rays enter and leave a solid, with normals."""
+    """The places where rays enter and leave a solid, with the normals of its surface there.
+
+    All arrays have one element for each ray that meets the solid.
+
+    ``rays``: the indices of these rays.
+
+    ``near``, ``far``: the distances at which a ray enters and leaves the solid.
+    """
 
     rays: NDArray[np.intp]
     near: Array
@@ -60,7 +70,10 @@ class Hits:
 
 @dataclass
 class Solid:
-    """A box with these half sides, or a cylinder about its own z axis within that box."""
+    """A box, or a cylinder about its own z axis that just fits into such a box.
+
+    ``half``: half the lengths of the sides of the box.
+    """
 
     matrix: Array
     half: Array
@@ -68,7 +81,10 @@ class Solid:
     rgba: Array
 
     def hits(self, origins: Array, directions: Array) -> Hits:
-        """Intersect rays from outside; ``origins`` (n, 3) and unit ``directions`` (n, 3)."""
+        """Return where rays from outside meet the solid.
+
+        ``origins`` and the unit vectors ``directions`` have the shape (n, 3).
+        """
         rays = close(self.matrix[:3, 3], np.linalg.norm(self.half), origins, directions)
         start = (origins[rays] - self.matrix[:3, 3]) @ self.matrix[:3, :3]
         way = directions[rays] @ self.matrix[:3, :3]
@@ -92,7 +108,9 @@ class Solid:
         return Hits(rays[met], near[met], normals[0], far[met], normals[1])
 
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
-        """Return normals of the faces across ``axis`` that rays meet at the distances ``at``.
+        """Return the normals of the surface where rays meet it, at the distances ``at``.
+
+        ``axis``: for each ray, the axis across which the face lies.
 
         ``sign``: 1 for normals along the ray, -1 for normals against it.
         """
@@ -107,7 +125,7 @@ class Solid:
 
 
 def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArray[np.intp]:
-    """Return the indices of rays that pass through a sphere, or begin in it."""
+    """Return the indices of the rays that pass through a sphere, or begin in it."""
     to = centre - origins
     along = np.einsum("ij,ij->i", to, directions)
     passing = np.einsum("ij,ij->i", to, to) - along**2 < reach**2
@@ -116,7 +134,7 @@ def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArr
 
 @dataclass
 class Link:
-    """A group of solids near each other, and a sphere around the group."""
+    """A group of solids that are near each other, and a sphere around them."""
 
     solids: list[Solid]
 
@@ -128,7 +146,7 @@ class Link:
 
 
 def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple[Solid, Hits]]:
-    """Yield each solid, with the places where the rays enter and leave it."""
+    """Yield each solid, and where the rays enter and leave it."""
     for link in links:
         rays = close(link.centre, link.reach, origins, directions)
         for solid in link.solids:
@@ -138,7 +156,7 @@ def meet(links: list[Link], origins: Array, directions: Array) -> Iterator[tuple
 
 
 def links() -> Iterator[Link]:
-    """Yield all visible parts of the robot, placed on the ground."""
+    """Yield all visible parts of the robot, placed on the floor."""
     robot = URDF.from_xml_string(xacro.process_file(str(DESCRIPTION)).toxml())
     colours = {material.name: material.color.rgba for material in robot.materials}
     places = {"base_link": np.linalg.inv(pose(robot.joint_map["base_footprint_joint"].origin))}
@@ -158,7 +176,7 @@ def links() -> Iterator[Link]:
 
 
 def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
-    """Return the amount of light at each point, from 0 to 1."""
+    """Return how much light each point gets, from 0 to 1."""
     light = np.zeros(len(points))
     for _ in range(LAMPS):
         towards = unit(LIGHT + random.normal(0.0, LAMP_SIZE, points.shape))
@@ -170,7 +188,7 @@ def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
 
 
 def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array:
-    """Return the colours along these rays from the eye."""
+    """Return the colours that are seen along these rays from the eye."""
     eyes = np.broadcast_to(EYE_M, rays.shape)
     depth = np.where(rays[:, 2] < 0.0, -EYE_M[2] / np.minimum(rays[:, 2], -1e-9), np.inf)
     colour = np.ones(rays.shape)
@@ -202,9 +220,9 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 
 
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
-    """Draw clear solids over what is behind them, from the lowest to the highest.
+    """Draw the clear solids over the colours behind them, from the lowest solid to the highest.
 
-    A face covers more of what is behind it where it is seen at a flat angle.
+    A face covers more of the colour behind it where it is seen at a flat angle.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Picture of squares of 5 m, driven by a simulated LOIS ECU: true path and path of ``odom``.
+"""Picture of squares of 5 m that a simulated LOIS ECU drives: the true path and that of ``odom``.
 
-Both firmwares drive in both directions, with wheels of the right size and the gains of the ECU's
-own host. The errors are printed as rows of a table.
+Both firmware variants drive a square to the left and one to the right. The wheels have the right
+size, and the gains are those of the ECU's own host. The errors are printed as rows of a table.
 """
 
 import math
@@ -40,7 +40,7 @@ def main(folder: Path) -> None:
 
 
 def draw(axes: Any, firmware: Firmware, name: str, sign: int) -> None:
-    """Draw one square, with the region in which the robot should be at its end."""
+    """Draw one square, and the region in which the robot should be at its end."""
     rig = Rig(nominal(firmware, SEED))
     rig.run(4.0)
     rig.square(SIDE_M, sign)
@@ -68,7 +68,6 @@ def _columns(poses: list[Pose]) -> tuple[list[float], list[float]]:
 
 
 def _region(pose: Pose, covariance: Covariance) -> Ellipse:
-    """Return the ellipse of ``SIGMAS`` standard deviations around a pose."""
     mean = (covariance.xx + covariance.yy) / 2
     half = math.hypot((covariance.xx - covariance.yy) / 2, covariance.xy)
     angle = math.degrees(math.atan2(2 * covariance.xy, covariance.xx - covariance.yy) / 2)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of the monitor's real screen: ``python test/pictures/monitor.py docs/pictures``.
+"""Pictures of the monitor's screen: ``python test/pictures/monitor.py docs/pictures``.
 
-A driver runs on a simulated board, a robot drives a square, and the dashboard has a size of 80x24.
+A driver runs on a simulated board, and the robot drives a square. The screen has 80x24 characters.
 """
 
 import asyncio

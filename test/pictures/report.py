@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of the report on a recorded drive around the demo's square, with an e-stop."""
+"""Pictures of the report on a recorded drive: the demo's square, with an e-stop."""
 
 import math
 import os
@@ -28,12 +28,12 @@ from omnibot_driver.tools.report.__main__ import main as report
 
 SHOWN = ("path", "timeline", "timing", "velocities")
 REST = 75
-"""Number of odom messages at rest: three seconds."""
+"""Number of odom messages to wait for while the robot is at rest: three seconds."""
 STOPPED_ON_LEG = 6
 
 
 def main(folder: Path) -> None:
-    """Write ``report_path.png`` and the other pictures of the report; print the verdict."""
+    """Write ``report_path.png`` and the report's other pictures; print its verdict."""
     rclpy.init()
     with ExitStack() as stack:
         stack.callback(rclpy.shutdown)
@@ -52,7 +52,7 @@ def main(folder: Path) -> None:
 
 
 def _drive(probe: Probe, recorder: Recorder, namespace: str) -> None:
-    """Rest, drive seven legs with an e-stop in the middle of the last, and rest."""
+    """Rest, drive seven sides of squares with an e-stop in the middle of the last one, and rest."""
     topic, kind, qos = f"/{namespace}/cmd_vel", "geometry_msgs/msg/Twist", QoSProfile(depth=10)
     recorder.types[topic], recorder.offered[topic] = kind, as_recorded(qos)
     recorder.hear(topic, kind, qos)

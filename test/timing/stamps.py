@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The timing report: writes the worst figures of each cell into docs/internals/time.md.
+"""The timing report, which writes the accuracy of stamps into docs/internals/time.md.
 
-Arguments: ``--seconds`` of each stream, and ``--seeds``, the number of streams in each cell, which
-have the skews of ``SKEWS`` in turn; ``--readers`` runs only the busy readers.
+``--seconds`` is the length of each stream. ``--seeds`` is the number of streams in each cell. Their
+clocks have the skews of ``SKEWS`` in turn. ``--readers`` measures only the readers of a busy
+computer.
 """
 
 import argparse
@@ -23,17 +24,20 @@ LOSSES = (0.0, 1e-3, 1e-2)
 SCENARIOS = {"nominal": "driving", "IMU only": "IMU only, noisy gyro"}
 BLOCKS = "4096-byte blocks"
 BLOCKS_SETTLED_S = 6.0
-"""Time until the driver's clock has settled with large blocks, in s: the time of two blocks."""
+"""Time in s after which the driver's clock has settled with large blocks.
+
+It is the time of two blocks.
+"""
 LIMITS_S = (0.2e-3, 0.5e-3)
 
 Cell = tuple[str, float, str, str]
-"""Line, share of lost bytes, mode, event."""
+"""One cell of the report: the line, the share of lost bytes, the mode, and the event."""
 Figures = tuple[float, float]
-"""Unevenness, and the half-width that contains 99 % of the errors, in s."""
+"""The unevenness, and half the width of the interval with 99 % of the errors, both in s."""
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
-    """Measure one stream in a process of the pool."""
+    """Measure one stream, in a process of the pool."""
     (line, loss, mode, event), seed = job
     skew = SKEWS[seed % len(SKEWS)]
     stamped = stamp(line, SCENARIOS[mode], loss, skew, seed, seconds, event)
@@ -42,7 +46,7 @@ def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
 
 
 def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
-    """Return a table with worst and median of each row, and the streams within both limits."""
+    """Return a table: worst and median of each row, and how many streams keep both limits."""
     lines = [
         f"| {head} | steps, std (ms) | 99 % within (ms) | streams that keep both limits |",
         "|---" * (head.count("|") + 4) + "|",
@@ -58,7 +62,7 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
 
 
 def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
-    """Measure all streams of all cells on all processors."""
+    """Measure all streams of all cells, on all processors."""
     jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
     found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
     with Pool(os.cpu_count()) as pool:
@@ -71,7 +75,7 @@ def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[F
 
 
 def publish(name: str, lines: list[str]) -> None:
-    """Print the lines, and write them into the document under this name."""
+    """Print the lines, and write them into the document between the marks with this name."""
     text = "\n".join(lines)
     print(text)
     begin, end = (mark.format(name) for mark in MARKS)
@@ -80,7 +84,7 @@ def publish(name: str, lines: list[str]) -> None:
 
 
 def lines_and_events(seconds: float, seeds: int) -> None:
-    """Measure all lines and events with a host that reads promptly."""
+    """Measure all lines and events, with a host that reads promptly."""
     undisturbed, *events = EVENTS_S
     cells = [(line, n, mode, undisturbed) for line in LINES for n in LOSSES for mode in SCENARIOS]
     cells += [
@@ -114,7 +118,7 @@ def lines_and_events(seconds: float, seeds: int) -> None:
 
 
 def busy_readers(seconds: float, seeds: int) -> None:
-    """Measure the stamps of hosts that read late."""
+    """Measure stamps of hosts that read late."""
     cells = [(line, n, mode, "none") for line in BUSY for n in LOSSES[:2] for mode in SCENARIOS]
     found = measured(cells, seconds, seeds)
     rows = {f"{line} | {n:g} | {mode}": figures for (line, n, mode, _), figures in found.items()}
@@ -127,7 +131,7 @@ def busy_readers(seconds: float, seeds: int) -> None:
 
 
 def main() -> None:
-    """Run the streams, and print and write the figures."""
+    """Measure the streams; print the results and write them into the document."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=30.0)
     arguments.add_argument("--seeds", type=int, default=30)

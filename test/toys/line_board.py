@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The profile and core of a toy board: two serial lines of text, two wheels, without IMU.
+"""The profile and the core of a toy board: two serial lines of text, two wheels, and no IMU.
 
-The line ``drive`` takes commands ``v LEFT RIGHT`` in mm/s. The line ``sense`` sends ``d WAY TURN``
-in mm and mrad every 0.4 s.
+The line ``drive`` receives the commands ``v LEFT RIGHT``, in mm/s.
+
+The line ``sense`` sends ``d WAY TURN``, in mm and mrad, every 0.4 s.
 """
 
 import re

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated robot of the toy with two lines."""
+"""The simulated robot of the toy board with two serial lines."""
 
 import argparse
 
@@ -12,7 +12,7 @@ TICK_S = 0.01
 
 
 class LineRobot:
-    """Two wheels that follow commands; the robot never stops by itself."""
+    """Two wheels that turn as commanded. The robot never stops by itself."""
 
     channels, tick_s = CHANNELS, TICK_S
 
@@ -52,7 +52,7 @@ class LineRobot:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add no options."""
+    """Add nothing: this board has only the common options."""
 
 
 def from_arguments(arguments: argparse.Namespace) -> LineRobot:

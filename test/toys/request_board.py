@@ -1,9 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The profile and core of a toy board: requests over UDP, and one blocking move at a time.
+"""The profile and the core of a toy board: requests over UDP, and one blocking move at a time.
 
-``WHERE`` → ``at WAY TURN``, in mm and mrad since the last reply. ``MOVE V W`` in mm/s and mrad/s →
-the robot moves for 0.2 s, then ``ok``. ``HALT`` on the next higher port ends a move at once.
+``WHERE`` is answered by ``at WAY TURN``: the motion since the last such reply, in mm and mrad.
+
+``MOVE V W``, in mm/s and mrad/s, moves the robot for 0.2 s and is then answered by ``ok``.
+
+``HALT`` on the next higher port ends a move at once.
 """
 
 import math
@@ -32,7 +35,7 @@ AT = re.compile(rb"at (-?\d+) (-?\d+)")
 
 
 class Moves:
-    """The toy's actuator: it sends one move at a time, after the reply to the previous request."""
+    """The toy's actuator. It sends one move at a time, after the reply to the previous request."""
 
     rate_hz = 20.0
     commanded: BodyTwist | None = BodyTwist(0.0, 0.0, 0.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulated robot of the toy with requests."""
+"""The simulated robot of the toy board with requests."""
 
 import argparse
 
@@ -12,7 +12,7 @@ TICK_S = 0.01
 
 
 class RequestRobot:
-    """A robot that handles one request at a time, while the others wait for their turn."""
+    """A robot that handles one request at a time. Further requests wait for their turn."""
 
     channels, tick_s = CHANNELS, TICK_S
 
@@ -62,7 +62,7 @@ class RequestRobot:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add no options."""
+    """Add nothing: this board has only the common options."""
 
 
 def from_arguments(arguments: argparse.Namespace) -> RequestRobot:

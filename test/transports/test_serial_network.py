@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Serial ports on a network: usable like local ones, and closed when the peer is gone."""
+"""Tests of serial ports on a network, which are used like local ones."""
 
 import contextlib
 import ctypes
@@ -34,7 +34,10 @@ def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
 def test_a_peer_that_vanished_without_a_word_is_given_up(
     monkeypatch: pytest.MonkeyPatch, said: bytes
 ) -> None:
-    """The port notices that its peer has vanished, although writes raise no error at first."""
+    """The peer of a port vanishes without closing the connection.
+
+    Writes raise no error at first. The port notices it and raises LinkError.
+    """
     options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
     monkeypatch.setattr("omnibot_driver.transports.serial_port.PEER_OPTIONS", options)
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -53,7 +56,7 @@ def go_on(action: Callable[[], object]) -> None:
 
 
 def drop_everything(peer: socket.socket) -> None:
-    """Let the kernel discard everything that arrives at this socket, with a packet filter."""
+    """Let the kernel discard all data that arrives at this socket, by a packet filter."""
     program = ctypes.create_string_buffer(struct.pack("HBBI", 0x06, 0, 0, 0))
     so_attach_filter = 26
     peer.setsockopt(
@@ -62,7 +65,7 @@ def drop_everything(peer: socket.socket) -> None:
 
 
 def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
-    """A write to a peer that reads nothing ends with an error when all buffers are full."""
+    """The peer reads nothing. When all buffers are full, a write raises LinkError."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port, far = connected(server)
         with far, closing(port), pytest.raises(LinkError, match="while writing"):
@@ -70,7 +73,10 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
 
 
 def test_a_board_behind_a_socket_is_served_as_well() -> None:
-    """Any URL of pyserial can be used; ``socket://host:port`` carries the same bytes."""
+    """The port has the URL ``socket://HOST:PORT``, one of those that pyserial knows.
+
+    It works like a local one.
+    """
     server = socket.create_server(("127.0.0.1", 0))
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     far, _ = server.accept()
@@ -89,7 +95,10 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
 
 
 def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
-    """A port closes the socket of a broken connection, which pyserial itself leaves open."""
+    """The peer breaks the connection off.
+
+    The port closes its socket, which pyserial itself leaves open.
+    """
     with socket.create_server(("127.0.0.1", 0)) as server:
         descriptors = len(os.listdir("/proc/self/fd"))
         port, far = connected(server)
@@ -103,7 +112,10 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
 def test_a_board_behind_rfc2217_is_served_as_well() -> None:
-    """A port also works through a server by RFC 2217, here the example server of pyserial."""
+    """The port is behind a server by RFC 2217, here pyserial's example server.
+
+    It works like a local one.
+    """
     board_side = serial.serial_for_url("loop://", timeout=0.05)
     listener = socket.create_server(("127.0.0.1", 0))
     done = threading.Event()
@@ -134,7 +146,7 @@ def test_a_board_behind_rfc2217_is_served_as_well() -> None:
 
 
 class Connection:
-    """The parts of a connection that rfc2217's PortManager needs."""
+    """The parts of a connection that the PortManager of pyserial needs."""
 
     def __init__(self, client: socket.socket) -> None:
         self._client = client

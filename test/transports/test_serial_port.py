@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A single serial port: errors with advice, exclusive use, complete writes."""
+"""Tests of a single serial port: errors with advice, exclusive use, and complete writes."""
 
 import fcntl
 import os
@@ -36,9 +36,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_every_way_a_port_can_refuse_says_what_to_do(
     monkeypatch: pytest.MonkeyPatch, error: Exception, advice: str
 ) -> None:
-    """Each error at the opening of a port leads to advice.
+    """A port cannot be opened. For each error, the message has advice.
 
-    Root is never refused, so a substitute for pyserial raises the errors.
+    A substitute for pyserial raises the errors, because root is never refused.
     """
 
     def refuse(*_: object, **__: object) -> None:
@@ -52,7 +52,10 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 
 @pytest.mark.parametrize("path", ["/dev/no-such-port", "/dev/null", "spy://a:b"])
 def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None:
-    """The message names the port's parameter; a board with several lines has one for each."""
+    """A port of a board with several lines cannot be opened.
+
+    The message names the parameter of this port.
+    """
     with pytest.raises(LinkError) as refused:
         SerialPort(path, 115200, "front_port")
     assert "front_port" in str(refused.value)
@@ -60,7 +63,10 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 
 
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
-    """The error for a second user of a port names the owner, from the kernel's list of locks."""
+    """A second program opens a port that is in use.
+
+    The error names the owner, from the kernel's locks.
+    """
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
         SerialPort(terminal.path, 115200)
@@ -68,7 +74,10 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Terminal) -> None:
-    """The kernel keeps 15 bytes of the owner's name, which may end within a two-byte letter."""
+    """The kernel keeps 15 bytes of the owner's name, which end within a two-byte letter here.
+
+    The error still names the owner.
+    """
     own = Path("/proc/self/comm")
     before = own.read_bytes()
     port = SerialPort(terminal.path, 115200)
@@ -82,7 +91,7 @@ def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Te
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
-    """Closing a port does not lower DTR; a board that is wired to DTR would restart."""
+    """A port is closed. DTR stays as it was, because a board that is wired to DTR would restart."""
     near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
     attributes = termios.tcgetattr(near)
     attributes[2] |= termios.HUPCL
@@ -95,9 +104,9 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A real terminal is exclusive, also towards programs without locks.
+    """A real terminal is exclusive, also for programs that use no locks.
 
-    A pseudo-terminal is not exclusive.
+    A pseudo-terminal is not.
     """
 
     def exclusive() -> bool:
@@ -117,11 +126,17 @@ def test_a_real_terminal_is_exclusive_until_it_is_closed(
 
 
 TIOCGEXCL = 0x80045440
-"""Linux's ioctl that reads whether a terminal is exclusive; the termios module lacks it."""
+"""Linux's ioctl that shows whether a terminal is exclusive.
+
+The module ``termios`` does not have it.
+"""
 
 
 def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) -> None:
-    """After a failed write, the port discards old data in the kernel, so new data comes first."""
+    """A write fails because the line is full.
+
+    The port discards the old data, so the next write succeeds.
+    """
     port = SerialPort(terminal.path, 115200)
     terminal.fill()
     with pytest.raises(LinkError, match="while writing"):
@@ -131,7 +146,10 @@ def test_after_a_failed_write_nothing_old_stands_in_the_way(terminal: Terminal) 
 
 
 def test_a_write_that_is_taken_in_pieces_is_completed(terminal: Terminal) -> None:
-    """A write that the kernel accepts only in parts is completed while the other end reads."""
+    """The kernel accepts a long write only in parts.
+
+    The port completes it while the other end reads.
+    """
     port = SerialPort(terminal.path, 115200)
     message = b"".join(b"%05d" % number for number in range(8000))
     reader = threading.Thread(target=lambda: heard.append(terminal.read_until(b"07999")))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two serial lines as one transport, on real pseudo-terminals."""
+"""Tests of two serial lines as one transport, on real pseudo-terminals."""
 
 import contextlib
 import os
@@ -23,7 +23,7 @@ from omnibot_driver.transports.several import Several
 
 
 class Ends:
-    """The far ends of two lines."""
+    """The ends of two lines: ``far`` at the boards, ``near`` at the driver."""
 
     def __init__(self) -> None:
         self.far, self.near, self.paths = [], [], []
@@ -77,7 +77,7 @@ def next_packets(lines: Several, count: int) -> set[Packet]:
 
 
 def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) -> None:
-    """Bytes keep their channel while both lines are used at the same time."""
+    """Both lines are used at the same time. The bytes keep their channels."""
     os.write(ends.far[0], b"drive")
     os.write(ends.far[1], b"front")
     assert next_packets(lines, 2) == {(0, b"drive"), (1, b"front")}
@@ -92,14 +92,14 @@ def read_on(lines: Several) -> NoReturn:
 
 
 def changed(lines: Several) -> dict[int, str]:
-    """Read until the set of missing lines changes; return the missing lines."""
+    """Read until the set of missing lines changes; return these lines, each with the reason."""
     with pytest.raises(LinesChanged):
         read_on(lines)
     return dict(lines.missing)
 
 
 def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Several) -> None:
-    """If one line is lost, the other still carries stops to the board and data from the board."""
+    """One line is lost. The other one still carries stops to the board, and data from the board."""
     ends.hang_up(0)
     lines.write(((0, b"stop"), (1, b"stop")))
     assert os.read(ends.far[1], 99) == b"stop"
@@ -111,7 +111,7 @@ def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Sev
 
 
 def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
-    """If no line is left, the error is that of the first line."""
+    """Both lines are lost, one after the other. LinkError has the reason of the first line."""
     ends.hang_up(0)
     changed(lines)
     ends.hang_up(1)
@@ -120,9 +120,9 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 
 
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
-    """A write never waits for a full line.
+    """One line is full. A write does not wait for it, and the other line gets its data at once.
 
-    After a while the line counts as missing, and old data is not sent to it.
+    After a while the full line is reported as missing. Its old data is discarded.
     """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -146,7 +146,10 @@ def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Severa
 def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A write itself declares a line missing if it is full for too long; the reader may be busy."""
+    """A line is full for too long.
+
+    The next write declares it missing, without waiting for a read.
+    """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -158,7 +161,7 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A full line is not given to a guard, since its lock would prevent a new opening."""
+    """A full line is not given to the guard. The guard's lock would prevent a new opening."""
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)
@@ -170,7 +173,7 @@ def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
 def test_what_a_full_line_does_not_take_at_once_follows_in_order(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The rest of a write to a full line follows in order as soon as the reader makes room."""
+    """A line is full. The data of two writes follows in order as soon as the reader makes room."""
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 60.0)
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
@@ -186,7 +189,7 @@ def test_what_a_full_line_does_not_take_at_once_follows_in_order(
 def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
     ends: Ends, tmp_path: Path
 ) -> None:
-    """A line that comes back is opened without closing the lines that are open."""
+    """A missing line appears. It is opened, and the other line stays open."""
     late = tmp_path / "late"
     paths = str(late), ends.paths[1]
     lines = Several([partial(SerialPort, path, 115200) for path in paths], retry_s=0.01)
@@ -204,13 +207,16 @@ def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
 
 
 def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
-    """A read that waits can be ended; it returns without data."""
+    """A read waits for data, and another thread ends it. It returns without data."""
     threading.Timer(0.02, lines.interrupt).start()
     assert lines.read() == (0, b"")
 
 
 def test_where_none_can_be_opened_none_is_kept() -> None:
-    """If no line can be opened, the error is that of the first, and no descriptor stays open."""
+    """No line can be opened.
+
+    The error is that of the first one, and no file descriptor stays open.
+    """
     before = len(os.listdir("/proc/self/fd"))
     paths = "/dev/no-such", "/dev/no-such-either"
     with pytest.raises(LinkError, match="/dev/no-such does not exist"):
@@ -219,12 +225,12 @@ def test_where_none_can_be_opened_none_is_kept() -> None:
 
 
 def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
-    """If two lines have the same port, the second is missing, since a port is exclusive."""
+    """Both lines have the same port. The second one is missing, because a port is exclusive."""
     with contextlib.closing(Several([partial(SerialPort, ends.paths[0], 115200)] * 2)) as lines:
         assert "in use" in lines.missing[1]
 
 
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
-    """A port without a descriptor cannot be one of several lines."""
+    """One of the lines is a port without a file descriptor. LinkError is raised."""
     with pytest.raises(LinkError, match="does not work for a board with several lines"):
         Several([partial(SerialPort, "loop://", 115200)])

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board in the driver's own process, used as a transport."""
+"""Tests of a simulated board in the driver's own process, as a transport."""
 
 import threading
 import time
@@ -27,13 +27,12 @@ PATIENCE_S = 60.0
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """Yield a stack of contexts that is closed with the test."""
     with ExitStack() as stack:
         yield stack
 
 
 def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
-    """Read at least this many bytes of a channel, and drop the bytes of other channels."""
+    """Read at least ``wanted`` bytes of one channel; discard the bytes of other channels."""
     data, deadline_s = b"", time.monotonic() + PATIENCE_S
     while len(data) < wanted:
         assert time.monotonic() < deadline_s, f"only {data!r} came"
@@ -43,19 +42,25 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
 
 
 def test_it_needs_no_guard_and_no_kernel() -> None:
-    """A simulated board ends with this process, has no descriptors, and counts no overruns."""
+    """A simulated board ends with the driver's process.
+
+    So it has no descriptors and no overruns.
+    """
     with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
         assert (transport.descriptors, transport.overruns) == (None, None)
 
 
 def test_a_read_ends_without_a_packet() -> None:
-    """A read that gets no packet ends after its time limit."""
+    """The board sends nothing. A read ends after its time limit."""
     assert InProcessBoard(ToyServer()).read(0.01) == (0, b"")
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """A waiting read can be interrupted; closing would otherwise wait for a paused board."""
+    """A read waits for data, and another thread interrupts it. It returns without data.
+
+    Otherwise, closing would wait for a paused board.
+    """
     board = InProcessBoard(ToyServer())
     canceller = threading.Timer(0.02, board.cancel)
     canceller.start()
@@ -66,7 +71,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
 
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:
-    """A closed transport behaves like a lost port; closing it again does nothing."""
+    """A closed transport raises LinkError, like a lost port. Closing it again does nothing."""
     transport = SimulatedTransport("sim://", TOY)
     transport.close()
     transport.close()
@@ -78,7 +83,10 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """A channel keeps as many unread bytes as a terminal, and drops the bytes that come later."""
+    """The driver does not read.
+
+    A channel keeps as many bytes as a terminal, and drops later ones.
+    """
     served = InProcessBoard(toy_lines.ToyLines())
     taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
     assert taken == [1000, 1000, 1000, 1000, UNREAD_LIMIT - 4000, 0]
@@ -89,7 +97,10 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
-    """A channel keeps as many unread datagrams as a socket, each of them whole, even if empty."""
+    """The driver does not read.
+
+    A channel keeps as many datagrams as a socket, whole, even empty ones.
+    """
     served = InProcessBoard(ToyServer())
     taken = [served._send(0, data) for data in [b"", *[b"ok 1"] * UNREAD_DATAGRAMS]]
     assert taken == [0, *[4] * (UNREAD_DATAGRAMS - 1), 0]
@@ -97,7 +108,10 @@ def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
 
 
 def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> None:
-    """A read returns bytes of a single channel; reads are in the order in which the board sent."""
+    """A read returns bytes of one channel only.
+
+    Reads have the order in which the board has sent.
+    """
     transport = stack.enter_context(closing(SimulatedTransport("sim://", TOY)))
     transport.write([(toy_lines.FRONT, b"angle 30\n"), (toy_lines.DRIVE, b"go 0.5 0\n")])
     assert b"30" in read(transport, 200, toy_lines.FRONT)
@@ -115,7 +129,10 @@ def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> 
     ],
 )
 def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -> None:
-    """The message for an unknown option names the command that lists the options."""
+    """A URL has a wrong option.
+
+    The message says why, and names the command that lists the options.
+    """
     with pytest.raises(LinkError) as refusal:
         SimulatedTransport(url, TOY)
     assert f"port '{url}' is not valid: " in str(refusal.value)
@@ -124,9 +141,9 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the board's thread fails, the error is a defect with its cause, not a lost cable.
+    """The thread of the board fails. The error is RuntimeError with its cause, not a lost line.
 
-    The board can still be closed.
+    Closing the board raises the same error, and leaves nothing behind.
     """
 
     def explode(_board: toy_lines.ToyLines) -> list[tuple[int, bytes]]:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Datagrams on the loopback: each packet is one datagram of its channel, in both directions."""
+"""Tests of datagrams on the loopback: each packet is one datagram of its channel."""
 
 import contextlib
 import os
@@ -67,7 +67,7 @@ def next_packet(transport: UdpPorts) -> Packet:
 
 
 def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPorts) -> None:
-    """In both directions, each packet is one datagram; packets are never joined."""
+    """Packets go in both directions. Each is one datagram, and packets are never joined."""
     transport.write(((0, b"one"), (0, b"two"), (1, b"halt")))
     (first, driver), (second, _) = host.ports[0].recvfrom(99), host.ports[0].recvfrom(99)
     assert (first, second) == (b"one", b"two")
@@ -81,7 +81,10 @@ def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPort
 
 
 def test_what_comes_from_another_address_is_not_heard(host: Host, transport: UdpPorts) -> None:
-    """Datagrams from another address are ignored, since anybody on the network could send them."""
+    """A datagram comes from another address, as anyone on the network could send it.
+
+    It is ignored.
+    """
     transport.write(((0, b"hello"),))
     _, driver = host.ports[0].recvfrom(99)
     with socket.socket(type=socket.SOCK_DGRAM) as stranger:
@@ -94,7 +97,10 @@ def test_what_comes_from_another_address_is_not_heard(host: Host, transport: Udp
 def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_back(
     host: Host, transport: UdpPorts
 ) -> None:
-    """The pending error of an earlier datagram must not prevent the next one from being sent."""
+    """The host is away, so a datagram causes an error. Then the host comes back.
+
+    The error does not prevent the next datagram from being sent.
+    """
     address = host.ports[0].getsockname()
     host.ports[0].close()
     transport.write(((0, b"hello"), (1, b"halt")))
@@ -108,7 +114,10 @@ def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_b
 
 
 def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
-    """A busy channel does not block the other."""
+    """One channel is busy, and a datagram comes on the other.
+
+    It is read after at most two others.
+    """
     transport.write(((0, b"hello"), (1, b"hello")))
     drivers = [port.recvfrom(99)[1] for port in host.ports]
     for _ in range(9):
@@ -118,7 +127,7 @@ def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
 
 
 def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
-    """A read that waits can be ended; it returns without data."""
+    """A read waits for data, and another thread ends it. It returns without data."""
     threading.Timer(0.02, transport.interrupt).start()
     assert transport.read() == (0, b"")
 
@@ -136,14 +145,20 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
     ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
-    """The error shows the form of a URL. Port 65535 is refused, as the next port does not exist."""
+    """A URL is wrong. The error shows the correct form.
+
+    Port 65535 is refused, because the second channel would need the next higher port.
+    """
     with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
         UdpPorts(url, 2)
 
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
-    """IPv6 addresses are in brackets; the second channel is one port higher."""
+    """The host is lost.
+
+    The error has its IPv6 address in brackets, and the port of the second channel.
+    """
     lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
     with contextlib.closing(UdpPorts("udp://[::1]:5000", 2)) as transport, lost:
         transport.write(((1, bytes(100_000)),))
@@ -151,7 +166,10 @@ def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
 
 @pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
 def test_a_host_that_is_not_known_is_refused(name: str) -> None:
-    """For an unknown host, any error of the resolver is reported; no descriptor stays open."""
+    """The host is unknown.
+
+    Any error of the resolver is reported, and no file descriptor stays open.
+    """
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
         UdpPorts(f"udp://{name}:5000", 2)

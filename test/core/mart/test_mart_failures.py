@@ -207,7 +207,7 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 ) -> None:
     """One or both motors are stuck.
 
-    The driver switches both off until a new command comes after a stop. If only the right wheel is
+    The driver switches both off until a stop and a new command come. If only the right wheel is
     stuck, the left one turns the robot for a while. Nothing measures this turn, but the covariance
     covers it.
     """
