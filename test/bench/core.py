@@ -70,7 +70,7 @@ def trust_all(blocks: Sequence[bytes]) -> int:
 
 
 def decode(chunks: Sequence[bytes]) -> int:
-    """Decode chunks as if the line had no pauses between them; return the number of frames."""
+    """Decode chunks as if the line had no pauses between them, and return the number of frames."""
     decoder, now, frames = FrameDecoder(), 0.0, 0
     for chunk in chunks:
         now += len(chunk) / BYTES_PER_S
@@ -144,7 +144,7 @@ def cold(ticks: int) -> str:
 
 
 def memory(hours: float = 1.0) -> str:
-    """Play a long stream to a session as fast as possible; return a sentence about its memory."""
+    """Play a long stream to a session as fast as possible, and return its memory as a sentence."""
     session = _session()
     data, now, events = stream(SECONDS), 0.0, 0
     resident_mb = []

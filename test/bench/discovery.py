@@ -55,7 +55,7 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """Measure the traffic and processor time of ``number`` drivers; return a row of the table."""
+    """Measure traffic and processor time of ``number`` drivers, and return a row of the table."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),

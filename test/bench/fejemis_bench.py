@@ -44,10 +44,9 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both halves in real time; send how long each front angle took to ``results``, in s.
+    """Run both halves in real time, and send how long each front angle took, in s, to ``results``.
 
-    The simulated wheel swings from side to side, so that recent angles differ and can be told
-    apart.
+    The simulated wheel swings from side to side, so that recent angles differ from each other.
     """
     pair = SimulatedFejemis()
     drive, _ = masters

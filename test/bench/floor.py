@@ -29,7 +29,7 @@ LENGTHS = {IMU: 14, DELTA: 9, POSE: 15}
 
 
 def measurements(port: int, node: Node) -> None:
-    """Read frames; publish a prepared message for each of them."""
+    """Read frames, and publish a prepared message for each of them."""
     imus = node.create_publisher(Imu, "imu/data_raw", 10)
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)

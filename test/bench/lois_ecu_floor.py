@@ -31,7 +31,7 @@ def rpm_line(speed_mps: float) -> bytes:
 
 
 def relay(port: int, node: Node) -> None:
-    """Read lines; publish prepared messages for each group of odometry reports."""
+    """Read lines, and publish prepared messages for each group of odometry reports."""
     odometries = node.create_publisher(Odometry, "odom", 10)
     joints = node.create_publisher(JointState, "joint_states", 10)
     odometry = Odometry(child_frame_id="base_link")

@@ -21,7 +21,7 @@ AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command each speed to the robots in turn; record when it was published for the first time."""
+    """Command each speed to the robots in turn, and record when it was first published."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

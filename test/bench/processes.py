@@ -47,7 +47,7 @@ class Program:
         return self.process.stdout.readline()
 
     def result(self) -> Any:
-        """Close the process's input; return the value that it then prints as JSON."""
+        """Close the process's input, and return the value that it then prints as JSON."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return json.loads(self.line())
@@ -88,19 +88,19 @@ def floor(what: str, path: str, namespace: str) -> Program:
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start ``steps.py`` on this port; its last step is ``what``."""
+    """Start ``steps.py`` on this port, with ``what`` as its last step."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 
 def ear(*namespaces: str) -> Program:
-    """Start a process that subscribes in these namespaces; wait until it is ready."""
+    """Start a process that subscribes in these namespaces, and wait until it is ready."""
     program = Program(str(HERE / "ear.py"), *namespaces)
     program.line()
     return program
 
 
 def memory_mb(pid: int) -> tuple[float, float]:
-    """Return the resident memory of a process and its proportional share of it, in MB."""
+    """Return the resident memory of a process, and its proportional set size, in MB."""
     rows = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     kb = {row.split()[0]: float(row.split()[1]) for row in rows[1:]}
     return kb["Rss:"] * 1.024e-3, kb["Pss:"] * 1.024e-3

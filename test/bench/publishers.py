@@ -12,7 +12,7 @@ from rclpy.node import Node
 
 
 def connected(namespaces: Sequence[str]) -> list[Any]:
-    """Initialize ROS; return one publisher per namespace, 1 s after all have subscribers."""
+    """Initialize ROS, and return one publisher per namespace, 1 s after all have subscribers."""
     rclpy.init()
     node = Node("hand", start_parameter_services=False, enable_rosout=False)
     publishers = [node.create_publisher(Twist, f"{name}/cmd_vel", 1) for name in namespaces]

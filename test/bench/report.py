@@ -69,7 +69,7 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
 
 
 def main() -> int:
-    """Run the measurements; print them and write them into the document; return the exit code."""
+    """Run the measurements, print them, and write them into the document. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"

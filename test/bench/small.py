@@ -70,7 +70,7 @@ class Group:
             self._root.write_text(str(os.getpid()))
 
     def give(self, part: float) -> None:
-        """Give the group this share of one core; 1 is the whole core."""
+        """Give the group this share of one core, where 1 is the whole core."""
         run_us, period_us = round(1e6 * RUN_S), round(1e6 * RUN_S / part)
         if self._is_first:
             self._write("cpu.cfs_quota_us", -1)

@@ -53,7 +53,7 @@ def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
 
 
 def imu_ends() -> Iterator[int]:
-    """Yield for each tick the number of bytes sent when its IMU frame is complete."""
+    """Yield for each tick how many bytes the board has sent by the end of its IMU frame."""
     begun = 0
     for tick in count():
         yield begun + IMU_BYTES

@@ -20,8 +20,7 @@ Counts = dict[str, tuple[float, int]]
 
 
 def table(seconds: float) -> list[str]:
-    """Return the rows of a table of the threads of driver and guard, and the rate of page faults.
-    """
+    """Return the rows of a table of the threads of driver and guard, and the page faults."""
     with TemporaryDirectory() as folder, Stage(1) as stage, ear("ours") as listener:
         names = Path(folder) / "names"
         before = f"import sys; sys.path.insert(0, {str(HERE)!r}); import thread_names"

@@ -18,7 +18,7 @@ PICTURES = HERE.parents[1] / "docs" / "pictures"
 
 
 def main() -> int:
-    """Run all modules; return the number of those that failed."""
+    """Run all modules, and return the number of those that failed."""
     with ThreadPoolExecutor(2) as pool:
         return sum(pool.map(_fails, sorted(HERE.glob("[!_]*.py"))))
 

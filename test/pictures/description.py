@@ -70,9 +70,9 @@ class Hits:
 
 @dataclass
 class Solid:
-    """A box, or a cylinder about its own z axis that just fits into such a box.
+    """A box, or a cylinder about its own z axis that fits exactly into a box.
 
-    ``half``: half the lengths of the sides of the box.
+    ``half``: half the lengths of the sides of that box.
     """
 
     matrix: Array

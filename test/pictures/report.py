@@ -33,7 +33,7 @@ STOPPED_ON_LEG = 6
 
 
 def main(folder: Path) -> None:
-    """Write ``report_path.png`` and the report's other pictures; print its verdict."""
+    """Write ``report_path.png`` and the report's other pictures, and print its verdict."""
     rclpy.init()
     with ExitStack() as stack:
         stack.callback(rclpy.shutdown)

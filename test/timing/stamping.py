@@ -67,7 +67,7 @@ class Stamped:
 
     ``sampled_s``: the true sampling time of each tick.
 
-    ``restarted_s``: when the board restarted; infinity if it did not.
+    ``restarted_s``: when the board restarted, or infinity if it did not.
 
     ``samples``: for each sample its tick, its stamp and its arrival time.
     """
@@ -174,7 +174,7 @@ def stamp(
 
 
 def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
-    """Return two streams as one; between them comes the text of a board that has just booted."""
+    """Return two streams as one, with the text of a board that has just booted between them."""
     text = b"Paused: 0 \n"
     at = len(before.data) + len(text)
     boots_s = before.times_s[-1] + 0.5

@@ -131,7 +131,7 @@ def busy_readers(seconds: float, seeds: int) -> None:
 
 
 def main() -> None:
-    """Measure the streams; print the results and write them into the document."""
+    """Measure the streams, print the results, and write them into the document."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=30.0)
     arguments.add_argument("--seeds", type=int, default=30)

@@ -60,7 +60,7 @@ def lines(ends: Ends) -> Iterator[Several]:
 
 
 def heard(far: int, words: bytes) -> bytes:
-    """Read until the received bytes end with ``words``; return all of them."""
+    """Read until the received bytes end with ``words``, and return all of them."""
     came = b""
     while not came.endswith(words):
         came += os.read(far, 4096)
@@ -92,7 +92,7 @@ def read_on(lines: Several) -> NoReturn:
 
 
 def changed(lines: Several) -> dict[int, str]:
-    """Read until the set of missing lines changes; return these lines, each with the reason."""
+    """Read until the set of missing lines changes, and return these lines, each with the reason."""
     with pytest.raises(LinesChanged):
         read_on(lines)
     return dict(lines.missing)

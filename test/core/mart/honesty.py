@@ -47,7 +47,7 @@ def nees(bench: MartBench) -> float:
 
 
 def drive(faults: NetworkFaults, seed: int, *, goals: bool = False) -> Iterator[float]:
-    """Make a random drive; yield the normalised squared error many times, and at the end."""
+    """Make a random drive, and yield the normalised squared error many times and at the end."""
     random = Random(seed)
     unequal = random.uniform(-0.04, 0.04)
     bench = MartBench(FIRMWARES[seed % 3], faults, seed=seed, motor_inequality=unequal).ready()

@@ -55,7 +55,7 @@ class NetworkRobot(MartRobot):
 
 
 def sleeps(board: SimulatedMart) -> bool:
-    """Return whether nothing is due in the next five ticks; if so, advance the board over them."""
+    """Return whether nothing is due in the next five ticks. If so, skip these ticks."""
     if board.server.wake_at <= (board.ticks + 5) * TICK_S:
         return False
     board.ticks += 5
@@ -120,13 +120,13 @@ class MartBench(AnyBench):
                 self.settle()
 
     def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
-        """Command the twist ten times a second for ``seconds``; ignore refusals."""
+        """Command the twist ten times a second for ``seconds``, and ignore refusals."""
         for _ in range(round(seconds / 0.1)):
             self.try_command(vx, yaw_rate)
             self.run(0.1)
 
     def try_command(self, vx: float, yaw_rate: float) -> str:
-        """Command the twist once; return the reason of a refusal, or an empty text."""
+        """Command the twist once, and return the reason of a refusal, or an empty text."""
         try:
             self.session.command_twist(BodyTwist(vx, 0.0, yaw_rate), self.now)
         except CommandRefused as error:
@@ -136,7 +136,7 @@ class MartBench(AnyBench):
         return ""
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
-        """Command the goal pose; repeat the command every 0.1 s while it is refused."""
+        """Command the goal pose, and repeat the command every 0.1 s while it is refused."""
         for _ in range(50):
             try:
                 self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)
@@ -148,7 +148,7 @@ class MartBench(AnyBench):
                 self.settle()
 
     def until_it_stands(self, limit_s: float = 20.0) -> float:
-        """Wait until the robot stands still; return how long that takes, in s."""
+        """Wait until the robot stands still, and return how long that takes, in s."""
         began_s = self.now
         self.run_until(lambda: self.robot.stands, limit_s)
         return self.now - began_s
@@ -187,7 +187,7 @@ class MartBench(AnyBench):
 
 
 def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: float = 0.04) -> None:
-    """Drive from corner to corner by odometry, as a ROS program would; turn on the spot at each."""
+    """Drive from corner to corner by odometry, as a ROS program would, turning on the spot."""
     for x_m, y_m in corners:
         for _ in range(600):
             way = bench.odometry[-1].pose.way_to(Pose(x_m, y_m, 0.0))

@@ -8,9 +8,9 @@ does more than the real driver.
 At each step a datagram may arrive, be lost, be late, or come twice, and the IMU may die. The number
 of commands from the user is not limited.
 
-The model has no clock. A late copy of a command arrives at any later step, or is lost. If the real
-driver waits for the network delay before a command, the modelled driver sends that command only
-when no late copy is left.
+The model has no clock. A late copy of a command arrives at any later step, or is lost. Some
+commands the real driver sends only after the longest network delay. The modelled driver sends them
+only when no late copy is left.
 """
 
 from collections.abc import Callable, Iterator
@@ -260,8 +260,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    A check or a controlled move takes so long that a late reply to an earlier command cannot be
-    taken for its reply.
+    A late reply is never taken for the reply to a check or to a controlled move, because these take
+    longer.
     """
     driver = world.driver
     state = driver.state

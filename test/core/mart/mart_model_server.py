@@ -28,8 +28,8 @@ class Server(NamedTuple):
     ``port``: the state of the command port: "free", "busy" with a controlled move, "waits" for a
     dead IMU, or "hung".
 
-    ``released``: whether a command on the stop port has stopped the motors in a motion without
-    control. The server then still regards that motion as in progress.
+    ``released``: whether the stop port has stopped an uncontrolled motion that the server still
+    regards as in progress.
     """
 
     motion: Motion = Motion.NONE
@@ -44,7 +44,7 @@ Reply = str | None
 
 
 def execute(server: Server, word: str) -> tuple[Server, Reply]:
-    """Execute one datagram; return the new state of the server, and its reply or None."""
+    """Execute one datagram, and return the new state of the server, and its reply or None."""
     if server.crashed:
         return server, None
     if word in ("SL", "SS"):

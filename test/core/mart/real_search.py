@@ -49,13 +49,13 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""The number of datagrams per wish, in each direction, that are disturbed one after the other.
+"""At most this many datagrams of a wish are disturbed in each direction, one in each trial.
 
-The driver's regular queries are not counted. Datagrams beyond this number are only the repeated
-stops of an e-stop.
+The driver's regular queries are not counted. Later datagrams are only the repeated stops of an
+e-stop.
 """
 PROOF_S: Final = 0.25
-"""Time in s after the death of the IMU. A motion that begins later was started without a check."""
+"""A motion that begins later than this after the death of the IMU, in s, began without a check."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
@@ -83,7 +83,7 @@ class Trial(NamedTuple):
 
     For a driver that starts:
 
-    ``met``: the command that the server is executing at that time; empty if none.
+    ``met``: the command that the server is executing at that time, or empty.
 
     ``away_s``: the time in s for which the network is interrupted at first.
 
@@ -204,7 +204,7 @@ def _ready() -> MartBench:
 
 
 def ran(trial: Trial) -> Carrier:
-    """Run the trial to its end; return its network, from which the end state can be read."""
+    """Run the trial to its end, and return its network, which has the end state."""
     # The driver compares its words by identity, so the copy has the same words.
     same = {id(word): word for word in vars(words).values() if isinstance(word, words.Word)}
     bench = copy.deepcopy(_ready(), same) if trial.wishes else MartBench("firmware", seed=3)
@@ -234,7 +234,7 @@ def ran(trial: Trial) -> Carrier:
 
 
 def trouble(trial: Trial) -> str:
-    """Run the trial; return what went wrong in it, or an empty text."""
+    """Run the trial, and return what went wrong in it, or an empty text."""
     carrier = ran(trial)
     bench, server = carrier.bench, carrier.bench.server
     lost = bench.board._pilot.lost > 0

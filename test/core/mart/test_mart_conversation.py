@@ -130,7 +130,7 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """The reply to a sonar query is lost, and the driver gives it up.
+    """The reply to a sonar query is lost, so the driver gives up that query.
 
     Another sonar query waits until the lost reply can no longer arrive. ENC, which driving needs,
     is sent at once, and its answer is marked as doubtful.

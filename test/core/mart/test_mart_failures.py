@@ -121,9 +121,9 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects RM with the reason of the last B, an obstacle. The front sonar shows none.
+    """The server rejects RM because of an obstacle, which was the reason of the last B.
 
-    So the driver sends RM again, and reports no obstacle.
+    The front sonar shows no obstacle. So the driver sends RM again, and reports no obstacle.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"

@@ -23,7 +23,7 @@ from omnibot_driver.simulator.mart import Firmware
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
     """The robot turns up to 9° farther than requested, and drives up to 30 % farther.
 
-    The driver learns this, and the robot reaches each goal before the moves run out.
+    The driver learns this, and the robot reaches each goal within the permitted number of moves.
     """
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
@@ -212,7 +212,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
-    """Command a goal ahead or behind; return the first requested distance, in inches."""
+    """Command a goal ahead or behind, and return the first requested distance, in inches."""
     since = len(bench.written)
     bench.go_to(x_m, 0.0, 0.0)
 
@@ -224,9 +224,9 @@ def first_distance(bench: MartBench, x_m: float) -> int:
 
 
 def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> None:
-    """An obstacle ends a move early.
+    """An obstacle ends a move early. The driver learns nothing from this move.
 
-    The driver does not conclude that the robot drives less per inch.
+    So it does not request a longer distance for the next one.
     """
     bench = MartBench(front_m=0.7).ready()
     first_distance(bench, 2.0)

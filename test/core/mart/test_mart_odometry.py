@@ -152,7 +152,7 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies to two stops show that the motion had begun; None if unknown.
+    """Return whether the replies to two stops show that the motion had begun, or None if unknown.
 
     The driver sent the start at 8 s, and the stops at 10 s and 10.3 s.
     """
@@ -301,8 +301,8 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
     """The odometry is reset during a controlled move.
 
-    The encoder count at its end covers the whole move. So the pose includes the part before the
-    reset. The covariance covers this error.
+    The encoder count at the end covers the whole move. So the pose includes the part before the
+    reset, and the covariance covers this error.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)

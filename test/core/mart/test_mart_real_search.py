@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A sample of the bounded search that runs the real driver; ``real_search`` runs all of it."""
+"""A sample of the bounded search that runs the real driver. ``real_search`` runs all of it."""
 
 from collections.abc import Callable
 from random import Random
@@ -42,9 +42,9 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """Only SL on the stop port arrives, and ends RM. A later SRM would hang the server.
+    """A driver starts during RM without a network. Its first command that arrives is SL.
 
-    So the driver does not send SRM.
+    SL ends RM on the stop port. A later SRM would hang the server, so the driver does not send SRM.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""

@@ -68,7 +68,7 @@ TRAPS: Final[dict[str, tuple[Callable[[State, str, Motion], bool], str]]] = {
 
 @pytest.mark.parametrize("trap", TRAPS)
 def test_a_planted_trap_is_found(trap: str) -> None:
-    """A table allows one command too many.
+    """The model's table allows one command too many.
 
     The search finds the failure that this command causes.
     """
@@ -83,7 +83,7 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 ) -> None:
     """With an empty HARMFUL_LATE, the driver does not wait for late copies.
 
-    The search finds the harm.
+    The search finds a copy that does harm.
     """
     monkeypatch.setattr(model, "HARMFUL_LATE", frozenset())
     assert search().bad

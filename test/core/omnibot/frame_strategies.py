@@ -52,7 +52,7 @@ believable_frames = st.one_of(
     pose_frames.filter(believable),
     paused_frames,
 )
-"""Frames that an undamaged board may send; damage can make others too."""
+"""Frames that an undamaged board may send. Damage can make others too."""
 
 any_streams = st.lists(
     st.one_of(

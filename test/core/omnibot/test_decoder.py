@@ -133,7 +133,7 @@ def test_a_shock_goes_on_across_a_delta_and_into_silence() -> None:
 
 
 def test_a_knock_right_before_a_silence_is_delivered() -> None:
-    """A frame with a knock is split by a pause, and a silence follows it. The frame is returned."""
+    """During a knock, a pause splits an IMU frame, and a silence follows. The frame is returned."""
     made = FrameDecoder()
     made.feed(LEAD_IN + 300 * encode(REST), 0.0)
     knock = ImuFrame((-2683, 3744, -16377), (0, 1, 1949))
@@ -142,7 +142,7 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """A doubtful frame is returned with the first byte of the next frame, not with its last one."""
+    """A doubtful frame waits only for the first byte of the next frame, not for the rest of it."""
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)

@@ -2,7 +2,6 @@
 
 """Fuzz tests of the decoder, with any bytes, at any times, in any chunks.
 
-
 The decoder must
 
 * never raise an exception;

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of boards that send deltas at a rate other than 25 Hz; the driver is set to that rate."""
+"""Tests of boards that send deltas at a rate other than 25 Hz, with a driver set to that rate."""
 
 import math
 from itertools import pairwise

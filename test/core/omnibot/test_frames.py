@@ -136,7 +136,10 @@ def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
 
 
 def test_the_named_frames_and_letters_are_those_of_the_manual() -> None:
-    """Stop is the appendix's frame in wheel mode; S, P and R are 0x53, 0x50 and 0x52."""
+    """Stop and the emergency stop are the frames of the appendix.
+
+    S, P and R are 0x53, 0x50 and 0x52.
+    """
     assert encode(STOP).hex(" ") == "ff fe 02 00 00 00 00 00 00"
     assert encode(EMERGENCY_STOP).hex(" ") == "ff fe 10 00 00 00 00 00 00"
     assert (FORCE_START, TOGGLE_PAUSE, RESET) == (b"\x53", b"\x50", b"\x52")

@@ -164,8 +164,8 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
     """The line is cut within a frame and comes back within a later frame.
 
-    The two parts have the length of a frame, but only the pause between them shows that they are
-    not one. The reader is prompt and measures this pause, so no false frame is returned.
+    Together the two parts are as long as one frame. Only the pause between them shows that they are
+    two. The reader is prompt and measures this pause, so no false frame is returned.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of advice on settings that the board's data contradicts; right settings cause no advice."""
+"""Tests of advice on settings that the board's data contradicts.
+
+Right settings cause no advice.
+"""
 
 import math
 

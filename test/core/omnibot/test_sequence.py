@@ -70,7 +70,7 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
     """Two seconds after a delta, a delta with the count 0 comes.
 
-    The old count could not be 0 by then. So the board has restarted.
+    A continued count would not be 0 at this time. So the board has restarted.
     """
     assert begun(count).delta(0, 102.0).restarted
 
@@ -175,7 +175,8 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
     """The pose counter begins at zero again.
 
-    As a gap this would take longer, so no delta is lost.
+    If poses had been lost, the counter would have needed more time to wrap. So no delta is counted
+    as lost.
     """
     sequence = Sequence()
     for count in range(25):

@@ -12,7 +12,7 @@ SENT = [b"%d" % number for number in range(5000)]
 
 
 def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
-    """Send one datagram every ``every_s``; return what arrives, in order of arrival."""
+    """Send one datagram every ``every_s``, and return what arrives, in order of arrival."""
     arrived = []
     for number, datagram in enumerate(SENT):
         path.send(datagram, number * every_s)

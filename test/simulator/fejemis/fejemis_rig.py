@@ -32,7 +32,7 @@ class Rig:
         return self.board.now_s
 
     def booted(self) -> "Rig":
-        """Run for a second after power-on; discard the lines that came in this time."""
+        """Run for a second after power-on, and discard the lines that came in this time."""
         self.run(1.0)
         self.lines.clear()
         return self
@@ -42,7 +42,7 @@ class Rig:
             self.board.receive(text.encode("latin-1") + b"\n", self.now, port)
 
     def run(self, seconds: float) -> list[tuple[int, str]]:
-        """Advance by ``seconds``; return port and text of each line received in that time."""
+        """Advance by ``seconds``, and return port and text of each line received in that time."""
         before = len(self.lines)
         for _ in range(round(seconds / self.board.tick_s)):
             for port, data in self.board.advance():
@@ -57,13 +57,13 @@ class Rig:
             self.say(DRIVE, f"fwl {text.split()[1]}")
 
     def ask(self, port: int, text: str) -> list[str]:
-        """Send a line; return the replies on its port within 10 ms, without periodic heartbeats."""
+        """Send a line, and return its port's replies within 10 ms, without periodic heartbeats."""
         self.say(port, text)
         said = [answer for number, answer in self.run(0.01) if number == port]
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
-        """Send an ``rc`` line to both halves; run for ``seconds``, with the front angle relayed."""
+        """Send an ``rc`` line to both halves, and run for ``seconds``, relaying the front angle."""
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)
         self.say(DRIVE, text)

@@ -36,7 +36,7 @@ class Rig:
         return self.board.now_s
 
     def run(self, seconds: float) -> list[Report]:
-        """Advance by ``seconds``; return the reports received in that time."""
+        """Advance by ``seconds``, and return the reports received in that time."""
         found: list[Report] = []
         for _ in range(round(seconds / self.board.tick_s)):
             found += self.decoder.feed(self.board.step(), self.now)
@@ -58,12 +58,12 @@ class Rig:
                 raise AssertionError(f"{command} was not obeyed")
 
     def drive(self, left: int, right: int, seconds: float) -> list[Report]:
-        """Command these wheel speeds in RPM for ``seconds``; return the reports of that time."""
+        """Command these wheel speeds in RPM for ``seconds``, and return the reports received."""
         self.say(SetRpm(left, right))
         return self.run(seconds)
 
     def booted(self) -> "Rig":
-        """Run until the board has booted; set its low-pass filter if the board has one."""
+        """Run until the board has booted. Set its low-pass filter if the board has one."""
         self.run(2.1)
         if self.board.settings.quirks.extra_settings:
             self.say(LOW_PASS)

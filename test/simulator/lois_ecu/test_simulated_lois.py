@@ -266,10 +266,7 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 
 
 def test_planted_errors_are_in_the_truth_alone() -> None:
-    """The true wheel radius is 5 % too large.
-
-    The board does not know it, so its odometry is too short.
-    """
+    """The true wheels are 5 % larger than the board assumes. So its odometry is too short."""
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)
     rig.say(SetRpm(0, 0))

@@ -35,7 +35,7 @@ class Rig:
         return self.server.now_s
 
     def say(self, *texts: str) -> None:
-        """Send these requests to the command port; do not wait for replies."""
+        """Send these requests to the command port, without waiting for replies."""
         for text in texts:
             self.server.receive(text.encode("latin-1"), COMMAND, "us", self.now)
 
@@ -43,13 +43,13 @@ class Rig:
         self.server.receive(text.encode("latin-1"), STOP, "us", self.now)
 
     def run(self, seconds: float) -> list[str]:
-        """Advance by ``seconds``; return the replies received in that time."""
+        """Advance by ``seconds``, and return the replies received in that time."""
         found = self.server.advance(self.now + seconds)
         self.replies += [(reply.at_s, reply.data) for reply in found]
         return [reply.data.decode("latin-1") for reply in found]
 
     def wait(self, limit_s: float = 20.0) -> str | None:
-        """Return the next reply, or None after ``limit_s``; store its time in ``took_s``."""
+        """Return the next reply, or None after ``limit_s``, and store its time in ``took_s``."""
         began_s, until_s = self.now, self.now + limit_s
         while self.now < until_s:
             found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))

@@ -180,7 +180,7 @@ def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
 
 @pytest.mark.parametrize(("text", "sign"), [("MCR 90", -1), ("MCL 90", 1), ("MCL SLOW 90", 1)])
 def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
-    """MCR turns right and MCL left; the manual describes MCL differently."""
+    """MCR turns right and MCL left. The manual describes MCL differently."""
     rig = Rig()
     assert rig.ask(text) == "ok"
     assert sign * rig.yaw_deg == pytest.approx(93, abs=5)

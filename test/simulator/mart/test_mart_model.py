@@ -25,7 +25,7 @@ TEXTS = (
 
 
 def walk(rig: Rig, seed: int, steps: int) -> None:
-    """Send random requests and stops; at times switch the IMU on or off, or restart the server."""
+    """Send random requests and stops, and at times switch the IMU or restart the server."""
     dice = random.Random(seed)
     for _ in range(steps):
         rig.run(dice.choice((0.0, 0.01, 0.1, 0.5, 2.0)))

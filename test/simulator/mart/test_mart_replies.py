@@ -206,7 +206,8 @@ def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
 ) -> None:
     """Each bit of MCSTAT is one fault of the motor board.
 
-    Bits 4 and 8 are a trip, 16 and 32 a short circuit, 64 more than 30 V, and 128 less than 16 V.
+    Bits 4 and 8 are a trip, and 16 and 32 a short circuit. Bit 64 is more than 30 V, and 128 is
+    less than 16 V.
     """
     rig = Rig()
     rig.server.chassis.change(**changes)  # type: ignore[arg-type]
@@ -284,7 +285,7 @@ def test_a_record_refuses_motions_until_it_is_stopped() -> None:
 
 
 def test_parameters_that_are_set_change_the_next_f_and_r_custom() -> None:
-    """SLMP sets the speed of F until the next SM; SSP sets the speed of R CUSTOM."""
+    """SLMP sets the speed of F until the next SM. SSP sets the speed of R CUSTOM."""
     rig = Rig()
     rig.ask("SLMP 5 50")
     rig.drive("F")

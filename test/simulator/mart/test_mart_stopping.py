@@ -96,9 +96,9 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """A command on the stop port stops a motion without control.
+    """A command on the stop port stops F, B or RM. SM or SRM then hangs the command port.
 
-    SM or SRM then hangs the command port. The port hangs for ever, and the motors are off.
+    It hangs for ever, and the motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -220,7 +220,7 @@ def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinn
 
 @pytest.mark.parametrize("text", ["R", "F", "B", "TF 12", "MCR 20", "RM 20", "SB", "RST IMU"])
 def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
-    """Other motions than L are refused during RM, which continues."""
+    """During RM the server refuses all other motions except L. RM continues."""
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == CONFLICT

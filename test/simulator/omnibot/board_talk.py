@@ -15,12 +15,12 @@ IMU, DELTA, POSE = b"\xff\xfa", b"\xff\xfb", b"\xff\xfc"
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:
-    """Return a body velocity command; the values are in LSB."""
+    """Return a command of a body velocity, with values in LSB."""
     return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
 
 
 def wheels(a: int, b: int, c: int) -> bytes:
-    """Return a command of wheel speeds; the values are in LSB."""
+    """Return a command of wheel speeds, with values in LSB."""
     return bytes.fromhex("FF FE 02") + struct.pack(">3h", a, b, c)
 
 

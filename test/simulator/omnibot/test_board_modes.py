@@ -60,9 +60,9 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """With a setting, the three bytes to wake the board may also come during the boot.
+    """On some boards, the three bytes that wake the board may also come during the boot.
 
-    The board then obeys the first S after the boot.
+    Such a board then obeys the first S after the boot.
     """
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
@@ -248,7 +248,7 @@ command_bytes = st.lists(
 @given(command_bytes, st.data())
 @settings(max_examples=60)
 def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:
-    """The same bytes come within one tick, in different chunks. The board does the same."""
+    """The same bytes come within one tick, in different chunks. The chunks make no difference."""
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)), max_size=10)))
     whole, cut = SimulatedBoard(RUNNING), SimulatedBoard(RUNNING)
     whole.receive(stream)

@@ -182,9 +182,9 @@ def test_earth_frame_deltas_add_up_to_the_pose() -> None:
 def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
     frame: str, expected: tuple[int, int, int]
 ) -> None:
-    """The robot drives along the earth's y axis.
+    """The robot drives along the y axis of the earth frame, at 0.5 m/s.
 
-    A delta has 20 mm in y, or in x of the body frame.
+    A delta in the earth frame has 20 mm in y. A delta in the body frame has 20 mm in x.
     """
     board = SimulatedBoard(
         BoardSettings(

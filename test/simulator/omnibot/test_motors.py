@@ -20,7 +20,7 @@ class Wheel:
         self._encoder = self.motor.encoder
 
     def hold(self, target: float, ticks: int) -> list[float]:
-        """Run the controller for ``ticks``; return the true speed after each tick."""
+        """Run the controller for ``ticks``, and return the true speed after each tick."""
         speeds = []
         for _ in range(ticks):
             self.motor.advance(self.pwm)
@@ -53,9 +53,9 @@ def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
 
 
 def test_saturation_does_not_wind_up_the_integrator() -> None:
-    """A speed that cannot be reached is commanded for 10 s, or for 1 s, and then a slow one.
+    """A speed that the motor cannot reach is commanded for 10 s, or for 1 s.
 
-    The wheel reaches the slow speed equally soon.
+    Then a slow one follows. The wheel reaches the slow speed equally soon in both cases.
     """
     long, short = Wheel(), Wheel()
     long.hold(300.0, 1000)
@@ -70,10 +70,7 @@ def test_the_effort_saturates() -> None:
 
 
 def test_efforts_within_the_dead_zone_move_nothing() -> None:
-    """A resting wheel gets an effort within the dead zone and does not turn.
-
-    Beyond it, it turns.
-    """
+    """A resting wheel does not turn at an effort within the dead zone. It turns at a larger one."""
     motor = Motor()
     assert motor.advance(DEAD_ZONE_PWM) == 0.0
     assert motor.advance(-DEAD_ZONE_PWM) == 0.0

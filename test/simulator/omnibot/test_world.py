@@ -49,14 +49,20 @@ def drive(settings: BoardSettings, ticks: int = 300) -> World:
 
 
 def test_larger_wheels_carry_the_robot_further_than_the_encoders_say() -> None:
-    """All wheels are 2 % too large. At the same encoder counts, the robot turns 2 % farther."""
+    """All wheels are 2 % larger than the board assumes.
+
+    At the same encoder counts, the robot turns 2 % farther.
+    """
     plain, large = drive(BoardSettings()), drive(BoardSettings(wheel_radius_scale=(1.02,) * 3))
     assert large.encoders == plain.encoders
     assert large.truth.yaw_rad == pytest.approx(1.02 * plain.truth.yaw_rad)
 
 
 def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
-    """The base radius is 5 % too large. At the same encoder counts, the robot turns less."""
+    """The base radius is 5 % larger than the board assumes.
+
+    At the same encoder counts, the robot turns 5 % less.
+    """
     plain, wide = drive(BoardSettings()), drive(BoardSettings(base_radius_scale=1.05))
     assert wide.encoders == plain.encoders
     assert wide.truth.yaw_rad == pytest.approx(plain.truth.yaw_rad / 1.05)
@@ -117,10 +123,9 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """A hand grips and moves the robot.
+    """Someone grips the robot and moves it. Its motors have no effect, but its encoders count.
 
-    Its motors have no effect, and its encoders count the motion. Afterwards the motors move the
-    robot from its new place.
+    Afterwards the motors move the robot from its new place.
     """
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
