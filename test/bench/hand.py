@@ -3,8 +3,8 @@
 """Command several robots in turn, 40 times a second each, for a number of seconds.
 
 The arguments are the seconds and the namespaces. The program prints a JSON list with an array for
-each namespace. It has two numbers for each command: the steady clock's time in s, and the forward
-speed in the board's units.
+each namespace. Each array has two numbers for each command: the steady clock's time in s, and the
+forward speed in the board's units.
 """
 
 import json

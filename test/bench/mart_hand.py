@@ -3,7 +3,7 @@
 """Command several MART robots in turn, with another speed every second, which is sometimes zero.
 
 The arguments are the seconds and the namespaces. The program prints a JSON list with an array for
-each namespace. It has two numbers for each speed: the steady clock's time in s at its first
+each namespace. Each array has two numbers for each speed: the steady clock's time in s at its first
 publication, and the speed in m/s.
 """
 

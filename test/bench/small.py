@@ -2,8 +2,8 @@
 
 """Driver and floor on a small computer, which is simulated by limiting their processor time.
 
-Each gets a share of one core, as a quota of Linux's cgroups. Its period is the shortest that the
-kernel permits, so the processes run slowly but evenly. Only root can set up a cgroup.
+Each gets a share of one core, as a quota of Linux's cgroups. The quota's period is the shortest
+that the kernel permits, so the processes run slowly but evenly. Only root can set up a cgroup.
 """
 
 import math

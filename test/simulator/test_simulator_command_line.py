@@ -32,9 +32,10 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """The program gets a signal. It removes its links and ends with code 0, without a traceback.
+    """The program has an input that has ended, and gets a signal.
 
-    The end of its input has not ended it before.
+    Only the signal ends the program. It removes its links and ends with code 0, without a
+    traceback.
     """
     link = tmp_path / "toy"
     with toy("toy_lines", "--link", str(link), stdin=subprocess.DEVNULL) as process:

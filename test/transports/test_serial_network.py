@@ -34,9 +34,9 @@ def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
 def test_a_peer_that_vanished_without_a_word_is_given_up(
     monkeypatch: pytest.MonkeyPatch, said: bytes
 ) -> None:
-    """The peer of a port vanishes without closing the connection.
+    """The peer of a port vanishes without closing the connection, so writes raise no error.
 
-    Writes raise no error at first. The port notices it and raises LinkError.
+    After a while the port notices the loss, and a read raises LinkError.
     """
     options = {**PEER_OPTIONS, socket.TCP_USER_TIMEOUT: 300}
     monkeypatch.setattr("omnibot_driver.transports.serial_port.PEER_OPTIONS", options)
@@ -75,7 +75,7 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
 def test_a_board_behind_a_socket_is_served_as_well() -> None:
     """The port has the URL ``socket://HOST:PORT``, one of those that pyserial knows.
 
-    It works like a local one.
+    The port works like a local one.
     """
     server = socket.create_server(("127.0.0.1", 0))
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
@@ -114,7 +114,7 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 def test_a_board_behind_rfc2217_is_served_as_well() -> None:
     """The port is behind a server by RFC 2217, here pyserial's example server.
 
-    It works like a local one.
+    The port works like a local one.
     """
     board_side = serial.serial_for_url("loop://", timeout=0.05)
     listener = socket.create_server(("127.0.0.1", 0))

@@ -207,7 +207,7 @@ def test_a_line_that_comes_back_is_opened_while_the_others_stay_open(
 
 
 def test_a_read_that_waits_can_be_ended(lines: Several) -> None:
-    """A read waits for data, and another thread ends it. It returns without data."""
+    """A read waits for data, and another thread ends it. The read returns without data."""
     threading.Timer(0.02, lines.interrupt).start()
     assert lines.read() == (0, b"")
 

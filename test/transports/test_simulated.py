@@ -57,7 +57,7 @@ def test_a_read_ends_without_a_packet() -> None:
 
 
 def test_a_read_that_waits_can_be_interrupted() -> None:
-    """A read waits for data, and another thread interrupts it. It returns without data.
+    """A read waits for data, and another thread interrupts it. The read returns without data.
 
     Otherwise, closing would wait for a paused board.
     """

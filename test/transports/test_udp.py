@@ -67,7 +67,7 @@ def next_packet(transport: UdpPorts) -> Packet:
 
 
 def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPorts) -> None:
-    """Packets go in both directions. Each is one datagram, and packets are never joined."""
+    """Packets go in both directions. Each packet is one datagram, and packets are never joined."""
     transport.write(((0, b"one"), (0, b"two"), (1, b"halt")))
     (first, driver), (second, _) = host.ports[0].recvfrom(99), host.ports[0].recvfrom(99)
     assert (first, second) == (b"one", b"two")
@@ -83,7 +83,7 @@ def test_each_packet_is_a_datagram_of_its_channel(host: Host, transport: UdpPort
 def test_what_comes_from_another_address_is_not_heard(host: Host, transport: UdpPorts) -> None:
     """A datagram comes from another address, as anyone on the network could send it.
 
-    It is ignored.
+    The port ignores this datagram.
     """
     transport.write(((0, b"hello"),))
     _, driver = host.ports[0].recvfrom(99)
@@ -116,7 +116,7 @@ def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_b
 def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
     """One channel is busy, and a datagram comes on the other.
 
-    It is read after at most two others.
+    This datagram is read after at most two others.
     """
     transport.write(((0, b"hello"), (1, b"hello")))
     drivers = [port.recvfrom(99)[1] for port in host.ports]
@@ -127,7 +127,7 @@ def test_the_channels_take_turns(host: Host, transport: UdpPorts) -> None:
 
 
 def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
-    """A read waits for data, and another thread ends it. It returns without data."""
+    """A read waits for data, and another thread ends it. The read returns without data."""
     threading.Timer(0.02, transport.interrupt).start()
     assert transport.read() == (0, b"")
 

@@ -69,8 +69,8 @@ class Found(NamedTuple):
 
     ``steps``: the number of steps between these worlds.
 
-    ``bad``: the steps to the first world that must not occur, and then what is wrong in it. It is
-    empty if no such world was found.
+    ``bad``: the steps to the first world that must not occur, and then what is wrong in that world.
+    The tuple is empty if no such world was found.
     """
 
     worlds: int

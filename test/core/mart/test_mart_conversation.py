@@ -89,8 +89,8 @@ def test_a_reply_answers_the_pending_request() -> None:
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
     """A late reply to an earlier request arrives while another request is pending.
 
-    It has a form, or a reason of failure, that the pending command never returns. So it is
-    discarded.
+    The late reply has a form, or a reason of failure, that the pending command never returns. So
+    the driver discards it.
     """
     talk = conversation()
     talk.ask(word.request(), 1.0)
@@ -200,10 +200,10 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """After a start and a stop, two replies arrive, both ok.
+    """After a start and a stop, two replies arrive, and both are ok.
 
-    Both may be copies of the start's reply. They do not prove the stop. The reply to the second
-    stop, "no motion", is unambiguous.
+    Both may be copies of the reply to the start, so they do not prove the stop. The reply to the
+    second stop, "no motion", is unambiguous.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -262,9 +262,10 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """A second motion begins, and the first count that arrives is about that of the motion before.
+    """A second motion begins, and an encoder count of the motion before arrives.
 
-    It is a late reply, or the server has not received the start. So the pose does not change.
+    Either this count is late, or the server has not received the start. So the pose does not
+    change.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -323,9 +324,9 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """A check of the IMU usually takes a while, but the server may report a failure at once.
+    """A check of the IMU usually takes a while. If the IMU is missing, the server answers at once.
 
-    It does so if the IMU is missing or the command is unknown. The driver accepts this early reply.
+    It also does so if the command is unknown. The driver accepts such an early failure.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

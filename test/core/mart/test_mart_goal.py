@@ -140,7 +140,7 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
-    """During a docking, the user repeats the last goal. This cancels the docking.
+    """During a docking, the user commands the last goal again, which cancels the docking.
 
     The driver stops the move to the dock at once.
     """

@@ -185,7 +185,10 @@ def asked(talk: Conversation, word: Word, reply: bytes, at_s: float, took_s: flo
 
 
 def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
-    """A copy of the encoder count arrives after a sonar query. It is not taken for a distance."""
+    """A copy of the encoder count arrives after a sonar query.
+
+    The driver does not take this copy for a distance.
+    """
     talk = Conversation(0.3)
     asked(talk, words.SFC, b"ok 141", 0.5, 0.06)
     asked(talk, words.ENC, b"ok 1792", 1.0, 0.01)
@@ -236,8 +239,7 @@ def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
 def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
     """The driver leaves more than 0.35 s between two sonar queries.
 
-    Both sonars report -1 if nothing is near, so equal values do not show a copy. Only the time
-    does.
+    Both sonars report -1 if nothing is near, so only the time shows whether a reply is a copy.
     """
     polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
     for tick in range(1000):

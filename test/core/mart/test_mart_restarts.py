@@ -21,9 +21,9 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 ) -> None:
     """The IMU dies during a motion and comes back.
 
-    The server ends the motion, but its stop port stays hung. It would not answer the next RM, and
-    nothing could stop the robot. So the driver refuses motion until a heading of zero or a long
-    silence shows that the server was restarted.
+    The server ends the motion, but its stop port stays hung. The server would not answer the next
+    RM, and nothing could stop the robot. So the driver refuses motion until a heading of zero or a
+    long silence shows that the server was restarted.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -51,8 +51,8 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
 ) -> None:
     """The server is restarted during a motion, and the motors still run.
 
-    The driver stops the robot. It sends neither voltage queries nor motions until the server is up,
-    as they would crash the server.
+    The driver stops the robot. The driver sends neither voltage queries nor motions until the
+    server is up, because either would crash the server.
     """
     for offset_s in (0.0, 0.23, 0.46, 0.71):
         bench = MartBench().ready()

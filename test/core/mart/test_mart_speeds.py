@@ -244,9 +244,10 @@ def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> N
 
 
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
-    """The commanded rate of a turn falls slowly. The driver does not begin the turn again.
+    """The commanded rate of a turn falls slowly.
 
-    It does so only if the commanded rate stays the same for a while.
+    The driver does not begin the turn again each time. A turn is begun again only if its commanded
+    rate stays the same for a while.
     """
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):

@@ -109,7 +109,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
     """Bytes are inserted into streams at random. At most 1 in 30 of them leads to a false frame.
 
-    This happens if a gyro value looks like a header.
+    A false frame comes from a gyro value that looks like a header.
     """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)

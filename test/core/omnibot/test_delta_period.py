@@ -128,9 +128,10 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """Each delta may be off by 0.05 mrad because of rounding.
+    """Each delta is off by 0.05 mrad because of rounding, in the same direction.
 
-    A pose that shows their sum is accepted. A difference of twice that sum contradicts the pose.
+    A pose that differs from the deltas by the sum of these errors is accepted. Twice that
+    difference is a contradiction.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
@@ -162,10 +163,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """At 10 Hz, a pose follows every second delta.
-
-    It shows the motion of the deltas that were lost.
-    """
+    """Deltas are lost. At 10 Hz a pose follows every second delta, and shows their motion."""
     on = Line(BoardSettings(running=True, delta_period_s=TEN_HZ_S))
     on.run(3.0)
     on.loses = lambda data, _now: data[:2] == DELTA

@@ -128,10 +128,7 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 
 @pytest.mark.parametrize("text", [b"Paused: 3\n", b"Paused: 3 \r\n", b"Paused: 3\r\n"])
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
-    """A paused text ends with other white space than in the manual, as firmware may differ.
-
-    It is accepted.
-    """
+    """A paused text may end with other white space than in the manual, as firmware may differ."""
     assert decode(text) == PausedFrame(3)
 
 

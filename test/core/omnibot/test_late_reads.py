@@ -134,7 +134,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
     """A reader stops within the last frame and within the paused text after it.
 
-    Both are returned.
+    The frame and the text are returned.
     """
     ticks = [encode(REST)] * 40
     text = b"Paused: 0 \n"

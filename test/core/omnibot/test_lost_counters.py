@@ -273,7 +273,7 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
 
 
 losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
-"""Each element is two numbers of frames: how many arrive, and then how many are lost.
+"""Patterns of losses: how many frames arrive, then how many are lost, again and again.
 
 Only deltas and poses are counted.
 """

@@ -113,7 +113,7 @@ def test_r_makes_the_mode_unknown(mode: Mode) -> None:
 def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
     """24 IMU frames come before R and one after it.
 
-    They do not show IMU-only mode, as R sets the count to 0.
+    The mode is unknown, as R sets the count to 0.
     """
     made = tracker(Mode.NOMINAL)
     for _ in range(24):
@@ -127,7 +127,7 @@ def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
 def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
     """S and P may be lost.
 
-    So the mode changes only when data is received, not when they are sent.
+    So sending one of them does not change the mode. Only received data does.
     """
     made = tracker(mode)
     made.apply(Happening.SENT_START)
@@ -139,9 +139,9 @@ def test_a_letter_alone_proves_nothing(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", [Mode.UNKNOWN, Mode.PAUSED])
 def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
-    """P is a toggle, so it would start a paused board.
+    """P is a toggle and would start a paused board.
 
-    It is refused if the board is not known to run.
+    P is refused if the board is not known to run.
     """
     made = tracker(mode)
     with pytest.raises(RequestRefused, match=mode.value):

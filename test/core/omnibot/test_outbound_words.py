@@ -83,7 +83,7 @@ def test_words_that_would_act_take_the_nearest_value_that_does_not(
 def test_everything_goes_out_behind_zeros() -> None:
     """Zeros come before each frame and letter.
 
-    They complete a frame that was cut, and wake a booted board.
+    The zeros complete a frame that was cut, and wake a booted board.
     """
     board = OmniBot(OmniBotSettings())
     zeros = "00 00 00 00 00 00 00 00 "
@@ -110,7 +110,10 @@ def test_a_goal_whose_high_byte_is_a_letter_is_refused(x_mm: int) -> None:
 
 
 def test_a_goal_whose_low_byte_is_a_letter_is_moved_by_a_millimetre() -> None:
-    """A goal at 83 mm has the letter S as its low byte. It is sent as a goal at 84 mm."""
+    """A goal at 83 mm has the letter S as its low byte.
+
+    The driver sends a goal at 84 mm instead.
+    """
     encoder = CommandEncoder(OmniBotSettings())
     assert bare(encoder.drive_to(Pose(0.083, 0.0, 0.0)))[3:5] == bytes.fromhex("00 54")
 
@@ -141,9 +144,9 @@ def test_halves_are_rounded_away_from_zero() -> None:
 @example([1e308, -1e308, 5e307])
 @example([32768.0, 100.0, 0.0])
 def test_words_fit_16_bits_and_keep_the_direction(counts: list[float]) -> None:
-    """Counts that are too large are all scaled down by one factor.
+    """Counts that are too large for 16 bits are all scaled down by one factor.
 
-    Each is exact to half a count.
+    Each word is exact to half a count.
     """
     words = words_of(counts)
     assert all(-32768 <= word <= 32767 for word in words)

@@ -187,9 +187,9 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnect, the count fits neither a restart nor a gap, so it is another board.
+    """After a reconnect, the count fits neither a restart nor a gap, so the board is another one.
 
-    This is treated like a restart.
+    Another board is treated like a restart.
     """
     sequence = begun(7)
     sequence.reconnect()

@@ -62,10 +62,9 @@ class LateBoard(RunningBoard[Motor]):
 def test_what_came_while_the_thread_was_late_precedes_the_ticks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A stop arrives while the board's thread does not run.
+    """A stop arrives while the board's thread does not run. The stop acts before the overdue ticks.
 
-    It acts before the ticks that are overdue. A real board would not drive on while the computer is
-    busy.
+    A real board would not drive on while the computer is busy.
     """
     board = LateBoard()
     monkeypatch.setattr(time, "monotonic", lambda: board.now_s)

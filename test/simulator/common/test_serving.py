@@ -38,9 +38,9 @@ def place(address: str) -> tuple[str, int]:
 
 
 def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
-    """A board has two serial channels.
+    """A board has two serial channels, and each has its own terminal.
 
-    Each has its own terminal, with only its own commands and reports.
+    A terminal carries only the commands and reports of its own channel.
     """
     with ServedBoard(ToyLines()) as served, ExitStack() as stack:
         ports = [os.open(path, os.O_RDWR | os.O_NOCTTY) for path in served.addresses]
@@ -87,9 +87,9 @@ def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path
 
 
 def test_a_datagram_is_answered_to_its_sender(client: socket.socket) -> None:
-    """Two programs send requests over UDP.
+    """Two programs send requests over UDP. Each program gets the reply to its own request.
 
-    Each gets the reply to its own request, as one datagram.
+    A reply is one datagram.
     """
     with ServedBoard(ToyServer()) as served:
         client.sendto(b"odo", place(served.addresses[0]))
@@ -113,10 +113,7 @@ def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -
 
 
 def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
-    """A board sends a datagram before any request has come.
-
-    It has no receiver, so it is dropped.
-    """
+    """A board sends a datagram before any request has come. Without a receiver, it is dropped."""
 
     class Talking(ToyServer):
         def advance(self) -> list[tuple[int, bytes]]:

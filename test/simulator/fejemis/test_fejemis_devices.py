@@ -116,7 +116,7 @@ def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_load
 ) -> None:
     """The host calibrates the gyro, and then ``eer`` or ``setid 0`` loads a configuration.
 
-    It has no offset of the gyro, so the yaw drifts with the gyro's bias.
+    The loaded configuration has no offset for the gyro, so the yaw drifts with the gyro's bias.
     """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")
@@ -154,7 +154,10 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 
 
 def test_id_zero_erases_the_configuration() -> None:
-    """``setid 0`` erases the configuration. It can be saved again only after another ``setid``."""
+    """``setid 0`` erases the configuration.
+
+    ``eew`` saves one again only after another ``setid``.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
     rig.run(0.01)

@@ -59,7 +59,7 @@ def test_some_firmware_goes_on_after_start() -> None:
 def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
     """The drive half restarts.
 
-    It loses its pose, subscriptions, source and time, and the motors stop. The front half
+    The motors stop, and its pose, subscriptions, source and time are reset. The front half
     continues.
     """
     rig = Rig().booted()
@@ -163,7 +163,7 @@ def test_sums_can_begin_and_end_in_each_half() -> None:
 
 
 def test_faults_can_be_planned() -> None:
-    """Faults are planned for certain times, in any order. They occur at these times."""
+    """A user plans faults for certain times, in any order. The faults occur at these times."""
     late = Fault(at_s=2.0, half="front", what="well")
     rig = Rig(faults=(late, Fault(at_s=1.0, half="front", what="silent")))
     rig.run(0.99)
@@ -290,7 +290,7 @@ def test_a_drive_half_that_restarts_has_forgotten_that_power_was_to_go_off() -> 
 
 
 def test_options_reach_the_board_by_a_url() -> None:
-    """A URL has the same options and names of faults as the command line. They reach the board."""
+    """A URL has the same options and names of faults as the command line. All reach the board."""
     url = (
         "sim://?sums=off&reverse=clamped&swapped&ids=90,7&fault=1:front:silent&fault=2:drive:hung"
         "&lose-inbound=0.1&timed-velocity&volts=21.5&front-m=3&uptime=100&boot=0.05&no-start-line"

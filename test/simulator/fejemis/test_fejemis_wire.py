@@ -171,7 +171,10 @@ def test_help_is_a_flood_of_text_without_comment_marks() -> None:
 
 
 def test_a_line_of_more_than_200_characters_is_cut() -> None:
-    """A line has more than 200 characters. Its rest is read as a new line, here as ``stop``."""
+    """A line has more than 200 characters.
+
+    The rest of the line is read as a new one, here ``stop``.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "x" * 200 + "stop")
     rig.run(0.01)

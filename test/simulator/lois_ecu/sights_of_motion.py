@@ -2,7 +2,7 @@
 
 """Detectors of quirks in motion: how a board counts ticks, and how it measures and controls speeds.
 
-A quirk is a deviation from the manual. Each function has the name of a quirk. It returns whether a
+A quirk is a deviation from the manual. Each function has the name of a quirk, and returns whether a
 board with the given quirks shows that one.
 """
 

@@ -33,9 +33,9 @@ def test_every_quirk_has_its_sight() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """The detector of a quirk finds it on the public firmware.
+    """On the public firmware, each detector finds its quirk.
 
-    It finds nothing if only this quirk is switched off.
+    If only this quirk is switched off, the detector does not find it.
     """
     assert SEEN[name](FIRMWARE)
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))

@@ -119,7 +119,7 @@ def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
 
 @BOTH
 def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks: Quirks) -> None:
-    """In a terminal mode the board sends only lines of the sensor. It still obeys commands."""
+    """In a terminal mode the board sends only lines of the sensor, but still obeys commands."""
     rig = Rig(quirks)
     rig.run(2.1)
     rig.decoder.terminal = True
@@ -226,7 +226,7 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """The board reboots and is silent for 2 s. Its ticks are zero and its filter is not set.
+    """The board reboots and is silent for 2 s. Then its ticks are zero, and its filter is not set.
 
     The robot's true pose stays.
     """

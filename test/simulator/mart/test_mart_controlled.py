@@ -187,10 +187,7 @@ def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
 
 
 def test_mcr_normal_90_parses_as_0() -> None:
-    """The server reads MCR NORMAL 90 as an angle of 0.
-
-    It answers ok, and the robot does not turn.
-    """
+    """The server reads MCR NORMAL 90 as an angle of 0. It answers ok without turning the robot."""
     rig = Rig()
     assert rig.ask("MCR NORMAL 90") == "ok"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)

@@ -201,7 +201,7 @@ def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int
 
 
 def test_rmcs_0_0_just_reads_the_angle() -> None:
-    """RMCS 0 0 changes no speed. It returns the angle, as RMRA does."""
+    """RMCS 0 0 changes no speed, and returns the angle, as RMRA does."""
     rig = Rig()
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -213,7 +213,7 @@ def test_rmcs_0_0_just_reads_the_angle() -> None:
 
 @pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
 def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
-    """RMRA returns the angle since the start of RM. It is positive to the left."""
+    """RMRA returns the angle since the start of RM, positive to the left."""
     rig = Rig(gyro_bias_dps=0.0)
     rig.drive("L")
     rig.ask("SM")

@@ -75,7 +75,7 @@ def test_the_obstacle_check_is_dead_without_an_imu() -> None:
 
 
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
-    """RM and SRM come while the IMU is dead. Both are answered when it works again."""
+    """RM and SRM come while the IMU is dead. The server answers both when the IMU works again."""
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
     assert rig.run(29.0) == []

@@ -143,7 +143,7 @@ def test_options_choose_the_robot_and_its_faults() -> None:
 
 @pytest.mark.parametrize("word", ["volts=x", "volts=99", "motor-status=256", "stuck=front"])
 def test_options_that_make_no_sense_are_refused(word: str) -> None:
-    """A user gives a wrong option. It is refused with a message."""
+    """A user gives a wrong option. The simulator refuses it with a message."""
     with pytest.raises(options.OptionError):
         options.from_url(f"sim://?{word}", mart)
 
@@ -184,7 +184,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The controller has the facts that the console and the tests use. They show its state."""
+    """The controller has the facts that the console and the tests use, and they show its state."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

@@ -222,7 +222,7 @@ def test_every_quirk_has_its_sight() -> None:
 
 @pytest.mark.parametrize("name", SEEN)
 def test_a_quirk_is_seen_with_it_and_unseen_without(name: str) -> None:
-    """The detector of a quirk finds it if it is on. It finds nothing if only this quirk is off."""
+    """If a quirk is on, its detector finds it. If only this quirk is off, the detector does not."""
     assert SEEN[name](replace(FIRMWARE, **{name: True}))
     assert not SEEN[name](replace(FIRMWARE, **{name: False}))
 

@@ -126,7 +126,7 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
     """The robot is at rest, so the server refuses CS without reading its numbers.
 
-    It does not crash.
+    The missing number does not crash the server.
     """
     assert Rig().ask("CS 5") == "fail"
 
@@ -144,10 +144,9 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server is restarted while the robot moves.
+    """The server is restarted while the robot moves. It then knows of no motion that it could stop.
 
-    It knows of no motion and cannot stop the robot. Only a power cycle of the controller stops the
-    motors.
+    Only a power cycle of the controller stops the motors.
     """
     rig = Rig()
     rig.drive("RM 30")
@@ -168,14 +167,17 @@ def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
     ("inches", "seen"), [(100.7, 100), (254.5, 254), (255.5, -1), (300, -1), (0.5, -1)]
 )
 def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen: int) -> None:
-    """Both sonars report whole inches. Below 1 inch and above 254 inches they report -1."""
+    """Both sonars report whole inches, and -1 below 1 inch and above 254 inches."""
     rig = Rig(front_m=inches * INCH_M, rear_m=inches * INCH_M)
     assert rig.number("SFC") == seen
     assert rig.number("SRC") == seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """Something is near the front sonar. It measures three times, so its reply takes longer."""
+    """Something is near the front sonar, which then measures three times.
+
+    So its reply takes longer.
+    """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"
     assert rig.took_s == pytest.approx(0.165)
@@ -266,10 +268,7 @@ def test_an_unknown_reset_repeats_the_previous_reply() -> None:
     ],
 )
 def test_undocumented_commands_are_known(text: str, answer: str) -> None:
-    """The server understands undocumented commands.
-
-    Those in this list do not switch the motors on.
-    """
+    """The server understands undocumented commands. The ones in this list start no motor."""
     rig = Rig()
     assert rig.ask(text) == answer
     assert not rig.server.chassis.powered
@@ -300,7 +299,7 @@ def test_parameters_that_are_set_change_the_next_f_and_r_custom() -> None:
 
 
 def test_a_reply_goes_to_the_sender_of_its_request() -> None:
-    """Two hosts send requests one after the other. Each gets the reply to its own request."""
+    """Two hosts send requests one after the other. Each host gets the reply to its own request."""
     rig = Rig()
     rig.server.receive(b"SFC", COMMAND, "one", 0.0)
     rig.server.receive(b"VOLTS", COMMAND, "other", 0.01)

@@ -96,9 +96,9 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """A command on the stop port stops F, B or RM. SM or SRM then hangs the command port.
+    """A command on the stop port stops F, B or RM, and then SM or SRM comes.
 
-    It hangs for ever, and the motors are off.
+    The command port hangs for ever, and the motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -241,7 +241,7 @@ def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
 def test_a_command_port_that_is_busy_executes_later_in_order() -> None:
     """Requests come while the command port is busy.
 
-    It executes them later, in the order of arrival.
+    They are executed later, in the order of arrival.
     """
     rig = Rig()
     rig.say("TF 12", "VOLTS", "R", "HELLO")

@@ -32,7 +32,7 @@ def run(board: SimulatedBoard, seconds: float) -> bytes:
 def mode_of(board: SimulatedBoard) -> BoardMode:
     """Return the board's mode.
 
-    It is a function so that a type checker does not assume an unchanged mode.
+    With a function, a type checker does not assume that the mode is unchanged.
     """
     return board.mode
 

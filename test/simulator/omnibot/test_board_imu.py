@@ -129,7 +129,7 @@ def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
 def test_a_stuck_gyro_reads_its_counts_whatever_the_motion() -> None:
     """A gyro is stuck at given counts.
 
-    It reads them also in a turn, while the accelerometer varies.
+    In a turn it still reads them, while the accelerometer varies.
     """
     board = SimulatedBoard(BoardSettings(running=True, gyro_stuck=(-6, -5, -4)))
     board.receive(velocity(0, 0, 250))

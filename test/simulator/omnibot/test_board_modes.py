@@ -144,7 +144,7 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """A motion frame comes to a board that is not woken yet. Its first three bytes are lost.
+    """A motion frame comes to a board that is not woken yet, and loses its first three bytes.
 
     The board reads the rest of the frame as letters, here as a reset.
     """
@@ -155,9 +155,9 @@ def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() ->
 
 
 def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -> None:
-    """A board that obeys letters within frames gets a frame with two 0x50.
+    """A board that obeys letters within frames gets a frame with two 0x50, the letter P.
 
-    It pauses and starts again.
+    The board pauses and starts again.
     """
     board = SimulatedBoard(BoardSettings(running=True, receiver=ReceiverKind(letters="anywhere")))
     board.receive(wheels(0x50, 0, 0x50))
@@ -168,7 +168,7 @@ def test_a_board_that_takes_letters_anywhere_pauses_in_the_middle_of_a_frame() -
 def test_a_running_board_takes_no_letters_out_of_frames() -> None:
     """A running board gets a frame that contains 0x50, 0x52 and 0x53.
 
-    They are numbers, not letters.
+    The board reads these bytes as numbers, not as letters.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(wheels(0x50, 0x52, 0x53))
@@ -188,7 +188,7 @@ def test_an_unknown_control_mode_is_ignored() -> None:
 
 
 def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
-    """A board without an emergency stop gets one. It ignores the frame, and the robot drives on."""
+    """A board without an emergency stop gets such a frame. The board ignores it and drives on."""
     board = SimulatedBoard(BoardSettings(running=True, obeys_estop=False))
     board.receive(velocity(35, 0, 0) + ESTOP)
     assert [command.kind for command in board.commands] == ["velocity"]

@@ -158,9 +158,9 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """The switch is on "position". Zeros in mode 1 then send the robot to the origin.
+    """The switch is on "position". Zeros in mode 1 do not stop the robot: they command the origin.
 
-    They do not stop it. For this reason the stop frame has mode 2.
+    For this reason the stop frame has mode 2.
     """
     board = SimulatedBoard(
         BoardSettings(running=True, control="position", initial_pose=BoardPose(1000.0))

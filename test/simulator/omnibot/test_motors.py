@@ -33,9 +33,9 @@ class Wheel:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, -41.6])
 def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target: float) -> None:
-    """After a step the speed reaches 90 % in 0.2 s. It overshoots by at most 5 %.
+    """After a step, the wheel reaches 90 % of the commanded speed in 0.2 s.
 
-    After 2 s it is within 0.5 %.
+    The speed overshoots by at most 5 %. After 2 s it is within 0.5 %.
     """
     speeds = [speed / target for speed in Wheel().hold(target, 300)]
     assert speeds[20] > 0.9
@@ -70,7 +70,7 @@ def test_the_effort_saturates() -> None:
 
 
 def test_efforts_within_the_dead_zone_move_nothing() -> None:
-    """A resting wheel does not turn at an effort within the dead zone. It turns at a larger one."""
+    """A resting wheel does not turn at an effort within the dead zone, but at a larger one."""
     motor = Motor()
     assert motor.advance(DEAD_ZONE_PWM) == 0.0
     assert motor.advance(-DEAD_ZONE_PWM) == 0.0

@@ -48,7 +48,10 @@ def test_the_console_reboots_the_board() -> None:
 
 
 def test_the_end_of_the_input_does_not_end_it() -> None:
-    """The program runs with /dev/null as its input. It does not end."""
+    """The program runs with /dev/null as its input.
+
+    The end of the input does not end the program.
+    """
     with simulator(stdin=subprocess.DEVNULL) as process:
         port = os.open(line(process), os.O_RDONLY | os.O_NOCTTY)
         try:

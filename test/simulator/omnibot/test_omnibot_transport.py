@@ -25,7 +25,10 @@ def read(transport: SimulatedTransport) -> bytes:
 
 
 def test_a_board_boots_and_obeys() -> None:
-    """The board boots and sends its paused text. It is woken and started, and sends data frames."""
+    """The board boots and sends its paused text.
+
+    After it is woken and started, it sends data frames.
+    """
     with closing(SimulatedTransport("sim://", OMNIBOT)) as transport:
         assert read(transport) == b"Paused: 0 \n"
         transport.write([(0, bytes(8)), (0, b"S")])

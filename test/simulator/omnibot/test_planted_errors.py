@@ -68,10 +68,7 @@ def test_wheel_counts_are_those_of_the_wheels() -> None:
 
 
 def test_each_motor_has_its_own_constants() -> None:
-    """One motor has a longer time constant.
-
-    It is slower at first, and the other motors are unchanged.
-    """
+    """One motor has a longer time constant, so it is slower at first. The others are unchanged."""
     slow = MotorConstants(time_constant_ticks=30.0)
     board = driven(FORWARD, 0.15, motors=(slow, MotorConstants(), MotorConstants()))
     a, b, _ = board.rim_speeds_mps
@@ -116,9 +113,9 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
 
 
 def test_a_robot_that_is_turned_by_hand_feels_it_and_its_wheels_do_not() -> None:
-    """A robot is turned to the left by hand. Its gyro, mounted upside down, reads a negative rate.
+    """Someone turns the robot to the left by hand. Its wheels do not turn.
 
-    Its wheels do not turn.
+    The gyro, mounted upside down, reads a negative rate.
     """
     board = driven(b"", 0.1, gyro_noise_dps=0.0, gyro_bias_dps=(0.0, 0.0, 0.0))
     board.hold(yaw_rate=radians(30))

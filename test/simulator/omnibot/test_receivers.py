@@ -152,7 +152,7 @@ def test_a_counting_receiver_completes_a_short_stop_with_the_next_header() -> No
 def test_a_counting_receiver_completes_a_short_stop_with_a_letter() -> None:
     """A stop has lost a byte, and the letter P follows.
 
-    It becomes a speed of wheel C, not a pause.
+    The receiver reads P as a speed of wheel C, not as a pause.
     """
     assert understood("FF FE 02 00 00 00 00 00", "50") == [ControlFrame(0x02, (0, 0, 80))]
 
@@ -179,7 +179,7 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
     """A stop has lost a byte. The window receiver completes it with the FF of the next frame.
 
-    It also keeps this FF, so it finds the next frame.
+    The receiver also keeps this FF, so it finds the next frame.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),

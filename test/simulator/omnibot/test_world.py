@@ -104,10 +104,7 @@ def test_a_force_moves_the_robot_in_its_direction() -> None:
 
 
 def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
-    """The floor is a slope along its x axis.
-
-    It moves the robot along that axis, whatever the heading.
-    """
+    """The floor slopes along its x axis. The robot rolls along that axis, whatever its heading."""
     world = World(BoardSettings(slope_pwm=500.0))
     world.gripped = Twist(0.0, 0.0, pi / 2)
     for _ in range(100):
@@ -123,7 +120,7 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """Someone grips the robot and moves it. Its motors have no effect, but its encoders count.
+    """Someone grips the robot and moves it. The motors have no effect, but the encoders count.
 
     Afterwards the motors move the robot from its new place.
     """
