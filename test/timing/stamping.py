@@ -123,7 +123,7 @@ def stamp(
 ) -> Stamped:
     """Generate one stream and stamp its samples.
 
-    The stream begins somewhere in its first second.
+    The host begins to read somewhere in the first second of the stream.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = generate(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)

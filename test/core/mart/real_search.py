@@ -55,7 +55,7 @@ The driver's regular queries are not counted. Later datagrams are only the repea
 e-stop.
 """
 PROOF_S: Final = 0.25
-"""A motion that begins later than this after the death of the IMU, in s, began without a check."""
+"""Time in s after the death of the IMU. A motion that begins after this time had no check."""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")

@@ -24,8 +24,10 @@ pytestmark = pytest.mark.slow
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
     """The user has two wishes, one after the other. One datagram is lost, late or doubled.
 
-    The server does not hang, and the robot is at rest at the end. In other trials the IMU dies
-    instead: then no later motion begins, and the robot is at rest or a notice says why not.
+    The server does not hang, and the robot is at rest at the end.
+
+    In other trials the IMU dies instead. Then no later motion begins, and the robot is at rest or
+    the driver reports the server as lost.
     """
     trial = Random(seed).choice(list(real_search.pairs()))
     assert trouble(trial) == ""
