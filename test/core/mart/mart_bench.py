@@ -187,7 +187,7 @@ class MartBench(AnyBench):
 
 
 def steer_along(bench: MartBench, corners: list[tuple[float, float]], near_m: float = 0.04) -> None:
-    """Drive from corner to corner by odometry, as a ROS program would, turning on the spot."""
+    """Drive from corner to corner by odometry, as a ROS program would, with turns on the spot."""
     for x_m, y_m in corners:
         for _ in range(600):
             way = bench.odometry[-1].pose.way_to(Pose(x_m, y_m, 0.0))

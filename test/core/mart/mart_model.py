@@ -8,9 +8,9 @@ does more than the real driver.
 At each step a datagram may arrive, be lost, be late, or come twice, and the IMU may die. The number
 of commands from the user is not limited.
 
-The model has no clock. A late copy of a command arrives at any later step, or is lost. Some
-commands the real driver sends only after the longest network delay. The modelled driver sends them
-only when no late copy is left.
+The model has no clock. A late copy of a command arrives at any later step, or is lost. The real
+driver sends some commands only after the longest network delay. The modelled driver sends these
+commands only when no late copy is left.
 """
 
 from collections.abc import Callable, Iterator

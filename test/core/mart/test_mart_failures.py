@@ -172,7 +172,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
     """The controller stops at an obstacle without a report.
 
-    The driver names it and still allows reversing.
+    The driver reports the obstacle, and still allows driving backward.
     """
     bench = MartBench(front_m=1.4).ready()
     bench.command(0.3, 0.0, 6.0)
