@@ -63,7 +63,7 @@ def test_only_the_first_piece_of_the_file_is_needed() -> None:
 
 @given(st.lists(st.binary(max_size=PIECE) | st.just(RECORD[:100]), max_size=4))
 def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
-    """Other files, and the beginning of a record, are no error."""
+    """Other files, or an incomplete beginning of a record, do not raise an error."""
     assert recorded_deg(pieces, MCR.request(90)) is None
 
 
