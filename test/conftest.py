@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Shared fixtures; ROS traffic stays on this machine and within this test run.
+"""Fixtures that all tests share, and the settings of ROS and Hypothesis.
 
-Hypothesis tries the same examples in every run, so a test that newly fails shows the effect of a
-change. ``pytest --hypothesis-profile exploring`` tries other examples. No example has a deadline.
+ROS traffic stays on this machine and within this test run. Hypothesis tries the same examples in
+every run, so a test that newly fails shows the effect of a change. ``pytest --hypothesis-profile
+exploring`` tries other examples. No example has a time limit.
 """
 
 import os
@@ -28,7 +29,7 @@ os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 99)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 
 ENDS_WITHIN_S = 60.0
-"""Time limit for the end of a closed link's thread, in s; the driver's own limit is shorter."""
+"""How long a thread of a closed link may still run, in s. The driver's own limit is shorter."""
 
 settings.register_profile("exploring", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("same", settings.get_profile("exploring"), derandomize=True)
@@ -36,11 +37,11 @@ settings.load_profile("same")
 
 
 WAITING = ("faults", "system", "tools")
-"""Folders of tests that wait for real time."""
+"""Folders with tests that wait in real time, and therefore are slow."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Sort the tests so that parallel workers begin with the files that wait.
+    """Let parallel workers begin with the slow test files.
 
     Otherwise one worker is still busy with a long file when the others have ended.
     """

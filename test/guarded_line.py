@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A line with a guard process, and what a test does in place of the driver."""
+"""Helpers for tests of the guard: a line, and functions that act in place of the driver."""
 
 import contextlib
 import os
@@ -25,7 +25,10 @@ LATCHED_WORDS = b"and these under the e-stop"
 
 
 class Line:
-    """A pseudo-terminal: ``near`` is the driver's port, and the test reads the far end."""
+    """A pseudo-terminal in place of a serial line.
+
+    ``near`` is the port that the driver uses. The test reads the other end, as a board would.
+    """
 
     def __init__(self) -> None:
         self._far, self.near = os.openpty()
@@ -47,7 +50,6 @@ class Line:
         return self.heard
 
     def fill(self) -> None:
-        """Fill the terminal's buffer."""
         fill(self.near)
 
     def hang_up(self) -> None:
@@ -72,7 +74,7 @@ def children() -> list[int]:
 
 
 def started(pid: int) -> None:
-    """Wait until Python runs in the process and the process ignores SIGTERM."""
+    """Wait until the guard process ignores SIGTERM, which shows that its program runs."""
     end = time.monotonic() + PATIENCE_S
     bit = 1 << (signal.SIGTERM - 1)
     while not int(status_of(pid, "SigIgn"), 16) & bit:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Whether the tested core is interpreted, and marks for tests that need one kind of core."""
+"""Marks for tests that need the interpreted core, and for tests that need the compiled core."""
 
 import pytest
 

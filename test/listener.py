@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The surroundings of a link in tests, in place of a node."""
+"""Helpers for tests of a link: a listener in place of the node, and a session."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -83,7 +83,10 @@ def link_to(url: str, listener: Listener, session: Session, **taps: Callable[[An
 
 
 def end_patiently(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Give every link more time at its end: on a busy computer the proof of rest comes later."""
+    """Lengthen the time limits for closing a link.
+
+    On a busy computer the proof of a stop comes later.
+    """
     for limit in ("STANDS_WITHIN_S", "SILENCE_S", "JOIN_TIMEOUT_S"):
         monkeypatch.setattr(f"omnibot_driver.link.{limit}", PATIENCE_S)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board is only its own folders: without them the other boards still work."""
+"""Each board can be removed: without its own files, the other boards still work."""
 
 import shutil
 import subprocess
@@ -18,7 +18,7 @@ REMAINS: Final = (
     "test/system/test_driver_toys.py::test_a_toy_drives_and_is_heard[line_board]",
     "test/transports/test_simulated.py",
 )
-"""Tests to run: one of the remaining boards, one of the complete driver, and one of ``sim://``."""
+"""Tests to run: of one remaining board, of the complete driver, and of ``sim://``."""
 IMPORT_AND_TEST: Final = """
 import importlib, pkgutil, sys
 import pytest
@@ -35,7 +35,10 @@ sys.exit(pytest.main(sys.argv[1:]))
 def test_without_the_folders_of_one_board_the_tests_of_the_rest_are_green(
     board: str, tmp_path: Path
 ) -> None:
-    """In a copy without one board's folders, all other modules can be imported, and tests pass."""
+    """The package is copied without the files of one board.
+
+    All other modules can still be imported, and the tests in ``REMAINS`` pass.
+    """
     ignored = shutil.ignore_patterns(board, f"{board}.py", f"{board}_*.py", "__pycache__")
     for folder in ("omnibot_driver", "test"):
         shutil.copytree(HOME / folder, tmp_path / folder, ignore=ignored)

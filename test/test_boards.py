@@ -26,7 +26,7 @@ from omnibot_driver.simulator.common import options
 
 PACKAGE = Path(boards.__file__).parent.parent
 KNOW_BOARDS = ("boards", *boards.PROFILES)
-"""Folders that may import boards."""
+"""Folders whose modules may import the code of a particular board."""
 
 
 def imported(path: Path) -> set[str]:
@@ -59,7 +59,10 @@ def test_common_code_imports_no_board(path: Path) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
-    """The kinematics of each board has as many joints as the board has wheels to command."""
+    """Every profile makes its board from the default parameters.
+
+    The kinematics has as many joints as the board has wheels.
+    """
     values = boards.check_all({"board": name})
     profile = boards.load(name)
     board = profile.make(values)
@@ -79,7 +82,8 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
 def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: object) -> None:
-    """An unknown value of ``board`` may have any type; the error lists the boards."""
+    """The parameter ``board`` has an unknown value, of any type. The error lists the known boards.
+    """
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})
 
@@ -95,7 +99,7 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
-    """A board has the parameter ``baudrate`` exactly if the board's traits let messages name it."""
+    """The parameter ``baudrate`` exists exactly for boards whose ``traits.baudrate`` is true."""
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))
     assert ("baudrate" in profile.PARAMETERS.by_name) is board.traits.baudrate
@@ -124,9 +128,10 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """A board's table has the common parameters that the board can use, with its own defaults.
+    """A board with few abilities has only the common parameters that it can use.
 
-    The table also has the parameters that only this board has.
+    Its profile may change their defaults. The table also has the parameters that only this board
+    has.
     """
     own = table(
         "few",
@@ -161,7 +166,10 @@ def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
 
 
 def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
-    """Common code reads a parameter that a board may lack with a default, never by indexing."""
+    """Some boards lack some of the parameters.
+
+    Common code reads these parameters with a default value, never by indexing.
+    """
     indexed = {
         node.slice.value
         for path in PACKAGE.rglob("*.py")
@@ -187,9 +195,9 @@ def test_the_core_takes_a_board_that_lacks_most_parameters() -> None:
 def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A parameter of another board is refused with that board's name.
+    """A parameter of another board is refused, and the error names that board.
 
-    An unknown name is refused with the most similar name of this board.
+    An unknown parameter is refused, and the error names the most similar parameter of this board.
     """
     other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
     monkeypatch.setitem(boards.PROFILES, "few", "few_profile")

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: a save is complete or changes nothing, and keeps other names in it."""
+"""Tests of the calibration file.
+
+A save is complete or changes nothing, and it keeps the other entries of the file.
+"""
 
 import stat
 from pathlib import Path
@@ -24,7 +27,7 @@ def test_what_is_saved_is_loaded_exactly(tmp_path: Path, bias: list[float]) -> N
 
 
 def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
-    """A missing or empty file contains no calibration; a save also makes the file's folder."""
+    """A missing or empty file contains no calibration. A save also makes the file's folder."""
     path = tmp_path / "new" / "robot.yaml"
     assert calibration.load(path, PARAMETERS) == {}
     calibration.save(path, {"gyro_bias": BIAS})
@@ -33,7 +36,7 @@ def test_without_a_file_there_is_no_calibration(tmp_path: Path) -> None:
 
 
 def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
-    """A save keeps other names in the file, and their order."""
+    """A save changes one entry of the file. The other entries stay, and so does their order."""
     path = tmp_path / "robot.yaml"
     path.write_text("robot: no. 7\ngyro_bias: [0, 0, 0]\naccel_bias: [1, 2, 3]\n")
     assert calibration.load(path, PARAMETERS) == {
@@ -57,7 +60,7 @@ def test_other_names_in_the_file_stay(tmp_path: Path) -> None:
 def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
     tmp_path: Path, text: str
 ) -> None:
-    """For an invalid file, the error names the file, and the file is not overwritten."""
+    """The file is invalid. The error names the file and says what to do."""
     path = tmp_path / "robot.yaml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(ParameterError, match="correct it, or remove it") as caught:
@@ -66,7 +69,7 @@ def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
 
 
 def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
-    """A folder at the file's path is an error that says it cannot be read."""
+    """The file's path is that of a folder. The error says that it cannot be read."""
     with pytest.raises(ParameterError, match="cannot be read"):
         calibration.load(tmp_path, PARAMETERS)
 
@@ -74,7 +77,7 @@ def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
 def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A save that fails, here because of a full disk, changes no file and leaves no other file."""
+    """The disk is full during a save. The old file stays, and no other file is left behind."""
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
 
@@ -96,7 +99,8 @@ def test_others_may_read_the_file(tmp_path: Path) -> None:
 
 
 def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
-    """A save through a symbolic link writes the link's target, in the target's folder."""
+    """The file is a symbolic link. A save changes the file to which it points, and the link stays.
+    """
     path, link = tmp_path / "far" / "robot.yaml", tmp_path / "robot.yaml"
     link.symlink_to(path)
     calibration.save(link, {"gyro_bias": BIAS})
@@ -106,7 +110,10 @@ def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
 
 
 def test_a_home_that_nobody_has_is_refused() -> None:
-    """A known user's home folder replaces ``~``; an unknown user's home folder is refused."""
+    """The driver replaces ``~`` with the user's home folder.
+
+    The home folder of an unknown user is refused.
+    """
     assert calibration.locate("~/robot.yaml") == Path.home() / "robot.yaml"
     with pytest.raises(ParameterError, match="its home folder does not exist; give the full path"):
         calibration.locate("~nosuchuser/robot.yaml")

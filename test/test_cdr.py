@@ -53,7 +53,10 @@ def message_name(message: object) -> str:
 
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
-    """Draw settings: any noise, and frame names of any length, which give every alignment."""
+    """Draw message settings with any noise and with frame names of any length.
+
+    The length of a name decides how the numbers after it are aligned.
+    """
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
@@ -61,9 +64,9 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 
 
 def padded(data: bytes, like: bytes) -> bytes:
-    """Return ``data`` with the padding of ``like``; rclpy may leave any bytes there.
+    """Return ``data`` with the padding bytes of ``like``, because rclpy may put any bytes there.
 
-    Padding is the bytes after a string's NUL up to the next multiple of eight.
+    Padding is the bytes between a string's NUL and the next multiple of eight.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):
@@ -80,7 +83,10 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
     wheels: Wheels,
     stamp_ns: int,
 ) -> None:
-    """Serialized bytes equal rclpy's except for padding, as do all fields after deserializing."""
+    """The driver's bytes equal those of rclpy, except for padding.
+
+    Deserializing both gives the same message.
+    """
     serializer, messages = Serializer(chosen), Messages(chosen)
     for ours, message in (
         (serializer.imu(imu, stamp_ns), messages.imu(imu, stamp_ns)),
@@ -95,7 +101,8 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
 
 
 def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
-    """For 1 m forward, both wheels of a differential drive (radius 0.1 m) turn by 10 rad."""
+    """A robot with two wheels of radius 0.1 m drives 1 m forward. Both its joints turn by 10 rad.
+    """
     two = replace(
         MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS)),
         wheels=DifferentialKinematics(wheel_radius_m=0.1, track_m=0.4),
@@ -113,7 +120,7 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """The fast serializer can be used for frame names of any length, thus for each alignment."""
+    """The driver can use its own serializer for frame names of any length, so for any alignment."""
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
@@ -129,7 +136,9 @@ def test_no_frame_length_is_refused_at_start(length: int) -> None:
 def test_a_difference_is_found_at_start(
     monkeypatch: pytest.MonkeyPatch, name: str, wrong: object, strange: str
 ) -> None:
-    """At its start the driver compares the constant parts of messages with those of rclpy.
+    """A constant part of the driver's messages is wrong.
+
+    The comparison with rclpy finds it at the start.
 
     Another test compares messages with varying values.
     """
@@ -159,7 +168,10 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """NaN or infinity is refused on all six axes, also on those that this robot does not have."""
+    """One of the six axes has NaN or infinity. The command is refused.
+
+    This also applies to axes along which the robot cannot move.
+    """
     values = [0.1] * 6
     values[place] = nonsense
     with pytest.raises(CommandRefused, match="NaN or infinity"):
@@ -168,7 +180,10 @@ def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense
 
 @pytest.mark.parametrize("length", range(52))
 def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
-    """Bytes that are too few for a velocity are refused; a middleware may deliver such messages."""
+    """A message has too few bytes for a velocity and is refused.
+
+    A middleware may deliver such messages.
+    """
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="not a valid Twist"):
         cdr.twist(data[:length])
@@ -185,8 +200,8 @@ def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> No
     ids=lambda wheels: f"{len(wheels.joints)} joints",
 )
 def test_any_number_of_wheels_is_serialised_as_rclpy_does(wheels: Any) -> None:
-    """A JointState with any number of wheels is serialized as by rclpy.
+    """The driver serializes a JointState with any number of wheels as rclpy does.
 
-    Without wheels, joint_states is not published.
+    For a robot without wheels, the driver does not publish joint_states.
     """
     assert difference(MessageSettings.from_parameters(boards.check_all({}), wheels)) == ""

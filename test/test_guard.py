@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The guard as a separate process, on a real pseudo-terminal."""
+"""Tests of the guard as a separate process, on a real pseudo-terminal."""
 
 import ast
 import os
@@ -36,7 +36,7 @@ def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
-    """If the driver has stopped the robot itself at its end, the guard writes nothing."""
+    """The driver has stopped the robot itself and ends. The guard writes nothing."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     alive(keeper, 0.2)
     keeper.end(stopped=True)
@@ -46,9 +46,9 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 
 
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
-    """After a broken pipe the guard repeats the stop bytes for a second and ends.
+    """The pipe from the driver to the guard breaks. The guard repeats the stop bytes, then ends.
 
-    The board may not receive the first stops.
+    It repeats them because the board may not receive the first ones.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
@@ -56,7 +56,10 @@ def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """When heartbeats are missing, the guard sends stops until they return; then it waits again."""
+    """The driver's heartbeats stop, so the guard writes stop bytes.
+
+    When heartbeats arrive again, the guard stops writing and waits.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     longest_s = alive(keeper, 2 * guard.LIMIT_S)
     os.write(line.near, b"so far: ")
@@ -70,9 +73,9 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """Changed stop bytes are used by this guard and the next one.
+    """The driver changes the stop bytes. Its guard writes the new ones, and so does the next guard.
 
-    The bytes that stop a board may depend on its current state.
+    The driver changes them because the bytes that stop a board may depend on the board's state.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -93,9 +96,9 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
-    """If old commands fill the port's buffer, the guard discards them to make room for a stop.
+    """Old commands fill the port's buffer. The guard discards them to make room for the stop bytes.
 
-    The test reads the port only after the guard has gone.
+    The test reads the port only after the guard has ended, so reading does not make the room.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
@@ -104,7 +107,7 @@ def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
 
 
 def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
-    """A guard whose port has failed ends by itself, so that the driver need not wait for it."""
+    """The guard's port has failed. The guard ends by itself, so the driver need not kill it."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     process = keeper._process
     assert process is not None
@@ -115,9 +118,9 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """A guard ignores signals that are meant for the driver.
+    """A guard ignores the signals that end the driver.
 
-    It has its own session, so ctrl-C in the driver's terminal does not reach it.
+    The guard has its own session, so ctrl-C in the driver's terminal does not reach it.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
@@ -176,7 +179,12 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """The guard writes to each line its own stop bytes, even if another line is gone."""
+    """A board has two lines, and one of them is gone.
+
+    The guard writes the stop bytes to the other one.
+
+    Each line gets only its own stop bytes.
+    """
     other = Line()
     try:
         words = ((0, b"drive stands"), (1, b"front stands"))
@@ -191,9 +199,9 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """The guard sends each stop as a datagram.
+    """The board's UDP port is closed at first, so sending the stop bytes fails.
 
-    It continues after the error for an absent host, so a host that starts late is stopped, too.
+    The guard tries again, and the board is stopped when its port opens.
     """
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
@@ -223,9 +231,11 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """The guard separates heartbeats and stop bytes correctly, however reads cut the data.
+    """The guard gets heartbeats and stop bytes through one pipe.
 
-    Stop bytes may contain the letter that means a heartbeat with a latched e-stop.
+    It separates them, however reads cut them.
+
+    Stop bytes may contain the letter ``e``, which alone means a heartbeat with a latched e-stop.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

@@ -15,7 +15,10 @@ from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """The driver replaces a guard that reads nothing: it would later write outdated stop bytes."""
+    """A suspended guard does not read the new stop bytes. The driver replaces it.
+
+    Otherwise the guard would later write outdated stop bytes.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGSTOP)
@@ -29,7 +32,10 @@ def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Lin
 
 
 def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
-    """Unread stop bytes do not mean that a guard hangs, since it may still be starting."""
+    """The driver changes the stop bytes often while a guard is starting and reads nothing.
+
+    The driver does not conclude that the guard hangs.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     children = line.children()
     for number in range(30):
@@ -40,7 +46,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
 
 
 def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
-    """The driver replaces a guard process that ends early; it reports only the first such end."""
+    """Two guards end early, and the driver replaces each. It reports only the first end."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     os.kill(first, signal.SIGKILL)
@@ -70,7 +76,10 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """The driver replaces a guard that hangs before the guard's pipe is full of heartbeats."""
+    """A guard hangs and does not read its heartbeats.
+
+    The driver replaces it before the pipe is full.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
     started(first)
@@ -87,9 +96,9 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The driver at once replaces a guard that cannot be killed, and reaps it later.
+    """A guard hangs and cannot be killed, like a process in uninterruptible sleep.
 
-    A process in uninterruptible sleep cannot be killed.
+    The driver starts another guard at once, and reaps the first one later.
     """
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -113,7 +122,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The driver starts no more guards when a certain number of them cannot be killed."""
+    """Guards hang and cannot be killed. After ``MOST_DYING`` of them, the driver starts no more."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
@@ -133,7 +142,8 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """The driver does not wait for a suspended guard, which does not receive the end message."""
+    """The guard is suspended and cannot read that the driver ends. The driver does not wait for it.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     os.kill(pid, signal.SIGSTOP)
@@ -144,9 +154,9 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
 def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The driver does not wait for a guard that cannot be killed.
+    """The guard cannot be killed when the driver ends. The driver does not wait for it.
 
-    A stopped process that signals do not reach imitates an uninterruptible sleep.
+    A suspended process that the driver cannot kill imitates an uninterruptible sleep.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The kernel's counters of ports and threads."""
+"""Tests of the kernel's counters for ports and threads."""
 
 import fcntl
 import os
@@ -37,7 +37,7 @@ def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.Mo
 
 
 def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
-    """The waiting time of a thread is in s; for an unknown thread it is None."""
+    """The waiting time of a thread is a number of seconds. For an unknown thread it is None."""
     waited = waited_s(threading.get_native_id())
     assert waited is None or waited >= 0.0
     assert waited_s(0) is None

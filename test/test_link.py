@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The threads of a link around a session, on a real pseudo-terminal and without ROS."""
+"""Tests of a link and its threads, on a real pseudo-terminal and without ROS."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -29,7 +29,8 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> None:
-    """The reader thread itself delivers measurements, since a queue or timer adds latency."""
+    """The reader thread itself delivers measurements, because a queue or a timer would add latency.
+    """
     listener = Listener()
     link = link_to(board.path, listener, session())
     link.start()
@@ -40,7 +41,10 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """The pacer repeats a command and stops the robot, even while the commanding callback hangs."""
+    """A caller gives one command. The pacer repeats it, and stops the robot after the timeout.
+
+    The caller's thread is not needed for this, so it may hang.
+    """
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -79,7 +83,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 
 
 def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: Path) -> None:
-    """The figures have the reason for a closed port, the number of openings, and byte counts."""
+    """The link counts its openings and bytes, and says why its port is closed."""
     listener, name = Listener(), tmp_path / "board"
     link = link_to(str(name), listener, session())
     link.start()
@@ -173,7 +177,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """A port that no guard can share is reported once.
+    """No guard can share the port. The driver reports this once.
 
     Without a guard, only the driver itself can stop the robot.
     """

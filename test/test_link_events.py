@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Events from a link to its listener: their order, and a listener that hangs or fails."""
+"""Tests of the events from a link to its listener: their order, and what a bad listener causes."""
 
 import threading
 import time
@@ -67,9 +67,9 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """Neither a caller nor the watchdog waits for a hanging listener.
+    """A listener hangs. Neither a caller's e-stop nor the repetition of a command waits for it.
 
-    Events arrive later, in order.
+    The listener gets its events later, in order.
     """
     listener, ours = Listener(), session()
     deliver, hang, goes_on = listener.deliver, threading.Event(), threading.Event()
@@ -99,7 +99,7 @@ def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard
 
 
 def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) -> None:
-    """The notice of a refused command leaves after the event that caused the refusal.
+    """An e-stop is latched, so a command is refused. The listener gets both events in this order.
 
     The log therefore shows the reason first.
     """
@@ -122,7 +122,7 @@ def test_a_refusal_leaves_between_what_was_before_and_after_it(board: PtyBoard) 
 
 
 def test_a_listener_that_raises_ends_the_link_with_a_report(board: PtyBoard) -> None:
-    """A link whose listener raises an error reports its end, and stops the robot before closing."""
+    """The listener raises an error. The link reports the error, stops the robot and ends."""
     listener = Listener()
 
     def explode(events: Sequence[Event]) -> None:

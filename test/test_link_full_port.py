@@ -31,10 +31,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """After a failed write, the link repeats its opening sequence before anything else.
+    """A write fails because the port is full. The link then repeats its opening sequence first.
 
-    The board may have received half a command. Another Stop precedes the sequence: the link writes
-    it before it opens the port again, since the board may resume sooner.
+    The board may have received half a command. The link also writes a Stop before it opens the port
+    again, because the board may read again before that.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -57,9 +57,9 @@ def at_rest(terminal: Terminal) -> tuple[Link, Session]:
 
 
 def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> None:
-    """Closing a link with a full port does not hang.
+    """The port is full while the link closes. Closing does not hang.
 
-    The guard stops the robot once there is room.
+    The guard stops the robot when there is room in the port.
     """
     link, _ours = at_rest(terminal)
     terminal.fill()
@@ -69,9 +69,9 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
-    """While its port is full, a link reports itself as blocked, until the port is opened again.
+    """The port is full when the e-stop is pressed. The link says that it is blocked.
 
-    The e-stop is written first when there is room.
+    When there is room again, the link writes the e-stop first.
     """
     link, _ours = at_rest(terminal)
     reader, may_open = link._reader, threading.Event()
@@ -92,7 +92,7 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
-    """If a defect ends the driver while its port is full, the guard has to send the final Stop."""
+    """A defect ends the driver while its port is full. The guard sends the final Stop."""
     link, ours = at_rest(terminal)
     terminal.fill()
     closed, session_closed = ours.closed, threading.Event()

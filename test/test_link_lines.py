@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link to a board with two lines, one of which appears late, disappears and comes back."""
+"""Tests of a link to a board with two lines. One line appears late, disappears and comes back."""
 
 import os
 from collections.abc import Iterator
@@ -84,7 +84,10 @@ class Lines:
         self.name.symlink_to(self.sense.path)
 
     def say_that_it_stands(self) -> None:
-        """Send a report of standstill when the line is open; earlier data would be lost."""
+        """Report a standstill, in place of the board, once the line is open.
+
+        Data that is sent earlier would be lost.
+        """
         self.listener.wait_for(lambda: self.listener.reports[-1:] == [None])
         os.write(self.sense.far, b"d 0 0\n")
         self.come_to_state("nominal")
@@ -115,9 +118,9 @@ def lines(tmp_path: Path) -> Iterator[Lines]:
 def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missing(
     lines: Lines,
 ) -> None:
-    """While one line is missing, the other still gets stops.
+    """One of two lines is missing. The link repeats Stop on the other line.
 
-    Both lines are one connection: motion is refused with the name of the missing line.
+    Both lines are one connection, so motion is refused, and the error names the missing line.
     """
     lines.link.start()
     lines.drive.read_until(5 * STOPS)
@@ -136,7 +139,7 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
 
 
 def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
-    """After the second line is opened, the robot can be driven; the first line stays open."""
+    """The second line appears later than the first. Then the robot can be driven."""
     lines.link.start()
     lines.drive.read_until(STOPS)
     lines.connect()
@@ -148,9 +151,9 @@ def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
 def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
     lines: Lines,
 ) -> None:
-    """A lost line stops the robot.
+    """One line disappears while the robot drives, and the link stops the robot.
 
-    When the line returns, the command from before the loss is discarded.
+    When the line is back, the link does not repeat the command from before.
     """
     lines.connect()
     lines.link.start()
@@ -209,8 +212,9 @@ def ends_at_rest() -> bool:
 
 
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
-    """The end of a link waits for the proof of a standstill from odometry, which comes every 0.4 s.
+    """A link closes while the robot drives. It waits until odometry proves a standstill.
 
-    On a busy computer the proof may come too late, so the test tries again.
+    Odometry arrives only every 0.4 s. On a busy computer it may be too late, so the test tries
+    again.
     """
     assert any(ends_at_rest() for _ in range(5))

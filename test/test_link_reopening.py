@@ -34,7 +34,9 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
 def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Before each attempt to open the port, the link waits 1.5 times as long, up to a limit.
+    """The port is missing.
+
+    Before each new attempt, the link waits 1.5 times as long, up to a limit.
 
     Because of the limit, a board that is plugged in late is found soon.
     """
@@ -60,9 +62,9 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 
 
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
-    """A lost port is found under a new name by udev's link.
+    """A board is unplugged during a drive and comes back under another device name.
 
-    The command from before is discarded.
+    The link finds it through udev's symbolic link. It does not repeat the command from before.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
@@ -86,7 +88,7 @@ def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_pat
 
 
 def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
-    """When a board is unplugged, its port hangs up; the link reports this and is disconnected."""
+    """A board is unplugged. The link reports this, and its state is disconnected."""
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard()) as board:
         link = link_to(board.path, listener, ours)
@@ -98,7 +100,7 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
 
 
 def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too() -> None:
-    """A port that is opened while the link closes gets a last Stop.
+    """A port opens while the link closes. The link still writes a last Stop to it.
 
     The robot may still follow a command from before the port was lost.
     """
@@ -121,7 +123,9 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
-    """A driver that ends while its port is lost tries to open the port once more, to send Stop.
+    """The port is lost during a drive, and the driver ends.
+
+    It tries to open the port once more for a Stop.
 
     The driver knows that the stop was sent and is unconfirmed.
     """
@@ -144,7 +148,10 @@ def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_pat
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_known_not_to_be_stopped() -> None:
-    """A driver that ends without its cable knows that the robot is not stopped."""
+    """The cable is unplugged during a drive, and the driver ends.
+
+    The driver knows that the robot is not stopped.
+    """
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
         link = link_to(board.path, listener, ours)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A driver that did not run for a while: the robot is stopped, and old commands are refused."""
+"""Tests of a driver that did not run for a while: it stops the robot and refuses old commands."""
 
 import threading
 import time
@@ -34,9 +34,9 @@ def obeyed(command: Callable[[], None]) -> bool:
 def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A command that waited while the pacer was blocked is refused; later commands are obeyed.
+    """A thread holds the session's lock, so the pacer cannot run, and a command waits.
 
-    A thread that holds the lock blocks the pacer.
+    The waiting command is refused. Later commands are obeyed.
     """
     monkeypatch.setattr("omnibot_driver.stall_detector.SETTLE_S", 0.0)
     listener, ours = Listener(), session()
@@ -74,9 +74,9 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 
 
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a suspension of the host, the driver stops the robot.
+    """The computer is suspended during a drive. When it resumes, the driver stops the robot.
 
-    By the steady clock, which does not count the suspension, no heartbeat is missing.
+    The steady clock does not count the suspension, so by that clock no heartbeat is missing.
     """
     suspended_s = 0.0
     monkeypatch.setattr(

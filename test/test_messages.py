@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The conversion of values to ROS messages puts each number where the REPs require it.
+"""Tests of the conversion of values to ROS messages.
 
-The rules are in REP-103, REP-105 and REP-145.
+REP-103, REP-105 and REP-145 say where each number has to be.
 """
 
 import math
@@ -63,7 +63,8 @@ def goal(
 def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     yaw_rad: float, length: float
 ) -> None:
-    """A goal's yaw is independent of its quaternion's length, as some senders do not normalize."""
+    """The length of a goal's quaternion does not change its yaw. Some senders do not normalize it.
+    """
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
     pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
     assert (pose.x_m, pose.y_m) == (1.0, -2.0)
@@ -98,7 +99,7 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """A delay between the readings of two clocks does not change their offset; a step does."""
+    """The offset of two clocks does not change when one of them is read late. It follows a step."""
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
@@ -107,7 +108,10 @@ def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
 
 
 def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
-    """Pose is in odom, twist in base_link, covariances are row-major over x, y, z and angles."""
+    """The pose is in odom, and the twist is in base_link.
+
+    Each covariance is a matrix over x, y, z and three angles, row by row.
+    """
     estimate = OdometryEstimate(
         0.0,
         Pose(1.0, 2.0, math.pi / 2),
@@ -139,7 +143,8 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
     """An unknown twist is zero with a large variance.
 
-    The first displacement after a pause includes all motion during the pause, at an unknown speed.
+    For example, the twist is unknown after a pause, because the first displacement contains the
+    motion of the whole pause.
     """
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS
@@ -149,7 +154,10 @@ def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> Non
 
 
 def test_an_imu_message_has_no_orientation() -> None:
-    """By REP-145 the orientation covariance begins with -1. Force and rate are as measured."""
+    """The orientation's covariance begins with -1, which means "unknown" by REP-145.
+
+    Force and rate are as measured.
+    """
     estimate = ImuEstimate(0.0, (1.0, 2.0, -9.8), (0.1, 0.2, 0.3))
     message = messages.imu_message(estimate, STAMP, SETTINGS)
     assert message.header.frame_id == "imu_link"
@@ -166,7 +174,7 @@ poses = st.builds(Pose, *[st.floats(-1e4, 1e4)] * 3)
 
 @given(poses)
 def test_the_transform_is_the_odometrys_pose_between_the_same_frames(pose: Pose) -> None:
-    """A transform has the pose, the frames and the time of odometry; tf has no covariance."""
+    """A transform has the pose, the frames and the time of odometry."""
     estimate = OdometryEstimate(0.0, pose, None, Covariance())
     odometry = messages.odometry_message(estimate, STAMP, PREFIXED)
     transform = messages.transform_message(estimate, STAMP, PREFIXED)
@@ -188,9 +196,11 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
 
 
 def test_joint_states_are_the_manuals_wheels() -> None:
-    """After 1 m forward at 0.1 m/s, wheel A has turned backwards, B forwards, and C not at all.
+    """The robot drives 1 m forward at 0.1 m/s.
 
-    Values are in rad and rad/s, of wheels with a radius of 29 mm.
+    Wheel A turns backwards, B forwards, and C not at all.
+
+    Angles are in rad and rates in rad/s. The wheels have a radius of 29 mm.
     """
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
@@ -215,9 +225,9 @@ def test_joints_whose_rate_is_not_known_have_none() -> None:
 
 
 def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
-    """The driver divides each new distance by the current wheel radius.
+    """The user changes the wheel radius. This alone turns no joint.
 
-    A new radius alone turns no joint.
+    The driver divides each further distance by the new radius.
     """
     small, large = OmniKinematics(0.029, 0.143), OmniKinematics(0.058, 0.2)
     ahead = [OdometryEstimate(0.0, Pose(), None, Covariance(), Pose(x, 0.0, 0.0)) for x in (1, 2)]

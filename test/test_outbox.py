@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outbox: threads deliver events in order, one at a time, without waiting for each other."""
+"""Tests of the outbox. Threads put events into it and deliver them in order, one at a time."""
 
 import random
 import threading
@@ -47,7 +47,8 @@ class Held:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed: int) -> None:
-    """Events leave once and in order, even if threads pause before or during a delivery."""
+    """Six threads bring events and pause at random. Each event leaves once, and all leave in order.
+    """
     outbox, lock = Outbox(), threading.Lock()
     happened: list[int] = []
     left: list[int] = []
@@ -100,7 +101,10 @@ def test_nobody_claims_what_is_not_next() -> None:
 
 
 def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
-    """A thread that cannot deliver returns at once; its events leave after the current delivery."""
+    """One thread delivers. Another thread brings events and returns at once.
+
+    The other thread's events leave after the current delivery.
+    """
     outbox = Outbox()
     left: list[str] = []
     held = Held(outbox)
@@ -114,7 +118,7 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 
 
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
-    """The delivering thread raises the error of a delivery; the next thread delivers the rest."""
+    """A delivery raises an error in its thread. The other events leave with the next delivery."""
     outbox = Outbox()
     left: list[int] = []
 
@@ -131,7 +135,7 @@ def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
 
 
 def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
-    """Events that are put into the outbox by a delivery leave after that delivery."""
+    """A delivery puts an event into the outbox. That event leaves after the delivery."""
     outbox = Outbox()
     left: list[int] = []
     outbox.put(lambda: outbox.put(partial(left.append, 2)) or left.append(1))
@@ -140,7 +144,7 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """A thread waits while the outbox is full; otherwise the queue would grow without limit."""
+    """The outbox is full, so a thread waits. Otherwise the queue would grow without limit."""
     outbox = Outbox()
     left: list[int] = []
     held = Held(outbox)

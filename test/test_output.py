@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Output to the terminal: the driver never waits for it, and loses only what cannot be printed."""
+"""Tests of output to the terminal.
+
+The driver never waits for the terminal, and loses only text that cannot be printed.
+"""
 
 import fcntl
 import os
@@ -19,7 +22,6 @@ PATIENCE_S = 60.0
 
 
 def taken(pipe: int) -> None:
-    """Wait until the pipe is empty; no event reports that."""
     end = time.monotonic() + PATIENCE_S
     while fcntl.ioctl(pipe, termios.FIONREAD, bytes(4)) != struct.pack("i", 0):
         assert time.monotonic() < end
@@ -27,7 +29,8 @@ def taken(pipe: int) -> None:
 
 
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
-    """A line that a full disk refuses is lost; the next one is written when there is room again."""
+    """A full disk refuses a line, which is lost. The next line is written when there is room again.
+    """
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)
     copier = threading.Thread(target=_copy, args=(source, disk))
@@ -45,7 +48,10 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
 
 
 def test_output_that_is_not_read_does_not_block_the_program() -> None:
-    """Unread output does not block the program, even if there is more than all buffers can hold."""
+    """The program prints more than all buffers can hold, and its output is not read.
+
+    It does not block.
+    """
     program = """
 import contextlib, os
 from omnibot_driver.output import UnblockedOutput
@@ -65,7 +71,7 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """Output at the program's end does not block: Python prints its traceback after the context.
+    """The output is not read, and Python prints a traceback after the context. This does not block.
 
     The pipe is exactly full (16 lines), or more output waits for it (100 lines).
     """
@@ -103,7 +109,9 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """A port never gets the descriptor of a closed standard output.
+    """A standard output is closed, so its descriptor is free.
+
+    A port that is opened does not get it.
 
     Otherwise, printed text would go to the board.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Valid values of a single parameter, and the message for an invalid one."""
+"""Tests of single parameters: their valid values, and the message for an invalid value."""
 
 import math
 from dataclasses import replace
@@ -30,7 +30,7 @@ def name_of(parameter: object) -> str | None:
 
 @pytest.mark.parametrize("parameter", FLOATS, ids=name_of)
 def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
-    """YAML's 1 is accepted as 1.0."""
+    """A float parameter accepts an integer: YAML's 1 becomes 1.0."""
     assert parameter.high is not None
     value = parameter.check(int(parameter.high))
     assert type(value) is float
@@ -39,7 +39,10 @@ def test_an_integer_will_do_for_a_float(parameter: Parameter) -> None:
 
 @pytest.mark.parametrize("parameter", RANGED, ids=name_of)
 def test_both_ends_of_a_range_are_allowed_and_nothing_beyond(parameter: Parameter) -> None:
-    """The message for a value outside the range names parameter, range, unit, and the value."""
+    """Both ends of a range are valid, and values beyond them are refused.
+
+    The message names the parameter, the range, its unit and the value.
+    """
     assert parameter.low is not None
     assert parameter.high is not None
     kind = type(parameter.default)
@@ -135,7 +138,10 @@ json_like = st.recursive(
 def test_any_value_is_either_taken_in_the_right_type_or_refused(
     parameter: Parameter, value: object
 ) -> None:
-    """A check raises no exception but ParameterError, and an accepted value is accepted again."""
+    """A check accepts a value or raises ParameterError.
+
+    It also accepts each value that it has returned.
+    """
     try:
         taken = parameter.check(value)
     except ParameterError:
@@ -172,7 +178,10 @@ def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
 
 @pytest.mark.parametrize("wrong", ["/", "/robot1/"])
 def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
-    """A frame prefix with a leading slash is unknown to tf2; an empty prefix is valid."""
+    """A frame prefix with a leading slash is refused, because tf2 does not allow it.
+
+    An empty prefix is valid.
+    """
     with pytest.raises(ParameterError, match=r"'frame_prefix'.*such as robot1/"):
         PARAMETERS.by_name["frame_prefix"].check(wrong)
     assert PARAMETERS.by_name["frame_prefix"].check("robot1/") == "robot1/"
@@ -236,11 +245,9 @@ def test_a_wrong_list_is_refused_with_what_it_may_be(
 
 
 def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
-    """A parameter that the board stores is None until the user gives it.
+    """The board itself stores some parameters. Such a parameter is None until the user gives it.
 
-    Its default only gives the type.
-
-    None is refused for other parameters.
+    Its default only says its type. Other parameters refuse None.
     """
     gain = Parameter("gain", 1.0, "1", "A gain.", low=0.0, high=9.0, unset=True)
     assert gain.initial is None

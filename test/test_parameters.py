@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The table of parameters, compared with the promised interface, the core and the file."""
+"""Tests of the parameter table: it agrees with the promised names, the core and the parameter file.
+"""
 
 from pathlib import Path
 
@@ -103,7 +104,7 @@ def test_every_default_passes_its_own_check_and_is_explained(parameter: Paramete
 
 
 def test_names_are_unique() -> None:
-    """Parameter names are unique, since two rows of one name would hide each other."""
+    """Each parameter name is in the table once. Of two rows with one name, one would be hidden."""
     assert len(PARAMETERS.by_name) == len(PARAMETERS.rows)
 
 
@@ -173,7 +174,10 @@ def test_odom_and_base_must_be_different_frames() -> None:
 def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """If x · y is not the sign of yaw, axis_signs is valid for velocities, but not for goals."""
+    """Position control refuses axis signs whose yaw is not the product of x and y.
+
+    Velocity control accepts them.
+    """
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
         check_all({"axis_signs": signs, "control_method": "position"})
@@ -277,8 +281,8 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 ) -> None:
     """A speed limit above the fastest possible speed is refused.
 
-    Odometry would reject every displacement above the fastest possible speed, and stop without a
-    message.
+    With such a limit the robot could drive so fast that odometry rejects every displacement.
+    Odometry would stop without a message.
     """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest
@@ -293,9 +297,9 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 
 
 def test_a_range_that_begins_beyond_its_end_is_refused() -> None:
-    """A sensor's range with a minimum above its maximum is refused.
+    """A distance sensor has a minimum above its maximum. This is refused.
 
-    Consumers would discard every measurement of such a sensor.
+    Otherwise, consumers would discard every measurement of the sensor.
     """
     table = boards.table_for({"board": "fejemis"})
     with pytest.raises(ParameterError, match=r"'tof_minimum' \(3 m\) must be below 'tof_maximum'"):

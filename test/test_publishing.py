@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Publishers of a real node, and stamps from the node's clock."""
+"""Tests of the publishers of a real node, and of stamps from the node's clock."""
 
 import json
 import subprocess
@@ -48,7 +48,7 @@ def node() -> Iterator[Node]:
 
 
 def session_with(node: Node) -> tuple[Session, Publishing]:
-    """Return a session, to which only the test gives data, and the publishing of its results."""
+    """Return a session without a board, and the publishers of its events."""
     session = Session(
         omnibot.make(VALUES),
         parameters.session_settings(VALUES, omnibot.kinematics(VALUES)),
@@ -110,7 +110,11 @@ def test_stamps_follow_simulated_time_while_there_is_any(
 def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stamps increase even between two steps of the simulated clock, and follow its jump back."""
+    """Measurements are published only after the simulated clock has begun.
+
+    Their stamps increase, even between two steps of that clock. If the clock jumps back, the stamps
+    follow.
+    """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
     stamps_ns: dict[str, list[int]] = {"_imu": [], "_odometry": []}
@@ -151,7 +155,8 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Joint angles of a robot at rest do not change when the wheel parameters change."""
+    """The user changes the wheel parameters while the robot stands. The joint angles do not change.
+    """
     _, publishing = session_with(node)
     published: list[bytes] = []
     monkeypatch.setattr(publishing._joints, "publish", published.append)
@@ -167,9 +172,9 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The last published state must be the one after the read.
+    """During one read the board pauses and resumes. Another thread publishes the state "paused".
 
-    Another thread may publish an intermediate state during the read.
+    The last published state must still be the one after the read.
     """
     session, publishing = session_with(node)
     published: list[str] = []
@@ -207,9 +212,9 @@ class Charge:
 
 
 def test_what_only_one_board_measures_is_published_by_its_type(node: Node) -> None:
-    """A value that only one board measures goes to the publisher for the value's type.
+    """Values that only one board measures go to the publisher for their type, in order.
 
-    Stamps are in ROS time, and the order of values is kept.
+    Their stamps are in ROS time.
     """
     _, publishing = session_with(node)
     published: list[tuple[float, int]] = []

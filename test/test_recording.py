@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``replay://``: the bytes of a recorded line from a bag, and every way in which this can fail."""
+"""Tests of ``replay://``, which reads the recorded bytes of a line from a bag, and of its errors.
+"""
 
 import sys
 from pathlib import Path
@@ -54,9 +55,9 @@ def test_every_byte_comes_back_with_its_time(tmp_path: Path, plugin: StoragePlug
 
 
 def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
-    """Options of the URL set speed, delay and topic.
+    """Options of the URL set the speed, the delay and the topic.
 
-    The topic selects one of two robots in a bag.
+    The bag has two robots, and the topic selects one of them.
     """
     path = bag(tmp_path / "bag", "/robot1/omnibot_driver/raw_rx", "/robot2/omnibot_driver/raw_rx")
     recording = open_recording(
@@ -68,7 +69,9 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """A replay gives the bytes of each recorded line as those of the right channel of the board.
+    """A bag has two robots with two lines each.
+
+    A replay gives the bytes of each line to its channel.
 
     The topic of one line selects the robot.
     """
@@ -82,9 +85,9 @@ def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: P
 
 
 def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_path: Path) -> None:
-    """Without options, speed is 1, and the bag's single topic is played after 5 s.
+    """Without options, the bag's only topic is played at speed 1, after 5 s.
 
-    In this time other nodes find the driver.
+    During the 5 s, other nodes find the driver.
     """
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     assert (recording.speed, recording.delay_s, recording.topics) == (1.0, 5.0, (RX,))
@@ -110,24 +113,21 @@ def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why:
 
 
 def test_a_bag_without_the_wire_says_how_to_record_it(tmp_path: Path) -> None:
-    """A bag without raw bytes is refused.
-
-    The usual cause is a recording without ``publish_raw``.
-    """
+    """A bag without raw bytes is refused. It was probably recorded without ``publish_raw``."""
     path = bag(tmp_path / "bag", "/odom", kind="std_msgs/msg/String")
     with pytest.raises(ParameterError, match="record with `publish_raw: true`"):
         open_recording(f"replay://{path}")
 
 
 def test_a_bag_of_two_robots_is_not_guessed_at(tmp_path: Path) -> None:
-    """For a bag of two robots, the message names all topics that could be meant."""
+    """A bag has two robots, and no topic is chosen. The message names the topics of both."""
     path = bag(tmp_path / "bag", "/b/raw_rx", "/a/raw_rx")
     with pytest.raises(ParameterError, match="topic=/a/raw_rx or topic=/b/raw_rx"):
         open_recording(f"replay://{path}")
 
 
 def test_what_is_not_a_bag_is_refused(tmp_path: Path) -> None:
-    """A path is refused if nothing is there, or if it is an empty folder or an unreadable file."""
+    """A path is refused if it does not exist, or if it is not a readable bag."""
     (tmp_path / "notes.txt").write_text("hello")
     (tmp_path / "torn.mcap").write_bytes(b"\x89MCAP0\r\n")
     for name, why in (
@@ -143,7 +143,10 @@ def test_what_is_not_a_bag_is_refused(tmp_path: Path) -> None:
 def test_without_the_library_it_says_what_to_install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The message for a missing rosbags says what to install; only a replay needs this library."""
+    """The library rosbags is missing. The message says how to install it.
+
+    Only a replay needs this library.
+    """
     path = bag(tmp_path / "bag", RX)
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(ParameterError) as refusal:
@@ -155,7 +158,7 @@ def test_without_the_library_it_says_what_to_install(
 
 
 def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> None:
-    """The replay of a bag that is damaged after its opening ends with a message."""
+    """A bag is damaged after it was opened. Reading it raises an error with a message."""
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     (tmp_path / "bag" / "metadata.yaml").unlink()
     with pytest.raises(LinkError, match="cannot be read any further"):

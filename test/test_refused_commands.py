@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""After a stop by the motion monitor: commands that the session refuses for other reasons."""
+"""Tests of refused commands after the motion monitor has stopped the robot.
+
+After such a stop, the robot moves again only when the sender has paused.
+"""
 
 import math
 from collections.abc import Callable
@@ -60,7 +63,10 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After a stop by the motion monitor, only silence for the timeout allows motion again."""
+    """The motion monitor has stopped the robot, and the sender sends invalid or late commands.
+
+    These do not count as a pause. Only silence for the timeout allows motion again.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     sender = Sender(bench, monkeypatch)
@@ -73,7 +79,12 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Commands that are refused because of a stall do not count as a pause of their sender."""
+    """The motion monitor has stopped the robot.
+
+    The sender's commands are refused because of a stall.
+
+    These do not count as a pause of the sender.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     sender = Sender(bench, monkeypatch)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Replays of a recorded line give the same result every time, at any speed.
+"""Tests of replays: a recorded line gives the same result every time, at any speed.
 
-It is also the result that the session had during the recording.
+The session had the same result during the recording.
 """
 
 import itertools
@@ -37,7 +37,7 @@ Chunks = list[tuple[int, bytes]]
 
 @dataclass(frozen=True)
 class Tape:
-    """A recording that is not from a bag."""
+    """A recording that a test makes, in place of one from a bag."""
 
     content: Iterable[tuple[int, bytes]]
     speed: float = math.inf
@@ -77,7 +77,6 @@ def start(tape: Tape) -> tuple[Replay, Heard]:
 
 
 def play(tape: Tape) -> Heard:
-    """Play a recording from beginning to end."""
     replay, heard = start(tape)
     heard.wait_for(lambda: heard.failures or ENDED in heard.events)
     replay.close("stop")
@@ -86,7 +85,7 @@ def play(tape: Tape) -> Heard:
 
 
 def simulated(ticks: int, *, silent: range = range(0), line: FaultyLine | None = None) -> Chunks:
-    """Return the bytes of a moving board, with times; the ``silent`` ticks are left out."""
+    """Return the bytes of a moving board, with times. The ``silent`` ticks are left out."""
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     board.receive(bytes.fromhex("FF FE 01 00 0E 00 07 00 32"))
     found = []
@@ -149,7 +148,10 @@ def test_the_pace_makes_no_difference() -> None:
 
 
 def test_time_passes_as_it_did() -> None:
-    """A silence in the recording is noticed at any speed, and so is the end."""
+    """The recording has a silence of 2 s.
+
+    The replay notices it at any speed, and also notices the end.
+    """
     heard = play(Tape(simulated(600, silent=range(200, 400))))
     assert heard.states == [
         *("connecting", "nominal"),
@@ -160,7 +162,10 @@ def test_time_passes_as_it_did() -> None:
 
 
 def test_a_recorded_robot_is_not_blamed_for_moving() -> None:
-    """The replay has no commands, so it must not warn of motion without a command."""
+    """A recorded robot moves, but a replay has no commands.
+
+    The driver must not warn of this motion.
+    """
     heard = play(Tape(simulated(600)))
     assert [event for event in heard.events if isinstance(event, Notice)] == [ENDED]
 
@@ -176,7 +181,7 @@ def test_stamps_are_times_of_the_recording() -> None:
 
 
 def test_a_recording_can_be_left_before_its_end() -> None:
-    """Closing a replay waits neither for the recording's beginning nor for its end."""
+    """A replay is closed before its recording begins, or in the middle. Closing does not wait."""
     for tape in (Tape(BAD_LINE, speed=1e-3), Tape(BAD_LINE, delay_s=3600.0)):
         replay, heard = start(tape)
         if tape.delay_s == 0.0:
@@ -188,9 +193,9 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 
 
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
-    """At the end of the recording, a request that still waits is answered.
+    """A request waits when the recording ends.
 
-    Later requests find the port closed.
+    It is answered, and later requests find the port closed.
     """
     endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
     stop = threading.Event()

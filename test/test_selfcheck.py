@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Checks of a port's surroundings, with an artificial sysfs in a temporary folder."""
+"""Tests of the checks at the driver's start: the adapter's timer, the clock, and other nodes.
+
+A temporary folder imitates sysfs.
+"""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,7 +14,8 @@ from omnibot_driver import selfcheck
 
 
 def adapter(root: Path, device: str, latency: str) -> Path:
-    """Create an imitation of sysfs with one adapter in this folder; return its root."""
+    """Make an imitation of sysfs with one adapter in the folder ``root``, and return that folder.
+    """
     folder = root / "class/tty" / device / "device"
     folder.mkdir(parents=True)
     (folder / "latency_timer").write_text(latency)
@@ -19,7 +23,10 @@ def adapter(root: Path, device: str, latency: str) -> Path:
 
 
 def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) -> None:
-    """For the default timer of FTDI, the message has a permanent remedy and a temporary one."""
+    """The adapter has FTDI's default latency timer.
+
+    The message has a permanent and a temporary remedy.
+    """
     text = selfcheck.latency_advice("/dev/ttyUSB0", adapter(tmp_path, "ttyUSB0", "16\n"))
     assert "16 ms" in text
     assert "udev/99-omnibot.rules" in text
@@ -81,9 +88,9 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """Only ports whose measurements wait for /clock get a notice.
+    """Measurements wait for /clock, which is not published. The driver says so.
 
-    A recording has its own stamps.
+    A recording has its own stamps, so its replay does not wait.
     """
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
@@ -113,7 +120,10 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """The warning names only publishers of the wrong message type; the test tries both types."""
+    """The warning names only publishers of the wrong message type.
+
+    Each of the two types can be wrong.
+    """
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert selfcheck.type_conflict([teleop], stamped=False) == ""
     assert selfcheck.type_conflict([nav], stamped=True) == ""

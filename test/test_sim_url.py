@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``sim://``: a simulated board in the driver's own process, without ROS."""
+"""Tests of ``sim://``: a simulated board in the driver's own process, without ROS."""
 
 import pytest
 from listener import Listener, link_to, session
@@ -34,7 +34,7 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
 
 
 def test_a_board_that_ends_with_the_driver_needs_no_guard() -> None:
-    """The driver does not warn that a simulated robot has no guard, as the robot ends with it."""
+    """A simulated robot ends with the driver, so the driver does not warn that it has no guard."""
     listener, ours = Listener(), session()
     link = link_to("sim://?running", listener, ours)
     link.start()
@@ -53,7 +53,10 @@ def test_options_come_after_a_question_mark() -> None:
 
 
 def test_a_board_whose_thread_died_is_a_defect(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the board's thread fails, the driver reports a defect with its cause, not a lost cable."""
+    """The simulated board's thread fails.
+
+    The driver reports a defect and its cause, not a lost cable.
+    """
 
     def explode(_board: SimulatedBoard) -> bytes:
         raise ZeroDivisionError

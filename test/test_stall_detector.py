@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of stalls of the watchdog's thread, and of commands that waited in a stall."""
+"""Tests of the stall detector: it finds stalls of the watchdog's thread, and commands from a stall.
+"""
 
 import pytest
 
@@ -36,7 +37,10 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 
 
 def test_a_standstill_is_told_once_with_its_length() -> None:
-    """The first thread that runs after a stall reports it; the next stall is reported again."""
+    """The first thread that runs after a stall reports it, and no other thread does.
+
+    The next stall is reported again.
+    """
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert standstill.begun(103.0) == pytest.approx(3.0)
@@ -56,14 +60,16 @@ def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
 
 
 def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
-    """Let the detector's thread run until ``begin``, stall, and run again from ``end``."""
+    """Let the detector's thread run at ``begin``, then stall until ``end``."""
     standstill.passed(begin, wall_ns(begin))
     standstill.begun(end)
     standstill.passed(end, wall_ns(end))
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """A command that waited through two stalls is not fresh.
+    """The driver stalls three times in a few seconds.
+
+    Commands from before the last stall are not fresh.
 
     On a very busy computer the driver may stall again before a retransmission delivers a command.
     """
@@ -95,7 +101,7 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command that seems to be sent right after a stall may have been sent during the stall.
+    """A command seems to be sent right after a stall. It may be from the stall, so it is not fresh.
 
     The driver knows the offset of the sender's clock only to within a message's transit time.
     """
@@ -105,7 +111,10 @@ def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_fro
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """A command sent during a stall is never fresh, even if it arrives ten seconds late."""
+    """A command sent during a stall is not fresh.
+
+    Some seconds after the stall, this no longer matters.
+    """
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
     assert not standstill.outlived_by(wall_ns(104.9), 108.0)
@@ -118,7 +127,10 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
 def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_old(
     step_s: float,
 ) -> None:
-    """A step of the clock by NTP changes no verdict: send times are by the clock after the step."""
+    """NTP steps the clock after a stall. Commands from the stall stay old, and new ones stay fresh.
+
+    The send times are by the clock after the step.
+    """
     standstill = resumed(3.0)
     standstill.passed(103.5, wall_ns(103.5))
     standstill.passed(103.6, wall_ns(103.6 + step_s))
@@ -134,7 +146,8 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """Soon after a stall, commands of a sender with a wrong clock are not fresh; later ones are."""
+    """The sender's clock is wrong. Its commands are not fresh right after a stall, and fresh later.
+    """
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
     standstill.passed(106.0, wall_ns(106.0))

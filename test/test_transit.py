@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Delays of commands from sender to driver, whose clocks are wrong, drift and step."""
+"""Tests of the estimated delay of commands, with clocks that are wrong, drift or step."""
 
 from dataclasses import dataclass, field
 
@@ -36,7 +36,10 @@ class Sender:
 
 @dataclass
 class Receiver:
-    """The driver: its clock is ahead of the true time by ``ahead_s``; its steady clock is right."""
+    """The driver.
+
+    Its clock is ahead of the true time by ``ahead_s``, and its steady clock is right.
+    """
 
     ahead_s: float = 0.0
     transit: Transit = field(default_factory=Transit)
@@ -75,7 +78,10 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The estimated delay, of network and queue together, never exceeds the true delay."""
+    """The estimated delay never exceeds the true delay, so no command in time is refused.
+
+    The estimate includes the delays in the network and in the driver's queue.
+    """
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
         now_s += pause_s
@@ -89,9 +95,9 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 def test_a_command_that_was_under_way_for_longer_is_refused(
     sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
 ) -> None:
-    """A late command is refused after any silence of any sender.
+    """A sender is silent for a while, and its next command arrives late. The command is refused.
 
-    The next command that comes in time is accepted.
+    The next command that arrives in time is accepted.
     """
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):
@@ -108,7 +114,10 @@ def test_a_command_that_was_under_way_for_longer_is_refused(
 def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_first(
     waited_s: float,
 ) -> None:
-    """The driver's clock suffices to refuse a command that waited in the driver's own queue."""
+    """A sender's first command waits in the driver's own queue. It is refused.
+
+    The driver needs only its own clock for this.
+    """
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
     assert delay.total_s == pytest.approx(waited_s)
@@ -132,7 +141,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """If a sender's clock steps back, its commands seem late, but are soon accepted again."""
+    """The sender's clock steps back, so its commands seem late. They are soon accepted again."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1
@@ -150,9 +159,9 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 
 @given(st.floats(1.0, 1e6))
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
-    """If a sender's clock steps forward, its commands are still accepted.
+    """The sender's clock steps forward. Its commands are still accepted.
 
-    Its late commands are refused, since their age is judged by the new clock.
+    Its late commands are still refused, because the driver judges their age by the new clock.
     """
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(100):
@@ -164,9 +173,9 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 
 
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
-    """Late commands, each after a silence, do not count as a clock that was set back.
+    """Single commands arrive late, each after a silence, as key presses on a bad network do.
 
-    Single key presses on a bad network are like this.
+    They are refused. The driver must not conclude that the sender's clock was set back.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
@@ -175,7 +184,10 @@ def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() 
 
 
 def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> None:
-    """Reliable transport sends all commands from an outage again; only the old ones are refused."""
+    """After an outage, reliable transport delivers all commands at once.
+
+    Only the old ones are refused.
+    """
     receiver, sender = Receiver(), Sender()
     for number in range(50):
         receiver.hear(sender, 100.0 + 0.1 * number, 0.01)
@@ -235,9 +247,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """If a sender's first message is 0.5 s late, its clock seems to be 0.5 s behind.
+    """A sender's first message is 0.5 s late, so its clock seems to be 0.5 s behind.
 
-    The second of two estimates of the send time, by the sender's own clock, is right.
+    The driver therefore has two estimates of the next send time. The second one, by the sender's
+    own clock, is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -247,9 +260,9 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the driver has one estimate of the next send time.
+    """After ten messages of a sender, the driver has only one estimate of the next send time.
 
-    It is by the driver's own clock, so an offset of the sender's clock has no effect on it.
+    The estimate is by the driver's own clock. An offset of the sender's clock has no effect on it.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

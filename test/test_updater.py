@@ -27,7 +27,10 @@ class Wrapper:
 
 
 class Updater:
-    """Runs its tasks when forced to; ``reports`` are the results."""
+    """An imitation of the library's updater.
+
+    It runs its tasks when forced to, and keeps the ``reports``.
+    """
 
     def __init__(self, node: object, period_s: float) -> None:
         self.period = 2 * period_s  # a parameter may change the period
@@ -56,7 +59,7 @@ def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch)
 def test_with_the_updater_each_status_is_a_task_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each task is added once and fills every report, at the period that the library gives."""
+    """Each status becomes one task, which fills every report. The library gives the period."""
     made: list[Any] = []
 
     def make(node: object, period_s: float) -> Updater:

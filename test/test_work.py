@@ -35,7 +35,7 @@ TICK_S = 0.01
 SETTLED = 400
 TICKS = 400
 IMU, DELTA, POSE = 14, 14 + 9, 14 + 9 + 15
-"""Kinds of ticks, by their length in bytes."""
+"""Lengths in bytes of the three kinds of ticks: IMU alone, IMU and delta, all three frames."""
 
 
 def calls(work: Callable[[], object]) -> int:
@@ -96,7 +96,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """The session needs at most this number of calls per tick, from the bytes to its events.
 
-    The calls by which the link asks for output and for the next wake-up are included.
+    The link's calls for output and for the next wake-up are included.
     """
     session = opened_session()
 
@@ -111,7 +111,8 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """The session needs at most this number of calls from a read to an IMU reading to publish."""
+    """The session makes an IMU reading from the bytes of a read with at most this number of calls.
+    """
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:
