@@ -1,8 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""If compiling fails (``OMNIBOT_DRIVER_COMPILE=1``), the package is installed as plain Python.
+"""Tests of ``OMNIBOT_DRIVER_COMPILE=1``.
 
-A substitute for mypyc makes one small C module, since mypyc itself takes a minute; ``make
+If compiling fails, the package is installed as plain Python.
+
+A substitute for mypyc makes one small C module, because mypyc itself takes a minute. ``make
 compiled`` runs mypyc.
 """
 
@@ -50,7 +52,7 @@ FAILURES = {
 
 
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
-    """Build the package into the folder's ``lib`` with a replaced mypyc; return the output."""
+    """Build the package into the folder ``lib`` with a replaced mypyc, and return the output."""
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
     (folder / "stand_in/mypyc/build.py").write_text(
@@ -82,7 +84,7 @@ def compiled_modules(folder: Path) -> list[str]:
 def test_what_cannot_be_compiled_is_installed_as_it_is(
     tmp_path: Path, fails: str, source: str
 ) -> None:
-    """If compiling fails, no compiled part is left, and one line of output gives the reason."""
+    """Compiling fails. No compiled part is left, and one line of output gives the reason."""
     output = built(tmp_path, fails, source)
     assert f"{PACKAGE}: not compiled (" in output
     assert not compiled_modules(tmp_path / "lib")
@@ -95,7 +97,10 @@ def test_what_cannot_be_compiled_is_installed_as_it_is(
     reason="no C compiler is installed",
 )
 def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
-    """An installation without compiling must remove the compiled modules of an earlier one."""
+    """The package is installed with compiled modules, and later without.
+
+    The later installation removes the compiled modules.
+    """
     assert f"{PACKAGE}: core: compiled" in built(tmp_path, "pass", GOOD)
     assert compiled_modules(tmp_path / "lib") == [MODULE.replace(".", "/") + ENDING]
     assert built(tmp_path, "raise SystemExit(1)", GOOD)

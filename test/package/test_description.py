@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot's description, expanded by xacro and parsed with the URDF parser of ROS tools."""
+"""Tests of the robot's description: xacro expands it, and the URDF parser of ROS tools reads it."""
 
 import math
 from pathlib import Path
@@ -43,7 +43,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 def rotate(rpy: Vector, vector: Vector) -> Vector:
-    """Turn a vector by roll, then pitch, then yaw about fixed axes, as in URDF."""
+    """Rotate a vector by roll, then pitch, then yaw about fixed axes, as in URDF."""
     roll, pitch, yaw = rpy
     x, y, z = vector
     y, z = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)
@@ -53,10 +53,10 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 
 
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
-    """Return a wheel's place, and the velocity of its centre over the floor, in m/s.
+    """Return the position of a wheel, and the velocity of its centre over the floor, in m/s.
 
-    The wheel's lowest point is at rest on the floor, so the centre moves with the opposite of the
-    rim's velocity at that point.
+    The wheel's lowest point rests on the floor. So the centre's velocity is opposite to the rim's
+    velocity at that point, relative to the centre.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -65,20 +65,20 @@ def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector,
 
 
 def test_the_joints_are_those_of_joint_states() -> None:
-    """The joints that turn are the three wheels, under the names of the interface."""
+    """Only the three wheels can turn, and their joints have the names from joint_states."""
     turning = [joint.name for joint in ROBOT.joints if joint.type != "fixed"]
     assert turning == list(WHEELS)
     assert {ROBOT.joint_map[name].type for name in WHEELS} == {"continuous"}
 
 
 def test_the_frames_are_those_of_the_driver() -> None:
-    """base_link is the root, since odom is its parent and a frame has only one parent."""
+    """The root is base_link. Its parent is odom, and a frame can have only one parent."""
     assert ROBOT.get_root() == PARAMETERS.by_name["base_frame"].default
     assert {PARAMETERS.by_name["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
 
 
 def test_the_default_geometry_is_the_drivers() -> None:
-    """Description, parameters and manual have the same radii."""
+    """The description, the parameters and the manual have the same radii."""
     for name, manual_m in GEOMETRY.items():
         assert PARAMETERS.by_name[name].default == manual_m
     for name in WHEELS:
@@ -90,9 +90,12 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """At the wheel rates of a twist, each wheel rolls as fast as the body moves at its place.
+    """The wheels turn at the rates for a twist.
 
-    Rollers allow motion along the axle, so only velocities in the rolling direction are compared.
+    Each wheel rolls as fast as the body moves at that place.
+
+    Rollers let a wheel slide along its axle, so only velocities in the rolling direction are
+    compared.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]
@@ -108,7 +111,7 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
 
 
 def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
-    """The wheels' axles point away from the robot's centre, as the commissioning guide says."""
+    """The axles point away from the robot's centre, as the commissioning guide says."""
     for name in WHEELS:
         joint = ROBOT.joint_map[name]
         x, y, _ = joint.origin.xyz
@@ -125,7 +128,10 @@ def test_the_wheels_stand_on_the_ground() -> None:
 
 
 def test_the_imu_hangs_upside_down() -> None:
-    """The IMU's place is that in the vendor's drivers; its z points down, its x forward."""
+    """The IMU is where the vendor's drivers have it.
+
+    Its z axis points down, and its x axis forward.
+    """
     joint = ROBOT.joint_map["imu_joint"]
     assert (joint.parent, joint.child) == ("base_link", "imu_link")
     assert joint.origin.xyz == [-0.005, 0.035, -0.06]
@@ -135,7 +141,8 @@ def test_the_imu_hangs_upside_down() -> None:
 
 
 def test_another_robot_is_described_by_arguments() -> None:
-    """Arguments describe a bigger robot with its IMU elsewhere, so no new file is necessary."""
+    """Arguments describe a bigger robot with its IMU at another place, so no new file is necessary.
+    """
     robot = description(
         wheel_radius="0.05",
         base_radius="0.2",

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The documents: generated parts are current, links and commands exist, the site can be built."""
+"""Tests of the documents: generated parts are current, links and commands exist, the site is built.
+"""
 
 import re
 import runpy
@@ -30,13 +31,13 @@ def name_of(page: Path) -> str:
 
 
 def anchors(page: Path) -> set[str]:
-    """Return the names that GitHub and the site give to the page's headings."""
+    """Return the anchors that GitHub and the site give to the page's headings."""
     headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w -]", "", text).strip().lower().replace(" ", "-") for text in headings}
 
 
 def found(pattern: str) -> Iterator[str]:
-    """Yield the group of every match of ``pattern`` in the documents."""
+    """Yield what the group in ``pattern`` matches, for every match in the documents."""
     for page in PAGES:
         yield from re.findall(pattern, page.read_text())
 
@@ -51,7 +52,7 @@ def test_what_is_generated_is_what_the_code_says(name: str) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_leads_somewhere(page: Path) -> None:
-    """Each link's file exists, and so does the heading if the link names one."""
+    """The file of each link exists. If a link names a heading, the heading exists, too."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if re.match(r"https?://|mailto:", target):
             continue
@@ -63,14 +64,17 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_no_row_has_lost_its_table(page: Path) -> None:
-    """A blank line in a table turns the rows below it into plain text."""
+    """All rows of a table follow its heading without a blank line.
+
+    A blank line in a table turns the rows below it into plain text.
+    """
     text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
         assert re.search(r"\A.*\n\|[-:| ]+\|\n", block), block
 
 
 def test_every_page_can_be_reached_from_the_readme() -> None:
-    """Readers find each page without a search."""
+    """The README has a link to each page, so that readers find the page without a search."""
     readme = (ROOT / "README.md").read_text()
     for page in set(ROOT.glob("docs/**/*.md")) - {ROOT / "docs/index.md"}:
         assert f"({page.relative_to(ROOT)}" in readme, page

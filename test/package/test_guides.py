@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The guides agree with the code: every quoted message and parameter exists."""
+"""Tests that the guides agree with the code: every message and parameter in them exists."""
 
 import ast
 import math
@@ -25,7 +25,8 @@ SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
 def text_of(node: ast.AST) -> str:
-    """Return the string of a string node, with gaps for inserted values; "" for any other node."""
+    """Return the text of a string node, with gaps for inserted values. For other nodes, return "".
+    """
     if isinstance(node, ast.JoinedStr):
         parts = [part.value if isinstance(part, ast.Constant) else GAP for part in node.values]
         return "".join(map(str, parts))
@@ -34,7 +35,7 @@ def text_of(node: ast.AST) -> str:
 
 @cache
 def code() -> dict[Path, list[ast.AST]]:
-    """Return the nodes of each module of the driver."""
+    """Return all syntax nodes of each module of the driver."""
     files = (ROOT / "omnibot_driver").rglob("*.py")
     return {file: list(ast.walk(ast.parse(file.read_text()))) for file in files}
 
@@ -50,7 +51,7 @@ def said() -> str:
 
 
 def told() -> Iterator[str]:
-    """Yield the messages with which the driver refuses or warns."""
+    """Yield the messages of the driver's refusals and warnings."""
     for file, nodes in code().items():
         if {"simulator", "demo", "tools"} & set(file.parts):
             continue
@@ -67,7 +68,10 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """The code contains each part of a quoted message; gaps and colons separate the parts."""
+    """The guide quotes a message of the driver. The code contains each part of it.
+
+    Gaps and colons separate the parts.
+    """
     parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)
     for part in parts:
@@ -75,10 +79,10 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 
 def test_what_the_driver_tells_is_explained() -> None:
-    """The guide explains each message of the driver.
+    """The guide has a row for each message of the driver.
 
-    It does so in a sentence that contains the beginning of the message, or whose parts are all in
-    the message.
+    The row's sentence contains the beginning of the message, or the message contains all parts of
+    the sentence.
     """
 
     def is_explained(template: str) -> bool:
@@ -98,7 +102,7 @@ def test_every_state_is_explained() -> None:
 
 
 def test_every_status_of_the_diagnostics_has_its_row() -> None:
-    """The rows of the guide are the statuses of the diagnostics, in the order of publication."""
+    """The guide has a row for each status of the diagnostics, in the order of publication."""
     code = (ROOT / "omnibot_driver/core/reporting/diagnosis.py").read_text()
     names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
     rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
@@ -107,7 +111,10 @@ def test_every_status_of_the_diagnostics_has_its_row() -> None:
 
 
 def test_the_tour_shows_what_the_driver_says() -> None:
-    """Each warning and error in the tour is a message of the driver, except for inserted values."""
+    """Each warning and error in the tour is a message of the driver.
+
+    Only inserted values may differ.
+    """
     patterns = [
         re.compile(".*".join(map(re.escape, template.split(GAP))))
         for template in said().splitlines()
@@ -120,7 +127,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the end of the guide lists all steps, and only parameters of the driver."""
+    """The form at the end of the guide lists all steps, and names only parameters of the driver."""
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What ``colcon build`` and ``pip install`` install, found and started as ``ros2 run`` does it."""
+"""Tests of what ``colcon build`` and ``pip install`` install, started as ``ros2 run`` does it."""
 
 import os
 import re
@@ -30,7 +30,7 @@ SHARED_FILES = [
 
 
 def run(command: Sequence[str | Path], cwd: Path) -> str:
-    """Run the command to its end and return its output; it must succeed."""
+    """Run the command to its end, and return its output. It must succeed."""
     done = subprocess.run(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
     )
@@ -40,7 +40,7 @@ def run(command: Sequence[str | Path], cwd: Path) -> str:
 
 @contextmanager
 def running(command: Sequence[str | Path], cwd: Path) -> Iterator[subprocess.Popen[str]]:
-    """Run the command beside the test; end it with the test, or at the deadline."""
+    """Run the command while the context lasts, and kill it at the end or after ``DEADLINE_S``."""
     process = subprocess.Popen(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
@@ -71,7 +71,7 @@ MADE_HERE = (".*", "__pycache__", "*.egg-info", "build", "install", "log")
 
 @pytest.fixture(scope="module")
 def sources(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a copy of the repository with the files that a commit of everything would have."""
+    """Return a copy of the repository's sources, as if all files were committed."""
     copy = tmp_path_factory.mktemp("sources") / PACKAGE
     if not (ROOT / ".git").exists():  # a source archive contains only the sources
         return Path(shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*MADE_HERE)))
@@ -134,7 +134,7 @@ def test_colcon_installs_the_executables(prefix: Path) -> None:
 
 
 def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Path) -> None:
-    """Python imports the installed copy, with its type marker, in a sourced workspace."""
+    """In a sourced workspace, Python imports the installed copy, which has a type marker."""
     script = f"import {PACKAGE}; print({PACKAGE}.__file__)"
     found = Path(run(in_workspace(workspace, [sys.executable, "-c", script]), workspace).strip())
     assert found.is_relative_to(prefix)
@@ -142,7 +142,7 @@ def test_the_installed_package_is_the_one_that_runs(workspace: Path, prefix: Pat
 
 
 def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, prefix: Path) -> None:
-    """Driver and simulator are started from their installed places, and ctrl-C ends the driver."""
+    """The installed driver runs on the installed simulator. Ctrl-C ends the driver."""
     executables = prefix / "lib" / PACKAGE
     board = workspace / "board"
     simulator = in_workspace(workspace, [executables / "simulator", "--link", board])
@@ -165,7 +165,8 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 
 
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
-    """colcon looks for pytest in setup.py; if pytest were missing there, no test would be run."""
+    """``colcon test`` runs the tests, because setup.py names pytest. Otherwise it would run none.
+    """
     one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]
     run([*colcon, "test", "--base-paths", sources, "--pytest-args", *one], workspace)

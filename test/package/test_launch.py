@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the launch files start, with which arguments and parameters.
+"""Tests of the launch files: what they start, and with which arguments and parameters.
 
 Where launch is not installed, the files are only parsed.
 """
@@ -65,9 +65,9 @@ Started = dict[str, dict[str, Any]]
 
 @pytest.fixture
 def launch(tmp_path: Path) -> Callable[..., Started]:
-    """Return a function that launches a file with recorders in place of the executables.
+    """Return a function that launches a file with recorders instead of the real executables.
 
-    The function returns the records of the executables that were started.
+    The function returns what each started recorder has recorded: its arguments and parameter files.
     """
     executables = {
         PACKAGE: "driver",
@@ -114,7 +114,7 @@ def launch(tmp_path: Path) -> Callable[..., Started]:
 
 
 def parameters(record: dict[str, Any]) -> dict[str, Any]:
-    """Return a process's parameters from all its files; later files replace earlier values."""
+    """Return a process's parameters from all its files. Later files replace earlier values."""
     merged: dict[str, Any] = {}
     for text in record["files"]:
         for node in yaml.safe_load(text).values():
@@ -124,7 +124,7 @@ def parameters(record: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=lambda path: path.name)
 def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
-    """Every file of this package that a launch file names is in an installed folder."""
+    """A launch file names other files of this package. Each of them is in an installed folder."""
     strings = [
         node.value
         for node in ast.walk(ast.parse(path.read_text()))
@@ -140,7 +140,7 @@ def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
 
 
 def test_the_driver_has_every_parameter_that_is_offered() -> None:
-    """At least one board has each parameter that the launch file offers.
+    """The launch file offers only parameters that at least one board has.
 
     An unknown parameter would end the driver.
     """
@@ -155,7 +155,8 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 
 
 class Stub(ModuleType):
-    """A substitute for a module of launch: a call of any name in it only records its arguments."""
+    """A substitute for a module of launch. A call of any function in it only records its arguments.
+    """
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -167,9 +168,9 @@ class Stub(ModuleType):
 def test_a_board_without_a_parameter_file_is_refused(
     file: str, parameters_of: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only boards with a parameter file can be chosen.
+    """The launch file offers only boards that have a parameter file.
 
-    launch itself would only warn of a missing file, and start the node without parameters.
+    For a missing file, launch itself would only warn, and start the node without parameters.
     """
     for module in ("launch", "launch_ros"):
         for part in (
@@ -201,7 +202,7 @@ def test_the_driver_gets_the_defaults_and_nothing_else(launch: Callable[..., Sta
 
 @needs_launch
 def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
-    """Each argument becomes a parameter of its type; the node is in its namespace."""
+    """Each argument becomes a parameter of the right type. The node is in the given namespace."""
     started = launch(
         "driver.launch.py",
         *("port:=sim://", "publish_tf:=false", "frame_prefix:=robot1/", "namespace:=robot1"),
@@ -220,7 +221,10 @@ def test_the_driver_gets_what_is_given(launch: Callable[..., Started]) -> None:
 def test_the_parameter_file_is_that_of_the_board(
     launch: Callable[..., Started], tmp_path: Path
 ) -> None:
-    """The board selects the parameter file; a user's own file may name the board instead."""
+    """The argument ``board`` selects the parameter file.
+
+    A user's own file may name the board instead.
+    """
     defaults = {row.name: row.default for row in PARAMETERS.rows}
     assert parameters(launch("driver.launch.py", "board:=omnibot")["driver"]) == defaults
     given = parameters(launch("driver.launch.py", "board:=lois_ecu")["driver"])
@@ -237,9 +241,11 @@ def test_the_parameter_file_is_that_of_the_board(
 def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
     launch: Callable[..., Started], tmp_path: Path, file: str
 ) -> None:
-    """The argument ``board`` is obeyed beside a parameter file that names no board.
+    """The user gives the argument ``board``, and a parameter file without a board.
 
-    Otherwise the driver would send OmniBot's frames to another board.
+    The argument is used.
+
+    Otherwise the driver would send the OmniBot's frames to another board.
     """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")
@@ -265,7 +271,7 @@ def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]
 
 @needs_launch
 def test_an_empty_board_is_described_as_the_default_one(launch: Callable[..., Started]) -> None:
-    """An empty ``board`` is the default board.
+    """The argument ``board`` is empty. The default board is described.
 
     A launch file that includes the driver's file may leave this argument empty.
     """
@@ -275,7 +281,10 @@ def test_an_empty_board_is_described_as_the_default_one(launch: Callable[..., St
 
 @needs_launch
 def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
-    """RViz uses this package's display, in the robot's own odometry frame."""
+    """The argument ``rviz`` is true.
+
+    RViz shows this package's display in the robot's odometry frame.
+    """
     started = launch("description.launch.py", "rviz:=true", "frame_prefix:=robot1/")
     words = started["rviz2"]["arguments"]
     display = Path(words[words.index("--display-config") + 1])
@@ -285,7 +294,8 @@ def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
 
 @needs_launch
 def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]) -> None:
-    """The driver does not publish the transform, and all nodes are in one namespace."""
+    """The filter publishes the transform, and the driver does not. All nodes are in one namespace.
+    """
     started = launch("ekf.launch.py", "namespace:=robot1", "frame_prefix:=robot1/")
     assert set(started) == {"driver", "ekf_node", "robot_state_publisher", "xacro"}
     assert parameters(started["driver"])["publish_tf"] is False
@@ -298,7 +308,7 @@ def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]
 
 @needs_launch
 def test_the_simulation_is_the_driver_with_a_board_inside(launch: Callable[..., Started]) -> None:
-    """The simulation has one process, which takes options of the board and of the driver."""
+    """The simulation is one process. It takes options of the board and of the driver."""
     started = launch("simulation.launch.py", "namespace:=robot1")
     assert set(started) == {"driver"}
     assert parameters(started["driver"])["port"] == "sim://"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Makefile's messages on a machine that lacks something."""
+"""Tests of the Makefile: its list of targets, and its behaviour if something is missing."""
 
 import os
 import subprocess
@@ -27,7 +27,10 @@ def make(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def no_python(tmp_path: Path) -> str:
-    """Return the path of an interpreter that always fails, like a Python without wheels on PyPI."""
+    """Return the path of an interpreter that always fails.
+
+    It stands for a Python version without wheels on PyPI.
+    """
     interpreter = tmp_path / "python"
     interpreter.write_text("#!/bin/sh\nexit 1\n")
     interpreter.chmod(0o755)
@@ -38,7 +41,10 @@ def no_python(tmp_path: Path) -> str:
 def test_without_wheels_one_sentence_points_to_jazzy(
     target: str, no_python: str, tmp_path: Path
 ) -> None:
-    """Without wheels, make creates nothing, fails, and names Jazzy's installation guide."""
+    """PyPI has no wheels for this Python. make fails, and names the installation guide of Jazzy.
+
+    It creates nothing.
+    """
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()
     assert done.returncode != 0
@@ -49,7 +55,7 @@ def test_without_wheels_one_sentence_points_to_jazzy(
 
 
 def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
-    """make must not clear a ``.venv`` that is a link to another environment."""
+    """The folder ``.venv`` is a link to another environment. make must not clear it."""
     (tmp_path / "theirs").mkdir()
     (tmp_path / "theirs/kept").touch()
     (tmp_path / "venv").symlink_to(tmp_path / "theirs")

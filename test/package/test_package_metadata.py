@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the package declares about itself, and which of its parts may import which."""
+"""Tests of the package's metadata, and of which parts of the package may import which."""
 
 import ast
 import re
@@ -72,7 +72,7 @@ MANIFEST = ElementTree.parse(ROOT / "package.xml").getroot()
 
 
 def declared(tag: str) -> set[str]:
-    """Return the rosdep keys in the manifest's elements of this name."""
+    """Return the rosdep keys in all elements of the manifest with the name ``tag``."""
     return {element.text or "" for element in MANIFEST.iter(tag)}
 
 
@@ -88,7 +88,7 @@ def python_files(*paths: str) -> list[Path]:
 
 
 def imports(file: Path) -> Iterator[str]:
-    """Yield the full dotted name of everything that the file imports, anywhere in it."""
+    """Yield the full dotted name of everything that a file imports, in any place of the file."""
     package = file.relative_to(ROOT).parent.parts
     for node in ast.walk(ast.parse(file.read_text(), file)):
         if isinstance(node, ast.Import):
@@ -122,7 +122,7 @@ def started_by(files: Iterable[Path]) -> set[str]:
 
 
 def within(name: str, module: str) -> bool:
-    """Return whether the dotted name is the module or something in it."""
+    """Return whether the dotted ``name`` is the module itself or something in it."""
     return name == module or name.startswith(f"{module}.")
 
 
@@ -144,12 +144,13 @@ def test_manifest_and_setup_agree(setup_arguments: dict[str, Any]) -> None:
 
 
 def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any]) -> None:
-    """The extras of pip contain only packages without which the driver still works."""
+    """The extras for pip have only libraries that the driver itself does not need."""
     assert setup_arguments["extras_require"] == {**EXTRAS, "test": ["pytest"]}
 
 
 def test_only_tools_need_what_an_extra_brings() -> None:
-    """Apart from tools, only a replay needs a package of an extra, namely rosbags."""
+    """Only the tools import libraries of the extras. The one exception is the replay with rosbags.
+    """
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {
         (file.relative_to(ROOT / PACKAGE).parts[0], library)
@@ -162,7 +163,10 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """The README has a pip command for what rosdep does not install; Ubuntu 24.04 accepts it."""
+    """rosdep does not install some libraries.
+
+    The README has a pip command that Ubuntu 24.04 accepts.
+    """
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()
 
@@ -183,7 +187,7 @@ def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
 
 
 def test_optional_packages_are_started_and_documented() -> None:
-    """rosdep does not install optional packages, so the README says how to install them."""
+    """rosdep does not install the optional packages. The README says how to install them."""
     readme = (ROOT / "README.md").read_text()
     assert started_by(python_files("launch")) >= OPTIONAL
     for name in OPTIONAL:
@@ -207,7 +211,7 @@ def test_launch_file_describes_a_launch(path: Path) -> None:
 
 
 def test_the_core_imports_itself_and_pure_modules_only() -> None:
-    """ROS, serial ports, threads, clocks and files are not used in the core."""
+    """The core does not import ROS, serial ports, threads, clocks or files."""
     foreign = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/core")
@@ -218,7 +222,8 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 
 
 def test_the_simulator_shares_nothing_with_the_core() -> None:
-    """The simulator uses no code of the driver, so that one misreading cannot affect both."""
+    """The simulator uses no code of the driver. So one misreading of a manual cannot affect both.
+    """
     shared = {
         f"{file.relative_to(ROOT)}: {name}"
         for file in python_files(f"{PACKAGE}/simulator")
@@ -229,7 +234,7 @@ def test_the_simulator_shares_nothing_with_the_core() -> None:
 
 
 def test_mypy_checks_exactly_what_imports_no_ros() -> None:
-    """mypy checks all modules except those that need ROS, which has no type annotations."""
+    """mypy checks all modules that do not import ROS, which has no type annotations."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     without_ros = {
         file
@@ -246,7 +251,7 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
 
 
 def test_every_source_file_says_whose_it_is() -> None:
-    """The first line of each file names the owner, and the licence that package.xml declares."""
+    """The first line of each source file names the owner, and the licence from package.xml."""
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
     files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
     without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Plain English in the repository: phrases that were hard to read are rejected.
+"""Tests of the repository's English: phrases that were hard to read are rejected.
 
 Every text file is searched: log lines, messages, documents, comments, docstrings. A phrase may span
-a line break. Identifiers are not searched, since ``_`` belongs to a word.
+a line break. Identifiers are not searched, because ``_`` is a part of a word.
 """
 
 import ast
@@ -44,15 +44,15 @@ PATTERNS = {
     "lattice": r"lattices?",
     "farewell": r"farewells?",
 }
-"""By the name of a phrase that must not be used, the phrase's pattern, as full words."""
+"""The phrases that must not be used: the name of each phrase, and its pattern in full words."""
 
 ALLOWED = {
     "test/package/test_plain_english.py": "names the phrases",
 }
-"""Files that are not searched, each with its reason."""
+"""Files that are not searched. The value is the reason."""
 
 CONJUNCTIONS = {"And", "But", "Nor", "Or"}
-"""A docstring that begins with one of these cannot be understood without the function's name."""
+"""Words that must not begin a docstring, because it would depend on the function's name."""
 
 
 @cache
@@ -67,7 +67,7 @@ def texts() -> dict[str, str]:
 
 
 def found(phrase: str) -> Iterator[str]:
-    """Yield the places of the phrase: file, line and words."""
+    """Yield each place of the phrase: the file, the line and the words."""
     pattern = re.compile(
         rf"\b(?:{PATTERNS[phrase]})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"),
         re.IGNORECASE | re.MULTILINE,
@@ -83,12 +83,12 @@ def found(phrase: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("phrase", PATTERNS)
 def test_the_phrase_is_not_used(phrase: str) -> None:
-    """No text has a phrase that must not be used; CONTRIBUTING.md says what to write instead."""
+    """No text uses the phrase. CONTRIBUTING.md says what to write instead."""
     assert list(found(phrase)) == []
 
 
 def test_no_docstring_begins_with_a_conjunction() -> None:
-    """A docstring should be understood by itself."""
+    """No docstring begins with a conjunction, so that each can be understood by itself."""
     fragments = [
         f"{name}: {doc.splitlines()[0]}"
         for name, text in texts().items()
@@ -102,5 +102,5 @@ def test_no_docstring_begins_with_a_conjunction() -> None:
 
 
 def test_every_exception_is_needed() -> None:
-    """Exceptions for files that no longer exist must be removed."""
+    """Every file in ``ALLOWED`` still exists."""
     assert set(ALLOWED) <= set(texts())

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The tests of ``make check`` stay quick: they do not use ROS, and have few examples."""
+"""Tests that ``make check`` stays quick: its tests do not use ROS and try few examples."""
 
 import ast
 import re
@@ -9,11 +9,11 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MOST_EXAMPLES = 200
-"""Largest number of examples of a property that is not marked slow."""
+"""Largest number of examples that a property may try without the mark ``slow``."""
 
 
 def quick_folders() -> list[str]:
-    """Return the folders of the quick tests, which are named in the Makefile."""
+    """Return the folders of the quick tests, which the Makefile names."""
     found = re.search(r"^QUICK := (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert found
     return found[1].split()
@@ -26,7 +26,7 @@ def modules() -> Iterator[tuple[str, ast.Module]]:
 
 
 def test_none_of_them_imports_ros() -> None:
-    """No quick test and no helper of a quick test imports rclpy."""
+    """No file in the folders of the quick tests imports rclpy."""
     for name, module in modules():
         for node in ast.walk(module):
             if isinstance(node, ast.Import | ast.ImportFrom):
@@ -36,7 +36,10 @@ def test_none_of_them_imports_ros() -> None:
 
 
 def test_a_property_of_many_examples_is_marked_slow() -> None:
-    """A property of many examples is marked slow, so that ``make check`` takes at most a minute."""
+    """A property that tries many examples has the mark ``slow``.
+
+    So ``make check`` takes at most a minute.
+    """
     for name, module in modules():
         for node in ast.walk(module):
             if not isinstance(node, ast.FunctionDef):

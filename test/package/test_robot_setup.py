@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The udev rules and the systemd unit: well formed, and as documented."""
+"""Tests of the udev rules and the systemd unit: they are well formed, and as documented."""
 
 import re
 import shutil
@@ -19,7 +19,7 @@ ASSIGNMENTS = {"SYMLINK", "GROUP", "MODE", "ATTR{latency_timer}"}
 
 
 def rules(lines: list[str]) -> list[dict[str, tuple[str, str]]]:
-    """Parse each line into its keys, with operator and value; fail at anything but a rule."""
+    """Parse each line into its keys, each with operator and value. Fail if a line is not a rule."""
     parsed = []
     for line in lines:
         tokens = [TOKEN.fullmatch(token) for token in line.split(", ")]
@@ -34,7 +34,7 @@ OFFERED = rules([line.lstrip("#") for line in LINES if line.lstrip("#").startswi
 
 
 def test_every_rule_matches_before_it_assigns() -> None:
-    """Keys and operators of each rule are those that udev knows."""
+    """Each rule has only keys and operators that udev knows."""
     for rule in ACTIVE + OFFERED:
         for key, (operator, _) in rule.items():
             assert key in MATCHES | ASSIGNMENTS
@@ -42,7 +42,7 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """The device is /dev/omnibot, for the group dialout only."""
+    """Each rule gives its adapter the name /dev/omnibot, which only the group dialout may use."""
     assert len(OFFERED) == 4
     for rule in OFFERED:
         assert rule["SUBSYSTEM"] == ("==", "tty")
@@ -54,7 +54,7 @@ def test_each_adapter_gets_the_same_name_and_rights() -> None:
 
 
 def test_only_one_adapter_is_taken_for_the_board() -> None:
-    """Only one rule makes the link /dev/omnibot. A second rule could give this name to a lidar."""
+    """Only one rule makes the link /dev/omnibot. A second rule might give this name to a lidar."""
     assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
 
 
@@ -67,7 +67,7 @@ def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
 
 
 def unit_settings() -> dict[str, list[str]]:
-    """Return the unit's keys with their values, continued lines joined."""
+    """Return the keys of the unit with their values. Continued lines are joined."""
     settings: dict[str, list[str]] = {}
     for line in UNIT.read_text().replace("\\\n", " ").splitlines():
         key, assigned, value = line.partition("=")
@@ -77,7 +77,8 @@ def unit_settings() -> dict[str, list[str]]:
 
 
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
-    """The unit starts the driver without a shell, because signals must reach the driver itself."""
+    """The unit starts the driver without a shell between, so that signals reach the driver itself.
+    """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
     assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)
@@ -85,7 +86,10 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 
 
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
-    """A crash of the driver must not kill its guard, which then stops the robot."""
+    """systemd ends the driver by SIGINT.
+
+    After a crash of the driver, its guard can still stop the robot.
+    """
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]
     assert settings["KillMode"] == ["control-group"]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings for other packages use only what the driver has, within its limits."""
+"""Tests of the settings for other packages: they use only topics and values of the driver."""
 
 import ast
 import json
@@ -43,7 +43,7 @@ def parameters(name: str, node: str) -> dict[str, Any]:
 
 
 def driver_names() -> set[str]:
-    """Return the names of topics and services in the driver's code, relative to its namespace."""
+    """Return the names of the driver's topics and services, relative to its namespace."""
     calls = [
         node
         for source in (ROOT / NODE).glob("*.py")
@@ -57,7 +57,7 @@ def driver_names() -> set[str]:
 
 
 def everything_under(key: str, tree: Any) -> Iterator[Any]:
-    """Yield all values of the key, at any depth of the tree."""
+    """Yield all values that the key has in a tree, at any depth."""
     if isinstance(tree, dict):
         if key in tree:
             yield tree[key]
@@ -72,13 +72,19 @@ DRIVER = driver_names()
 
 
 def test_the_drivers_names_are_found() -> None:
-    """The driver's names, with which the other tests compare, are found in its code."""
+    """The driver's topics and services are found in its code.
+
+    The other tests compare names with them.
+    """
     assert {"odom", "imu/data_raw", "cmd_vel", f"{NODE}/estop_active", f"{NODE}/estop"} <= DRIVER
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.name)
 def test_ros_reads_each_parameter_file(path: Path) -> None:
-    """rcl's parser accepts less than YAML: anchors and mixed lists are invalid."""
+    """rcl reads each parameter file.
+
+    Its parser is stricter than YAML: it has no anchors or mixed lists.
+    """
     context = Context()
     rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
     rclpy.shutdown(context=context)
@@ -106,7 +112,7 @@ def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
 
 
 def test_nav2_keeps_to_the_drivers_limits() -> None:
-    """Each speed limit in Nav2 is the driver's default, so plans can be followed."""
+    """Each speed limit in Nav2 is the driver's default limit, so the robot can follow the plans."""
     file = load("nav2_omnibot.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     assert {mppi["vx_max"], -mppi["vx_min"], mppi["vy_max"]} == {LINEAR}
@@ -132,7 +138,7 @@ def test_nav2_knows_that_the_robot_moves_sideways() -> None:
 
 
 def test_nav2_uses_the_drivers_topics_and_frames() -> None:
-    """Nav2's topics of odometry and commands, and all its frames, are the driver's."""
+    """Nav2 uses the driver's topics for odometry and commands, and the driver's frames."""
     file = load("nav2_omnibot.yaml")
     assert set(everything_under("odom_topic", file)) == {"odom"} <= DRIVER
     assert set(everything_under("cmd_vel_out_topic", file)) == {"cmd_vel"} <= DRIVER
@@ -144,13 +150,13 @@ def test_nav2_uses_the_drivers_topics_and_frames() -> None:
 
 
 def test_every_critic_that_is_tuned_is_used() -> None:
-    """Each tuned critic is in the list of critics, since a misspelt name would be ignored."""
+    """Each critic with settings is in the list of critics. A misspelt name would be ignored."""
     mppi = load("nav2_omnibot.yaml")["controller_server"]["ros__parameters"]["FollowPath"]
     assert {name for name in mppi if name.endswith("Critic")} == set(mppi["critics"])
 
 
 def test_the_mux_is_locked_by_the_drivers_estop() -> None:
-    """The mux's lock listens to the driver's latched Bool, and has priority over all sources."""
+    """The mux's lock is the driver's topic ``estop_active``. It has priority over all sources."""
     mux = parameters("twist_mux.yaml", "twist_mux")
     (lock,) = mux["locks"].values()
     assert lock["topic"] == f"{NODE}/estop_active"
@@ -160,7 +166,10 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
 
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
-    """The mux reads from topics that the driver does not use, with the driver's command timeout."""
+    """The mux's sources are topics that the driver does not use.
+
+    They have the driver's command timeout.
+    """
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()
     assert {source["timeout"] for source in sources} == {TIMEOUT}
@@ -170,7 +179,10 @@ def test_the_mux_passes_on_what_the_driver_takes() -> None:
 
 
 def test_rviz_shows_topics_and_frames_that_exist() -> None:
-    """RViz's names are relative, so that a display can be put into a robot's namespace."""
+    """RViz shows topics of the driver.
+
+    Their names are relative, so a robot's namespace can be added.
+    """
     rviz = yaml.safe_load((ROOT / "rviz/omnibot.rviz").read_text())["Visualization Manager"]
     topics = {
         topic["Value"]
@@ -182,7 +194,7 @@ def test_rviz_shows_topics_and_frames_that_exist() -> None:
 
 
 def test_foxglove_shows_topics_and_services_that_exist() -> None:
-    """Each name with a leading slash in Foxglove's layout is the driver's, or in ``OTHERS``."""
+    """Each name in Foxglove's layout is a topic or service of the driver, or is in ``OTHERS``."""
     text = (CONFIG / "foxglove.json").read_text()
     names = set(re.findall(r'"/([a-z_/]+)', text))
     assert {"odom", "imu/data_raw", f"{NODE}/state", f"{NODE}/estop"} < names
@@ -190,7 +202,10 @@ def test_foxglove_shows_topics_and_services_that_exist() -> None:
 
 
 def test_foxglove_lays_out_every_panel_once() -> None:
-    """In Foxglove, a panel without a place is not drawn, and a place without settings is empty."""
+    """Each panel in Foxglove's layout has one place, and each place has a panel's settings.
+
+    A panel without a place is not drawn, and a place without settings is empty.
+    """
     layout = json.loads((CONFIG / "foxglove.json").read_text())
     places = list(everything_under("first", layout)) + list(everything_under("second", layout))
     panels = [place for place in places if isinstance(place, str)]
@@ -198,7 +213,10 @@ def test_foxglove_lays_out_every_panel_once() -> None:
 
 
 def test_foxglove_drives_slowly_and_often_enough() -> None:
-    """Foxglove's buttons keep the limits, and repeat faster than the command timeout."""
+    """Foxglove's buttons command speeds within the limits.
+
+    They repeat faster than the command timeout.
+    """
     teleop = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["Teleop!drive"]
     assert teleop["publishRate"] > 2 / TIMEOUT
     limits = {"linear-x": LINEAR, "angular-z": ANGULAR}

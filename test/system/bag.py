@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Record the topics of a driver to a bag, as ``ros2 bag record`` does, and read a bag."""
+"""Record the topics of a driver to a bag, as ``ros2 bag record`` does, and read bags."""
 
 import importlib
 from functools import partial
@@ -26,7 +26,7 @@ TYPES: Final = get_typestore(Stores.ROS2_JAZZY)
 DEPTH: Final = 1000
 
 Message = tuple[int, bytes]
-"""Time of arrival in ns, and the serialised message."""
+"""The time at which a message arrived, in ns, and the serialised message."""
 
 
 def message_class(name: str) -> type:
@@ -35,7 +35,7 @@ def message_class(name: str) -> type:
 
 
 def as_recorded(qos: QoSProfile) -> Qos:
-    """Convert a quality of service from the type of rclpy to the type that bags use."""
+    """Convert a quality of service from rclpy's type to the type that bags use."""
     return Qos(
         QosHistory[qos.history.name],
         qos.depth,
@@ -50,7 +50,8 @@ def as_recorded(qos: QoSProfile) -> Qos:
 
 
 def as_played(qos: Qos) -> QoSProfile:
-    """Convert the quality of service stored in a bag to one for a publisher or a subscription."""
+    """Convert the quality of service from a bag to rclpy's type, for a publisher or a subscription.
+    """
     return QoSProfile(
         depth=DEPTH,
         reliability=ReliabilityPolicy[qos.reliability.name],
@@ -63,9 +64,13 @@ def _time(duration: Duration) -> QosTime:
 
 
 class Recorder:
-    """Records all topics that a driver publishes; the topics are found at run time.
+    """Records all topics that a driver publishes. It finds the topics at run time.
 
-    The keys of ``messages``, ``types`` and ``offered`` (qualities of service) are topics.
+    ``messages``: the messages of each topic.
+
+    ``types``: the message type of each topic, such as "nav_msgs/msg/Odometry".
+
+    ``offered``: the quality of service that the driver offers on each topic.
     """
 
     def __init__(self, probe: Probe) -> None:
@@ -75,7 +80,10 @@ class Recorder:
         self._probe = probe
 
     def record(self, *expected: str) -> None:
-        """Wait for the topics ``expected``, then subscribe to all topics of the driver."""
+        """Wait until the driver publishes the ``expected`` topics.
+
+        Then subscribe to all its topics.
+        """
         namespace = self._probe.node.get_namespace()
 
         def publishes() -> bool:
@@ -133,7 +141,7 @@ def read(path: Path) -> tuple[dict[str, list[Message]], dict[str, Qos]]:
 
 
 def equal(ours: Any, theirs: Any) -> bool:
-    """Return whether all fields of a message from rclpy and of one from rosbags are equal."""
+    """Return whether two messages have equal fields: one from rclpy, and one from rosbags."""
     if hasattr(ours, "get_fields_and_field_types"):
         names = ours.get_fields_and_field_types()
         return all(equal(getattr(ours, name), getattr(theirs, name)) for name in names)

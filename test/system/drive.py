@@ -1,12 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A drive over a bad serial line: compares the published messages with the board's frames.
+"""A drive over a bad serial line: the published messages are compared with the board's frames.
 
 ``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a separate process on a
-simulated board, drives curves over ``cmd_vel``, and prints how many messages are wrong and how far
-``odom`` is off. Every message must match a frame of the board: an Imu by its six values, an
-Odometry by the length and the turn of its displacement. The pose in an Odometry is compared with
-that of the board.
+simulated board and drives curves over ``cmd_vel``. It prints how many messages are wrong, and the
+error of ``odom``.
+
+Every message must match a frame of the board. An Imu matches by its six values. An Odometry matches
+by the length and the turn of its displacement. The pose in an Odometry is compared with the pose of
+the board.
 """
 
 import argparse
@@ -26,11 +28,11 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Largest distance, in deltas, of a message's delta from the one that its timestamp suggests."""
+"""How far from the delta that its timestamp suggests a message's own delta may be, in deltas."""
 LONGEST_STALL = 1000
-"""Largest distance, in IMU frames, of a message's frame from the one that its timestamp suggests.
+"""How far from the frame that its timestamp suggests a message's own frame may be, in IMU frames.
 
-A stall of the computer may shift timestamps by this distance.
+A stall of the computer may shift the timestamps by this distance.
 """
 
 Triple = tuple[float, float, float]
@@ -40,8 +42,16 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    imu_sent, odom_sent: number of frames sent, from the first received one on. worst_m, worst_rad,
-    last_m, last_rad: largest and last errors of ``odom`` against the pose of the board.
+    ``way_m``: length of the path.
+
+    ``imu_sent``, ``odom_sent``: number of frames that the board sent, from the first one that
+    arrived.
+
+    ``imu_wrong``, ``odom_wrong``: number of messages that match no frame.
+
+    ``worst_m``, ``worst_rad``: largest error of ``odom`` against the pose of the board.
+
+    ``last_m``, ``last_rad``: error of ``odom`` in the last message.
     """
 
     seconds: float
@@ -73,7 +83,8 @@ class Outcome:
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
     """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames.
 
-    The caller must have initialised rclpy.
+    ``lose``, ``burst`` and ``flip`` are the fault rates of the line. The caller must have
+    initialised rclpy.
     """
     from driver_process import Driver
     from geometry_msgs.msg import Twist
@@ -188,9 +199,9 @@ def trace(
 
 
 def since(found: Sequence[int | None]) -> int:
-    """Return the index of the first IMU frame that arrived as a message.
+    """Return the index of the first frame that arrived as a message.
 
-    The listener was not ready for earlier frames.
+    Earlier frames were sent before the listener was ready.
     """
     return next(number for number in found if number is not None)
 
@@ -213,10 +224,11 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return all deltas, the board's pose after each delta, and the last IMU frame before each.
+    """Return three lists with one item for each delta that the board sent.
 
-    A delta is three integers. The rounding of at most four deltas limits the accuracy of a pose. An
-    IMU frame is given by its index.
+    The first list has the deltas, as three integers. The second has the board's pose after each
+    delta, which the rounding of at most four deltas makes inaccurate. The third has the index of
+    the last IMU frame before each delta.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []
@@ -246,9 +258,9 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return the displacement from which the driver computed a message's twist.
+    """Return the length, in 0.1 mm, and the turn, in 0.1 mrad, of a message's displacement.
 
-    The length is in units of 0.1 mm, the turn in units of 0.1 mrad.
+    The driver has computed the message's twist from this displacement.
     """
     twist = message.twist.twist
     turn = twist.angular.z * PERIOD_S
@@ -263,7 +275,7 @@ def _stamp(message: Any) -> float:
 
 
 def main() -> int:
-    """Print the outcome of a drive; return 1 if a message was wrong, else 0."""
+    """Drive and print the outcome. Return 1 if a message was wrong, else 0."""
     parser = argparse.ArgumentParser(description="A drive over a bad line, end to end.")
     parser.add_argument("seconds", type=float)
     for fault in ("lose", "burst", "flip"):

@@ -1,11 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driver processes that are forked from a process that has already imported the driver.
+"""A nursery for driver processes: it imports the driver once and forks a process for each driver.
 
-A driver spends most of its start on imports, and the tests start hundreds of drivers. A process
-called the nursery imports the driver once, and forks a child for each driver. The child has its own
-output, environment, arguments and exit code, and runs the usual ``main``. Tests of the start itself
-run a new interpreter instead.
+A driver spends most of its start on imports, and the tests start hundreds of drivers. Each forked
+driver has its own output, environment, arguments and exit code, and runs the usual ``main``. Tests
+of the start itself run a new interpreter instead.
 """
 
 import atexit
@@ -25,7 +24,8 @@ from pathlib import Path
 from typing import NoReturn
 
 LARGEST_REQUEST = 1 << 17
-"""Largest size in bytes of a request: the arguments and the environment of a driver."""
+"""Largest size of a request, in bytes. A request has the arguments and the environment of a driver.
+"""
 
 
 class Forked:
@@ -65,7 +65,7 @@ class Forked:
 
 
 class Nursery:
-    """The process that forks drivers; it runs from the first driver until the tests end."""
+    """Starts the nursery process with the first driver. The process ends with the tests."""
 
     def __init__(self) -> None:
         self._control: socket.socket | None = None
@@ -105,7 +105,10 @@ def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
 
 
 def serve(descriptor: int) -> None:
-    """Fork a driver for each request on the socket; write the exit code of each ended driver."""
+    """Fork a driver for each request that arrives on the socket ``descriptor``.
+
+    When a driver ends, write its exit code to the pipe that came with its request.
+    """
     import omnibot_driver.node  # noqa: F401, which takes most of the time
     from omnibot_driver import boards
 
@@ -159,8 +162,8 @@ def reap(statuses: dict[int, int]) -> None:
 def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
     """Run the driver in this forked process.
 
-    The process ends without calling the exit handlers of libraries, because the handler of LTTng
-    would stop a thread that does not exist after a fork.
+    The process ends without the exit handlers of libraries. The handler of LTTng would stop a
+    thread that does not exist after a fork.
     """
     from omnibot_driver import driver
 

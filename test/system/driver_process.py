@@ -17,23 +17,26 @@ from typing import Any, Self
 from driver_nursery import Nursery
 
 PATIENCE_S = 120.0
-"""Longest wait for an event, in s, after which a test fails. Tests do not assert durations."""
+"""How long a test waits for an event before it fails, in s. Tests do not assert durations."""
 
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     # Under nohup, children would inherit that SIGHUP is ignored; a handler is not inherited.
     signal.signal(signal.SIGHUP, lambda *_: None)
 
 _namespaces = (f"robot{os.getpid()}_{number}" for number in itertools.count())
-"""Namespaces that no other driver uses, even one of another test run in the same ROS domain."""
+"""Namespaces that no other driver uses, not even in another test run in the same ROS domain."""
 _nursery = Nursery()
 
 
 class Driver:
     """The driver as a separate process in a namespace.
 
-    before: Python code that a new interpreter runs before the driver; without such code, the
-    nursery forks the process. namespace: namespace of the driver, by default an unused one. more:
-    further ROS arguments.
+    ``before``: Python code that runs before the driver, in a new interpreter. Without such code,
+    the nursery forks the process.
+
+    ``namespace``: the driver's namespace. By default it is an unused one.
+
+    ``more``: further ROS arguments.
     """
 
     def __init__(
@@ -89,7 +92,7 @@ class Driver:
         return "".join(self.lines)
 
     def wait_for_line(self, pattern: str, since: int = 0) -> str:
-        """Wait for a line of output that matches the pattern; return it.
+        """Wait until a line of output matches the pattern, and return the line.
 
         The search begins at the line with the index ``since``.
         """

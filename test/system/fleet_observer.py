@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Program that waits, as a super client of a discovery server, for all drivers of a fleet.
+"""Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX``. The program is a separate process, because with Fast
-DDS a process that has been a client of a server finds nothing without a server afterwards.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. The program is a
+separate process because of Fast DDS: a process that was once a client of a server finds nothing
+without a server afterwards.
 """
 
 import sys

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Program that runs several drivers, each in a separate process, after a single import.
+"""Program that imports the driver once and runs several drivers, each in a separate process.
 
-``python fleet_of_drivers.py NUMBER PREFIX`` runs the drivers ``/PREFIX0``, ``/PREFIX1`` and so on
-until its standard input is closed, and prints their process ids. The port of the drivers does not
-exist, which saves computing time and is enough for discovery. Each driver has its own DDS
-participant, as on several robots.
+``python fleet_of_drivers.py NUMBER PREFIX`` runs the drivers ``/PREFIX0``, ``/PREFIX1`` and so on.
+It prints their process ids and ends when its standard input is closed. Each driver has its own DDS
+participant, as on several robots. The drivers' port does not exist, which saves computing time and
+is enough for discovery.
 """
 
 import os

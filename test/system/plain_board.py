@@ -2,8 +2,8 @@
 
 """Profile of a board with few features: two wheels and ``cmd_vel``, but no IMU and no pause.
 
-The board uses the protocol of the OmniBot and ignores the IMU, so the tests can use the simulated
-OmniBot. The profile has a topic and a service of its own.
+The board uses the OmniBot's protocol and ignores the IMU frames, so a simulated OmniBot can serve
+as the board. The profile has one topic and one service that other boards do not have.
 """
 
 from collections.abc import Callable, Mapping

@@ -23,7 +23,7 @@ from omnibot_driver.stall_detector import SETTLE_S
 
 
 class Probe:
-    """A ROS node that subscribes, publishes and calls services."""
+    """A ROS node in the namespace of a driver. It subscribes, publishes and calls services."""
 
     def __init__(self, namespace: str) -> None:
         self.node = Node("probe", namespace=namespace)
@@ -79,18 +79,18 @@ class Probe:
         self._executor.wake()
 
     def wait_for(self, predicate: Callable[[], object]) -> None:
-        """Wait until the predicate holds; the probe checks it whenever a message arrives."""
+        """Wait until the predicate holds. The probe checks it whenever a message arrives."""
         assert self.comes_about(predicate), "it did not come about"
 
     def comes_about(self, predicate: Callable[[], object]) -> bool:
-        """Wait for the predicate; return whether it holds within ``PATIENCE_S``."""
+        """Wait for the predicate, and return whether it holds within ``PATIENCE_S``."""
         with self._changed:
             return bool(self._changed.wait_for(predicate, PATIENCE_S))
 
     def wait_for_later_stamp(self, messages: list[Any]) -> None:
         """Wait until the newest message has a timestamp more than 1 s after the call.
 
-        Messages from before the call may still be on their way.
+        Messages with earlier timestamps may still arrive after the call.
         """
         then_ns = self.node.get_clock().now().nanoseconds + 10**9
         self.wait_for(
@@ -117,10 +117,11 @@ class Probe:
         return publisher
 
     def publish_again(self) -> None:
-        """Publish the probe's newest message again, after a delay that is longer than a stall.
+        """Publish the probe's newest message again, some seconds later.
 
-        The driver logs refusals only every ``WARN_EVERY_S``. The delay is longer, so the probe also
-        notices if the driver refuses the message again.
+        The delay is longer than the driver's stall. It is also longer than ``WARN_EVERY_S``, the
+        driver's shortest interval between two logged refusals. So the probe notices if the driver
+        refuses the message again.
         """
 
         def publish() -> None:
@@ -142,7 +143,7 @@ class Probe:
             self.remove(timer)
 
     def wait_for_graph(self, predicate: Callable[[], object]) -> None:
-        """Wait until the predicate holds; the probe checks it every 20 ms."""
+        """Wait until the predicate holds. The probe checks it every 20 ms."""
         held = threading.Event()
 
         def look() -> None:
@@ -155,7 +156,7 @@ class Probe:
         self.remove(timer)
 
     def wait_for_node(self, name: str, namespace: str) -> None:
-        """Wait until the node is discovered; its topics may have been discovered earlier."""
+        """Wait until the node is discovered. Its topics may be discovered earlier."""
         self.wait_for_graph(lambda: (name, namespace) in self.node.get_node_names_and_namespaces())
 
     def remove(self, entity: Any) -> None:
@@ -164,9 +165,9 @@ class Probe:
         self.wait_for_future(self._executor.create_task(destroy, entity))
 
     def client(self, kind: type, service: str) -> Any:
-        """Return the client of a service.
+        """Return the client of a service. Each client is created only once.
 
-        Each client is created only once, because the middleware never forgets a client.
+        The middleware never forgets a client, so new ones for each call would accumulate.
         """
         if service not in self._clients:
             self._clients[service] = self.node.create_client(
@@ -188,7 +189,7 @@ class Probe:
     def call(self, kind: type, service: str, **request: object) -> Any:
         """Call a service and return its answer.
 
-        The call is repeated if a stall of the driver has ended the requested task.
+        If a stall of the driver ends the requested task, the call is repeated.
         """
         for _ in range(20):
             answer = self.call_async(kind, service, **request).wait()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A bag keeps all messages of a driver, and a driver can replay its recorded bytes."""
+"""Tests that record a driver's topics to a bag, and replay the recorded bytes in other drivers."""
 
 import signal
 from contextlib import ExitStack
@@ -65,7 +65,10 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Drive:
 def test_every_topic_comes_out_of_a_bag_as_it_went_in(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """Both storage formats of bags keep all bytes, times and qualities of service."""
+    """All topics of a drive are written to a bag, in both storage formats.
+
+    The bag keeps all bytes, times and qualities of service.
+    """
     recorder = drive.recorder
     recorder.write(tmp_path / "bag", plugin)
     messages, offered = read(tmp_path / "bag")
@@ -75,7 +78,10 @@ def test_every_topic_comes_out_of_a_bag_as_it_went_in(
 
 
 def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
-    """Messages decoded with the standard definitions of Jazzy equal those decoded by rclpy."""
+    """Each recorded message is decoded twice: by rclpy, and with the standard types of Jazzy.
+
+    Both give equal fields.
+    """
     for topic, kind in drive.recorder.types.items():
         for _, data in drive.recorder.messages[topic]:
             ours = deserialize_message(data, message_class(kind))
@@ -83,7 +89,10 @@ def test_who_knows_only_the_standard_types_reads_them_all(drive: Drive) -> None:
 
 
 def test_a_bag_played_back_is_heard_as_it_was(drive: Drive) -> None:
-    """The types and qualities of service in a bag suffice to publish its messages again."""
+    """A bag's messages are published again with the types and qualities of service from the bag.
+
+    A subscriber receives the same bytes.
+    """
     messages, offered = read(drive.bag)
     topics = [topic for topic in messages if topic.startswith(f"/{drive.namespace}/")]
     with Probe("playback") as probe:
@@ -108,7 +117,8 @@ def wire(drive: Drive, topic: str) -> list[bytes]:
 
 
 def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
-    """The raw topics have one message for each read and each write of the port."""
+    """A raw topic has one message for each read of the port, and another topic one for each write.
+    """
     received, sent = (wire(drive, topic) for topic in RAW)
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)
@@ -118,7 +128,7 @@ def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
 
 
 def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
-    """Two drivers that replay one bag publish identical messages, and stay running afterwards."""
+    """Two drivers replay one bag. They publish identical messages, and still run afterwards."""
     with ExitStack() as stack:
         replays = [replay(stack, drive) for _ in range(2)]
         for driver, probe, _ in replays:
@@ -138,7 +148,10 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
 
 
 def replay(stack: ExitStack, drive: Drive) -> tuple[Driver, Probe, dict[str, list[Message]]]:
-    """Start a driver that replays the recorded bytes; return it, its probe and its messages."""
+    """Start a driver that replays the recorded bytes.
+
+    Return it, its probe, and its messages by topic.
+    """
     driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=7"))
     probe = stack.enter_context(Probe(driver.namespace))
     heard = {}
@@ -157,7 +170,7 @@ def by_stamp(messages: list[Message], kind: str) -> dict[tuple[int, int], bytes]
 
 
 def measured(data: bytes, kind: str) -> Any:
-    """Return the fields of a message that depend neither on time nor on the initial pose."""
+    """Return the fields of a message that do not depend on the time or on the initial pose."""
     message = deserialize_message(data, message_class(kind))
     if kind == MEASURED["odom"]:
         return message.twist

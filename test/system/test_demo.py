@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the demo's steering and drawing, and of the complete program as a user runs it."""
+"""Tests of the demo: its steering, its display, and the complete program as a user runs it."""
 
 import math
 import os
@@ -40,7 +40,8 @@ poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
 
 @given(poses, st.integers(0, 1000))
 def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
-    """From any pose the demo commands a speed above zero, and at most its maximum speed."""
+    """The robot may have any pose. The demo always commands motion, at most at its maximum speed.
+    """
     _, twist = square.steer(pose, leg)
     assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
     assert abs(twist.yaw_rate_radps) <= square.YAW_RATE_RADPS
@@ -48,7 +49,7 @@ def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> 
 
 @given(poses, st.integers(0, 1000))
 def test_a_robot_that_cannot_drive_sideways_is_never_told_to(pose: Pose, leg: int) -> None:
-    """``steer_ahead`` always commands motion ahead or a turn, but never sideways motion."""
+    """A robot cannot drive sideways. ``steer_ahead`` only commands it to drive ahead or to turn."""
     _, twist = square.steer_ahead(pose, leg)
     assert twist.vy_mps == 0.0
     assert 0.0 <= twist.vx_mps <= square.SPEED_MPS
@@ -58,7 +59,10 @@ def test_a_robot_that_cannot_drive_sideways_is_never_told_to(pose: Pose, leg: in
 
 @given(st.integers(0, 1000), st.floats(0.0, 0.009), st.floats(-math.pi, math.pi))
 def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, yaw: float) -> None:
-    """Close to the corner that ends a leg, the velocity points along the next leg."""
+    """The robot is close to the corner at the end of a side.
+
+    The demo commands it along the next side.
+    """
     x_m, y_m = CORNERS[leg % 4]
     direction = leg * math.pi / 2
     pose = Pose(x_m - before_m * math.cos(direction), y_m - before_m * math.sin(direction), yaw)
@@ -74,7 +78,10 @@ def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, ya
 def test_the_square_closes(
     steer: Any, yaw_at_the_end: int, x_m: float, y_m: float, yaw_rad: float
 ) -> None:
-    """A robot with a lag of 0.1 s passes all corners and ends a lap with the right heading."""
+    """A robot that follows commands with a lag of 0.1 s drives a lap. It passes all four corners.
+
+    At the end it has the right heading.
+    """
     pose, leg, step_s, lag_s = Pose(x_m, y_m, yaw_rad), 0, 0.08, 0.1
     moving = BodyTwist(0.0, 0.0, 0.0)
     nearest = [math.inf] * 4
@@ -116,7 +123,10 @@ def test_a_status_row_stands_under_its_heading(
 
 @contextmanager
 def running_demo(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Run a demo; yield its process and a mark in its environment; kill all marked processes."""
+    """Run a demo, and yield its process and a mark that all processes of the demo have.
+
+    At the end, kill all processes that have the mark in their environment.
+    """
     mark = uuid.uuid4().hex
     with subprocess.Popen(
         [sys.executable, "-m", "omnibot_driver.demo"],
@@ -140,7 +150,7 @@ def _python_path() -> str:
 def marked(mark: str, name: str = "") -> list[int]:
     """Return the ids of the processes that have ``mark`` in their environment.
 
-    Only processes with ``name`` in their command line count.
+    With ``name``, only processes with this text in their command line are returned.
     """
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
@@ -155,7 +165,7 @@ def marked(mark: str, name: str = "") -> list[int]:
 
 
 def wait_until_all_have_ended(mark: str) -> None:
-    """Wait until all processes with the mark have ended; a guard ends later than its driver."""
+    """Wait until all processes with the mark have ended. A guard ends later than its driver."""
     for pid in marked(mark):
         try:
             process = os.pidfd_open(pid)
@@ -225,10 +235,10 @@ def test_laps_are_told_in_english(
 def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The demo of a robot without an IMU shows no IMU data.
+    """The demo runs for a robot without an IMU that cannot drive sideways.
 
-    If the robot cannot drive sideways, the demo says that the robot turns at the corners. The
-    command for the real robot names the board.
+    The demo does not mention IMU data, and says that the robot turns at the corners. The command
+    for the real robot names the board.
     """
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     page = "docs/boards/cart.md"
@@ -269,7 +279,7 @@ def test_every_board_has_a_demo(name: str) -> None:
 def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """For an unknown board the demo prints one line and starts nothing."""
+    """The user names an unknown board. The demo prints one line and starts nothing."""
     assert main(["--board", "zeppelin"]) == 2
     told = capsys.readouterr().err
     assert told.startswith("demo: parameter 'board' must be one of omnibot")
@@ -277,7 +287,8 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a terminal the monitor shows the demo's driver; the result follows at the end."""
+    """The demo runs on a terminal. The monitor shows the driver, and the result follows at the end.
+    """
     monkeypatch.setenv("DEMO_SECONDS", "20")  # the monitor may find the driver or draw late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")
@@ -289,7 +300,10 @@ def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
-    """After SIGINT or SIGTERM the demo prints its result, exits with 0 and leaves no process."""
+    """SIGINT or SIGTERM arrives during the drive.
+
+    The demo prints its result, exits with 0 and leaves no process.
+    """
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.send_signal(number)
@@ -301,7 +315,7 @@ def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 def test_who_ends_it_before_it_drives_is_told_so() -> None:
-    """If a signal ends the demo before the robot has driven, one line says so."""
+    """A signal ends the demo before the robot has driven. One line says so."""
     with running_demo() as (process, mark):
         assert process.stdout is not None
         for line in process.stdout:
@@ -315,7 +329,8 @@ def test_who_ends_it_before_it_drives_is_told_so() -> None:
 
 
 def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
-    """If the driver is killed, the demo says so, exits with 1, and ends the simulator."""
+    """The driver is killed during the demo. The demo says so, exits with 1 and ends the simulator.
+    """
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         (driver,) = marked(mark, "omnibot_driver.driver")
@@ -328,7 +343,7 @@ def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
 
 
 def test_a_killed_demo_leaves_nobody_behind() -> None:
-    """If the demo is killed by SIGKILL, the simulator and the driver still end."""
+    """The demo is killed by SIGKILL. The simulator and the driver still end."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.kill()
@@ -338,7 +353,7 @@ def test_a_killed_demo_leaves_nobody_behind() -> None:
 
 @pytest.mark.parametrize("value", ["soon", "0", "-3", "nan"])
 def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
-    """For an invalid ``DEMO_SECONDS`` the demo prints one line and exits with code 2."""
+    """``DEMO_SECONDS`` is invalid. The demo prints one line and exits with code 2."""
     with running_demo(DEMO_SECONDS=value) as (process, _):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 2
@@ -348,7 +363,7 @@ def test_wrong_seconds_are_refused_in_one_sentence(value: str) -> None:
 def test_an_argument_that_it_does_not_know_drives_nothing(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """For an unknown argument the demo prints a message with its name and exits with code 2."""
+    """The user gives an unknown argument. The demo's message names it, and the exit code is 2."""
     with pytest.raises(SystemExit) as ended:
         main(["port:=/dev/ttyUSB0"])
     assert ended.value.code == 2

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A super client finds a fleet through a Fast DDS discovery server, as docs/fleet.md says."""
+"""Test that a super client finds a fleet through a discovery server, as docs/fleet.md says."""
 
 import os
 import shutil
@@ -29,7 +29,8 @@ def program(
 ) -> Iterator[subprocess.Popen[str]]:
     """Run a program while the context lasts.
 
-    Then close its input, and kill it if it has not ended after ``ends_within_s``.
+    At the end, close the program's input. Kill the program if it still runs after
+    ``ends_within_s``.
     """
     process = subprocess.Popen(
         command,
@@ -59,9 +60,9 @@ def free_udp_port() -> int:
 
 
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
-    """The observer finds 16 drivers through the discovery server.
+    """16 drivers and an observer are clients of a discovery server. The observer finds all drivers.
 
-    All participants are clients of the server, so the observer finds no driver by multicast.
+    A client of a server does not use multicast, so the observer cannot find a driver by multicast.
     """
     port = str(free_udp_port())
     environment = {

@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver as a process on a pseudo-terminal that loses bytes, observed by its topics."""
+"""Test of a long drive with the driver as a process, on a line that loses bytes."""
 
 from drive import drive
 
 
 def test_over_a_bad_line_every_message_is_what_the_board_sent_and_odom_is_its_pose() -> None:
-    """On a line that loses single bytes and bursts, at most 3 of 2,500 messages are wrong.
+    """The robot drives for 20 s, and its line loses single bytes and bursts.
 
-    The test drives for 20 s. ``drive.py`` as a program can run longer.
+    At most 3 of 2,500 messages are wrong. ``drive.py`` as a program can run longer.
     """
     outcome = drive(20.0, lose=0.001, burst=0.0005)
     assert outcome.bytes_lost > 100, outcome

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver has no topics, services and parameters for features that its board lacks."""
+"""Tests of a board with few features: the driver has no interfaces for what the board lacks."""
 
 import json
 from collections.abc import Callable
@@ -47,7 +47,10 @@ def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
 def test_what_a_board_lacks_is_not_advertised(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """For a board without IMU, wheel commands and pause, the driver has no interface for them."""
+    """The board has no IMU, no wheel commands and no pause. The driver has no interfaces for these.
+
+    It has no topics, services and parameters of theirs.
+    """
     driver = start_plain(start_driver, start_board().path)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -79,9 +82,10 @@ def test_what_a_board_lacks_is_not_advertised(
 def test_a_deleted_parameter_does_not_block_the_others(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver refuses to delete an optional parameter.
+    """A user asks to delete an optional parameter. The driver refuses.
 
-    The driver reads this parameter at each later change of any parameter.
+    It reads all parameters at each later change of one, so a deleted parameter would block every
+    change.
     """
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))
     deleted = [RosParameter(name="gain", value=ParameterValue())]
@@ -122,7 +126,7 @@ def test_the_monitor_shows_what_the_board_has(
     probe_of: Start,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """For a board without an IMU the monitor neither shows one nor reports it as missing."""
+    """The board has no IMU. The monitor neither shows an IMU nor reports it as missing."""
     driver = start_plain(start_driver, start_board().path)
     probe_of(driver).wait_for_state("nominal")
     assert main(["--json", "--namespace", driver.namespace]) == 0
@@ -160,7 +164,10 @@ def test_what_means_nothing_to_the_board_is_refused(
 
 
 def test_a_board_that_is_not_there_ends_the_start(start_driver: Start) -> None:
-    """For an unknown board the driver lists the known boards and exits with code 2."""
+    """The parameter ``board`` names an unknown board.
+
+    The driver lists the known boards and exits with code 2.
+    """
     driver: Driver = start_driver("/dev/null", board="martha")
     driver.wait_for_line("cannot start: parameter 'board' must be one of omnibot")
     assert driver.end() == 2

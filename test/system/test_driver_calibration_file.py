@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver reports at its start what it reads from its calibration file, and what it ignores."""
+"""Tests of the log at the driver's start: what the calibration file sets, and what is ignored."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +13,7 @@ WARNED = "calibration_file {} does not exist, so nothing is loaded from it; chec
 
 
 def said_of(path: Path, start_driver: Start) -> str:
-    """Start a driver with the calibration file; return its only log line about the file."""
+    """Start a driver with the calibration file, and return its only log line about the file."""
     driver = start_driver("/dev/null", calibration_file=path)
     driver.wait_for_line("is not a serial port")
     (line,) = [line for line in driver.lines if "calibration_file" in line]
@@ -24,7 +24,7 @@ def said_of(path: Path, start_driver: Start) -> str:
 def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     start_driver: Start, tmp_path: Path, is_there: bool
 ) -> None:
-    """The driver starts with a missing or empty file, but warns, as its path may be mistyped."""
+    """The calibration file is missing or empty. The driver starts, and warns of a mistyped path."""
     path = tmp_path / "robt.yaml"
     if is_there:
         path.write_text("# nothing yet\n")
@@ -35,9 +35,9 @@ def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
 
 
 def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) -> None:
-    """The driver names the parameters that the file sets in a single line of its log.
+    """One log line names the parameters that the calibration file sets.
 
-    The line omits the notes that the tools add to the file.
+    The line omits the notes that the tools have added to the file.
     """
     path = tmp_path / "robot.yaml"
     path.write_text("axis_signs: [1, -1, -1]\nimu_rpy: [0, 0, 0]\nstep: {}\nlinear_scale: 80\n")
@@ -49,7 +49,10 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
 def test_names_that_are_not_read_are_told_with_the_nearest(
     start_driver: Start, tmp_path: Path
 ) -> None:
-    """One warning lists all names that the driver does not read, with the nearest known name."""
+    """The calibration file has names that the driver does not read. One warning lists them all.
+
+    A mistyped name is listed with the nearest known name.
+    """
     path = tmp_path / "robot.yaml"
     path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")
     line = said_of(path, start_driver)
@@ -63,7 +66,10 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
 
 
 def test_a_home_that_nobody_has_ends_the_start(start_driver: Start) -> None:
-    """For the home directory of an unknown user the driver asks for the full path and exits."""
+    """The file's path is in the home directory of an unknown user.
+
+    The driver asks for the full path and exits with code 2.
+    """
     driver = start_driver("/dev/null", calibration_file="~nosuchuser/c.yaml")
     driver.wait_for_line("the calibration_file ~nosuchuser/c.yaml cannot be found: .*full path")
     assert driver.end() == 2

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands that the driver obeys or refuses, sent by another process over real DDS."""
+"""Tests of commands that another process sends over real DDS, and that the driver obeys or refuses.
+"""
 
 import math
 import re
@@ -33,9 +34,9 @@ def newest(board: SimulatedBoard) -> ReceivedCommand:
 
 
 def test_cmd_vel_reaches_the_board_as_the_manuals_frame(probe: Probe, board: PtyBoard) -> None:
-    """The board receives 0.3 m/s, -0.2 m/s and 0.5 rad/s as 21, -14 and 250 LSB.
+    """A user commands 0.3 m/s, -0.2 m/s and 0.5 rad/s. The board receives 21, -14 and 250 LSB.
 
-    After the command timeout the board receives Stop.
+    After the command timeout, the board receives Stop.
     """
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -62,9 +63,10 @@ omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path, topic: str
 ) -> None:
-    """The driver refuses an old command by its send time, which the middleware provides.
+    """The driver's executor is blocked while a command arrives, so the command waits for 2 s.
 
-    The refusal does not depend on the stamp of a goal. The driver obeys the next command.
+    The driver refuses the command by its send time, which the middleware provides. The stamp of a
+    goal has no effect. The driver obeys the next command.
     """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)
@@ -110,7 +112,10 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 def test_a_zero_twist_is_the_stop_frame(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """A zero Twist ends a motion at once by the Stop frame, never by a zero velocity frame."""
+    """A zero Twist arrives while the robot drives. The driver sends the Stop frame at once.
+
+    It never sends a velocity frame with zeros.
+    """
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
     commands = probe.publisher(Twist, "cmd_vel")
@@ -125,7 +130,8 @@ def test_a_zero_twist_is_the_stop_frame(
 
 
 def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
-    """The driver sends 10 rad/s of a wheel with a radius of 29 mm as 20 LSB."""
+    """A user commands a wheel to turn at 10 rad/s. The driver sends 20 LSB for a radius of 29 mm.
+    """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=[10.0, -10.0, 0.0]))
     assert board.wait_for(lambda b: obeyed(b, "wheels", 20, -20, 0), PATIENCE_S)
@@ -143,7 +149,12 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
 def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     probe: Probe, driver: Driver, board: PtyBoard, data: list[float], reason: str
 ) -> None:
-    """The driver rejects a wrong wheel_cmd with a reason, and obeys the next correct one."""
+    """A wheel_cmd has a wrong number of values, or NaN or infinity.
+
+    The driver rejects it with a reason.
+
+    The driver obeys the next correct one.
+    """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))
     driver.wait_for_line(f"wheel_cmd rejected.*{reason}")
@@ -156,7 +167,10 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """NaN or infinity is rejected even in axes that the driver ignores: the sender is faulty."""
+    """A Twist has NaN or infinity in an axis, even one that the driver ignores. It is rejected.
+
+    Such a value shows that the sender is faulty.
+    """
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.y = 0.3
@@ -168,7 +182,10 @@ def test_a_twist_that_is_not_finite_anywhere_is_refused(
 
 
 def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBoard) -> None:
-    """A command of 1e300 m/s to the front left is limited to 0.5 m/s in the same direction."""
+    """A user commands 1e300 m/s to the front left.
+
+    The driver commands its limit in the same direction.
+    """
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.x = twist.linear.y = 1e300
@@ -177,7 +194,10 @@ def test_a_huge_twist_is_limited_in_its_own_direction(probe: Probe, board: PtyBo
 
 
 def test_the_estop_topic_latches_and_never_releases(probe: Probe, board: PtyBoard) -> None:
-    """The value true on the topic ``estop`` latches the e-stop; only the service releases it."""
+    """A button publishes true on ``estop``, and then false. The e-stop stays latched.
+
+    Only the service can release it.
+    """
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop")
     button.publish(Bool(data=True))
@@ -211,7 +231,10 @@ def test_stamped_commands_are_taken_instead_when_the_parameter_says_so(
 def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is_taken(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver refuses a command older than ``cmd_vel_timeout``, unless its stamp is zero."""
+    """A stamped command is older than ``cmd_vel_timeout``. The driver refuses it.
+
+    The driver obeys a command whose stamp is zero.
+    """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -230,9 +253,9 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 
 
 def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
-    """The driver warns once if a node publishes cmd_vel with the other message type.
+    """A node publishes cmd_vel with the wrong message type. The driver warns of it once.
 
-    The middleware does not deliver such commands to the driver, and does not report them.
+    The middleware does not deliver such commands, and does not report them either.
     """
     reports = probe.listen(DiagnosticArray, "/diagnostics")
     probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
@@ -247,7 +270,10 @@ def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver
 def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
     probe: Probe, driver: Driver
 ) -> None:
-    """The driver warns of a best-effort publisher of cmd_vel, whose commands it cannot receive."""
+    """A node publishes cmd_vel best-effort, so the driver cannot receive it.
+
+    The driver warns of this.
+    """
     quality = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
     probe.node.create_publisher(Twist, "cmd_vel", quality)
     driver.wait_for_line("incompatible QoS.*RELIABILITY")
@@ -256,9 +282,10 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
 def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Under positional control the robot drives to a goal 0.25 m ahead in odom.
+    """The board is under positional control, and a user gives a goal 0.25 m ahead in odom.
 
-    Velocity commands are refused. The origin of odom differs from that of the board's frame.
+    The robot drives to the goal, although the board's frame has another origin than odom. Velocity
+    commands are refused.
     """
     board = start_board(
         control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""However the driver ends, it sends Stop last, and the exit code gives the reason."""
+"""Tests of all ways in which the driver can end.
+
+It sends Stop last, and its exit code gives the reason.
+"""
 
 import contextlib
 import os
@@ -42,9 +45,10 @@ import omnibot_driver.driver as driver, omnibot_driver.link as link
 link.STANDS_WITHIN_S = link.SILENCE_S = link.JOIN_TIMEOUT_S = 10.0
 driver.LONGEST_END_S = 50.0
 """
-"""Code that sets longer time limits, because a busy computer delays the board's report of rest.
+"""Code that sets longer time limits for the driver's end.
 
-On an idle computer the report comes early, and the limits have no effect.
+A busy computer delays the board's report of a standstill. On an idle computer the report comes
+early, and the limits have no effect.
 """
 
 
@@ -62,7 +66,12 @@ On an idle computer the report comes early, and the limits have no effect.
 def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     start_board: Start, start_driver: Start, probe_of: Start, signals: list[signal.Signals]
 ) -> None:
-    """Ctrl-C on ``ros2 launch`` sends two signals; the driver still sends Stop and exits with 0."""
+    """One or two signals arrive while the robot drives.
+
+    The driver sends Stop and exits with code 0.
+
+    Ctrl-C on ``ros2 launch`` sends two signals.
+    """
     board = start_board()
     driver: Driver = start_driver(board.path, before=PATIENT)
     probe: Probe = probe_of(driver)
@@ -86,14 +95,17 @@ join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 100 * timeout)
 atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in executors)))
 """
-"""Code that makes the driver print how many executors are still running at its exit.
+"""Code that makes the driver print how many executors still run at its exit.
 
-It also makes the driver wait longer for threads, which a busy computer delays.
+It also makes the driver wait longer for its threads, which a busy computer delays.
 """
 
 
 def test_the_executor_is_shut_down_before_python_ends(start_driver: Start) -> None:
-    """The driver shuts its executor down; if Python did it at exit, rclpy might print an error."""
+    """The driver shuts its executor down itself at its end.
+
+    If this were left to the exit of Python, rclpy might print an error.
+    """
     driver: Driver = start_driver("sim://", before=PATIENT + REPORTS_EXECUTORS)
     driver.wait_for_line("state: nominal")
     assert driver.end(signal.SIGTERM) == 0
@@ -118,7 +130,12 @@ node.OmniBotDriver._on_estop_topic = lambda self, message: rclpy.shutdown()
 def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
     start_board: Start, start_driver: Start, probe_of: Start, before: str, exit_code: int
 ) -> None:
-    """A defect ends the driver with exit code 1, a shutdown of ROS with 0; both send Stop last."""
+    """A callback has a defect, or ROS is shut down, while the robot drives.
+
+    The driver sends Stop last.
+
+    It exits with code 1 after a defect, and with 0 after a shutdown.
+    """
     board = start_board()
     driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
@@ -133,9 +150,9 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 def test_a_board_that_takes_nothing_any_more_does_not_hold_up_the_end(
     start_driver: Start, probe_of: Start, silent_terminal: tuple[int, str]
 ) -> None:
-    """The driver ends even if the kernel's buffer for data to the board is full.
+    """The kernel's buffer for data to the board is full. The driver still ends.
 
-    The guard then keeps trying to send Stop.
+    Its guard then tries to send Stop until there is room.
     """
     far, path = silent_terminal
     driver: Driver = start_driver(path, auto_start=False)
@@ -173,9 +190,9 @@ def test_the_board_can_be_left_paused_or_reset(
 
 
 def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
-    """If the driver's output is not read, command timeout, e-stop and SIGTERM still work.
+    """The driver's output is not read. Command timeout, e-stop and SIGTERM still work.
 
-    Examples are a terminal stopped by ctrl-S, and a pipe whose reader hangs.
+    Examples are a terminal that ctrl-S has stopped, and a pipe whose reader hangs.
     """
     board = start_board(running=True)
     reading, writing = os.pipe()

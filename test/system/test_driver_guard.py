@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot stops if the driver is killed, crashes or hangs while the robot moves."""
+"""Tests that the robot stops if the driver is killed, crashes or hangs while the robot moves."""
 
 import math
 import os
@@ -34,7 +34,7 @@ def twist(vx_mps: float) -> Twist:
 
 
 def driving(probe: Probe, board: PtyBoard) -> Any:
-    """Publish commands until the robot moves; return the publisher."""
+    """Publish commands until the robot moves, and return the publisher."""
     commands = probe.publisher(Twist, "cmd_vel")
     for _ in range(20):  # a stall of the computer stops the robot
         commands.publish(twist(0.3))
@@ -49,7 +49,7 @@ def still(board: SimulatedBoard) -> bool:
 
 
 def hang(driver: Driver, board: PtyBoard) -> int:
-    """Suspend the driver; return the number of bytes that the board has received from it."""
+    """Suspend the driver, and return the number of bytes that the board has received from it."""
     driver.process.send_signal(signal.SIGSTOP)
     stat = Path(f"/proc/{driver.process.pid}/stat")
     wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == "T")
@@ -59,7 +59,7 @@ def hang(driver: Driver, board: PtyBoard) -> int:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
-    """Poll the predicate until it holds; processes and log lines give no event to wait for."""
+    """Poll the predicate until it holds. Processes and log lines give no event to wait for."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
@@ -70,7 +70,8 @@ def wait_until(predicate: Callable[[], object]) -> None:
 def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
     board: PtyBoard, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """The guard stops the robot of a dead driver, without sending an emergency stop."""
+    """The driver dies while the robot drives. The guard stops the robot without an emergency stop.
+    """
     driving(probe, board)
     assert driver.end(number) == -number
     assert board.wait_for(still, PATIENCE_S)
@@ -82,7 +83,10 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
 def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """If the driver dies during the e-stop, the guard repeats emergency stop and then Stop."""
+    """The driver dies while the e-stop is latched.
+
+    The guard repeats the emergency stop, each time followed by Stop.
+    """
     driving(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
     mark = len(board.board.received)
@@ -98,7 +102,10 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
     board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
 ) -> None:
-    """A new driver retries until the guard of a killed driver has released the port."""
+    """A driver is killed, and its guard still uses the port.
+
+    A new driver tries again until the guard has released the port.
+    """
     driving(probe, board)
     driver.end(signal.SIGKILL)
     successor: Driver = start_driver(board.path)
@@ -110,9 +117,10 @@ def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
 def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The guard stops the robot of a hanging driver; later only a fresh command moves the robot.
+    """The driver hangs while the robot drives, and the guard stops the robot.
 
-    A command that waited in the middleware during the hang is not fresh.
+    Commands wait in the middleware during the hang. When the driver runs again, it refuses them.
+    Only a command that is sent later moves the robot.
     """
     commands = driving(probe, board)
     mark = hang(driver, board)
@@ -155,9 +163,12 @@ CLOCK_BOOTTIME also counts the time for which a host is suspended.
 def test_a_robot_is_stopped_when_its_host_was_suspended(
     board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """After a suspension of its host the driver discards the old command and stops the robot.
+    """The computer is suspended while the robot drives.
 
-    The clock for the command timeout does not advance during a suspension.
+    When it resumes, the driver stops the robot.
+
+    The clock for the command timeout does not advance during a suspension. The driver still
+    discards the old command.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
@@ -176,9 +187,11 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
     board: PtyBoard, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver refuses a command that was sent while it hung, even if the stamp is recent.
+    """A stamped command is sent while the driver hangs.
 
-    The stamp may come from a planner that does not know about the hang.
+    The driver refuses it, although its stamp is recent.
+
+    The sender may be a planner that does not know about the hang.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)
@@ -203,7 +216,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_again(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """A command that was refused after a hang is obeyed when its sender repeats it."""
+    """A command is sent while the driver hangs, and is refused. The driver obeys its repetition."""
     commands = probe.publisher(Twist, "cmd_vel")
     mark = hang(driver, board)
     commands.publish(twist(0.2))
@@ -216,7 +229,8 @@ def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_a
 def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The driver logs the death of a guard and starts another one, which also stops the robot."""
+    """A guard is killed. The driver logs this and starts another guard, which also stops the robot.
+    """
     with probe.commanding(0.3):
         (first,) = driver.guards()
         os.kill(first, signal.SIGKILL)
@@ -230,7 +244,10 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 def test_every_connection_has_one_guard_and_no_process_stays_behind(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """Each of five connections has a guard of its own; no guard remains after the driver's end."""
+    """The board is plugged in five times. Each connection has a guard of its own.
+
+    After the driver's end, no guard is left.
+    """
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     probe: Probe = probe_of(driver)
@@ -251,7 +268,10 @@ def test_every_connection_has_one_guard_and_no_process_stays_behind(
 
 
 def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: Probe) -> None:
-    """After ctrl-C the driver stops the robot without an emergency stop."""
+    """The user presses ctrl-C while the robot drives.
+
+    The driver stops it without an emergency stop.
+    """
     driving(probe, board)
     assert driver.end(signal.SIGINT) == 0
     with board.lock:
@@ -260,7 +280,7 @@ def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: P
 
 
 def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> None:
-    """With ``guard: false``, which is meant for use with a debugger, the driver has no guard."""
+    """The parameter ``guard`` is false, for use with a debugger. The driver has no guard."""
     driver: Driver = start_driver(board.path, guard=False)
     driver.wait_for_line("state: nominal")
     assert driver.guards() == []

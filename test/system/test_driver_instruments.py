@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Joint states, diagnostics, transforms and the calibration of the gyro, over real DDS."""
+"""Tests of joint states, diagnostics, transforms and the gyro calibration, over real DDS."""
 
 import importlib.util
 import math
@@ -30,7 +30,10 @@ HAS_TF2 = importlib.util.find_spec("tf2_ros") is not None
 
 
 class Robot:
-    """A board and a driver that the tests of this module share; each test ends at rest."""
+    """A board and a driver that all tests of this module share.
+
+    At the end of each test the robot rests.
+    """
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self.file = folder / "calibration.yaml"
@@ -50,7 +53,7 @@ class Robot:
         self.reports = self.probe.listen(DiagnosticArray, "/diagnostics")
 
     def status(self, name: str) -> Any:
-        """Return the newest diagnostic status of this name from this robot, or None."""
+        """Return this robot's newest diagnostic status with this name, or None."""
         found = [
             status
             for report in self.reports
@@ -74,9 +77,11 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def test_the_gyro_is_calibrated_saved_and_loaded_again(
     robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """``~/calibrate_gyro`` reports the planted bias, subtracts it, and saves it in the file.
+    """The simulated gyro has a known bias.
 
-    Another driver loads the bias from the file.
+    ``~/calibrate_gyro`` reports it and saves it in the file.
+
+    The driver then subtracts the bias. Another driver loads it from the file.
     """
     planted = [math.radians(value) for value in PLANTED_DPS]
     answer = robot.probe.call(Trigger, "calibrate_gyro")
@@ -97,7 +102,7 @@ def test_the_gyro_is_calibrated_saved_and_loaded_again(
 
 
 def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot) -> None:
-    """If the calibration file is damaged, a new gyro bias is applied, but not saved."""
+    """The calibration file is damaged. A new gyro bias is applied, but not saved."""
     robot.file.write_text("gyro_bias: [1, 2")
     answer = robot.probe.call(Trigger, "calibrate_gyro")
     assert not answer.success
@@ -110,7 +115,7 @@ def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot)
 def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     tmp_path: Path, start_driver: Callable[..., Driver]
 ) -> None:
-    """For a damaged calibration file the driver says what to do and exits with code 2."""
+    """The calibration file is damaged. The driver says what to do and exits with code 2."""
     path = tmp_path / "robot.yaml"
     path.write_text("gyro_bias: [1, 2")
     driver = start_driver("/dev/null", calibration_file=path)
@@ -121,9 +126,9 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
 def test_the_bias_is_what_was_set_last(
     start_board: Callable[..., PtyBoard], start_driver: Callable[..., Driver], probe_of: Any
 ) -> None:
-    """A ``gyro_bias`` that the user sets replaces the bias that the driver has refined at rest.
+    """The driver has refined the gyro bias at rest, and the user sets ``gyro_bias``.
 
-    That holds even if the parameter already has the new value.
+    The user's value replaces the refined one, even if the parameter has this value already.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
@@ -142,9 +147,9 @@ def test_the_bias_is_what_was_set_last(
 
 
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
-    """In joint_states the wheels turn as wheel_cmd commands: same order, signs and units.
+    """A user sends wheel_cmd. The wheels in joint_states turn at the commanded rates.
 
-    The angles of the wheels grow while the wheels turn.
+    Order, signs and units are the same. The angles of the wheels grow while the wheels turn.
     """
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
@@ -176,7 +181,8 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     """The diagnostics have seven statuses, show the expected IMU rate, and count no faults."""
 
     def keeps_pace() -> bool:
-        """Return whether the IMU rate is right; after a stall it is at first low, and then high."""
+        """Return whether the IMU rate is right. After a stall it is first too low, then too high.
+        """
         if (status := robot.status("Stream")) is None:
             return False
         values = {value.key: value.value for value in status.values}
@@ -204,7 +210,7 @@ def test_the_updater_publishes_where_it_is_installed(robot: Robot) -> None:
 
 
 def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> None:
-    """Frame names in odom begin with ``frame_prefix``; a missing tf2_ros is reported once."""
+    """Frame names in odom begin with ``frame_prefix``. A missing tf2_ros is reported once."""
     odometry = robot.probe.listen(Odometry, "odom")
     robot.probe.wait_for(lambda: odometry)
     assert odometry[-1].header.frame_id == "robot1/odom"
@@ -217,9 +223,9 @@ def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> No
 def test_who_does_not_want_transforms_hears_nothing_of_tf(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """With ``publish_tf: false`` the driver does not warn that tf2_ros is missing.
+    """The parameter ``publish_tf`` is false. The driver does not warn that tf2_ros is missing.
 
-    The driver still warns of simulated time on a real port.
+    It still warns of simulated time on a real port.
     """
     driver = start_driver("/dev/null", publish_tf=False, use_sim_time=True)
     driver.wait_for_line("use_sim_time is set, but the board on /dev/null runs in real time")
@@ -229,9 +235,12 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """With ``use_sim_time`` the driver publishes measurements only once /clock has a time.
+    """The parameter ``use_sim_time`` is true, and /clock has no time yet.
 
-    That also holds for a simulated board, whose own time differs from /clock.
+    No measurements are published.
+
+    When /clock has a time, measurements are published. This also applies to a simulated board,
+    whose own time differs from /clock.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

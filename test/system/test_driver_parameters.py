@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver checks its parameters and arguments, at its start and while it runs."""
+"""Tests of the driver's parameters and arguments, at its start and while it runs."""
 
 import os
 import signal
@@ -42,7 +42,8 @@ Start = Callable[..., Any]
 def test_wrong_parameters_end_the_start_with_a_sentence(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """For a wrong parameter the driver prints a reason, without a traceback, and exits with 2."""
+    """A parameter is wrong. The driver prints the reason without a traceback and exits with code 2.
+    """
     driver: Driver = start_driver("/dev/null", **parameters)
     driver.wait_for_line(message)
     assert driver.end() == 2
@@ -60,7 +61,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     ],
 )
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
-    """The driver does not start with unknown arguments, as it might open the wrong port."""
+    """An argument is unknown. The driver does not start, because it might open the wrong port."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -73,7 +74,7 @@ def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -
 )
 @pytest.mark.parametrize("before", [[], ["--ros-args"]])
 def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list[str]) -> None:
-    """If ``-p`` is missing before a parameter, the message shows how to write it."""
+    """The user forgets ``-p`` before a parameter. The message shows how to write it."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *before, *words]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -90,7 +91,8 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
-    """``--help`` explains parameters and works without any library, with exit code 0."""
+    """``--help`` explains how to give parameters. It works without any library, with exit code 0.
+    """
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
@@ -100,7 +102,7 @@ def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
 
 
 def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
-    """If the reader of ``--help`` is gone, such as a closed pager, the exit code is still 0."""
+    """The reader of ``--help`` is gone, for example a closed pager. The exit code is still 0."""
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-c", WITHOUT_ROS, "--help"]
@@ -110,7 +112,7 @@ def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
 
 
 OPENS_NOTHING = "import serial; serial.serial_for_url = None"
-"""Code that prevents the driver from opening a port, because a robot may be on the default port."""
+"""Code that keeps the driver from opening a port. A real robot may be on the default port."""
 
 
 @pytest.mark.parametrize(
@@ -120,9 +122,9 @@ OPENS_NOTHING = "import serial; serial.serial_for_url = None"
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
 ) -> None:
-    """The driver reports a parameter file for another node.
+    """A parameter file is for another node. The driver reports this.
 
-    ROS ignores such a file silently, and the driver would use its default port.
+    ROS ignores such a file without a message, so the driver would use its default port.
     """
     path = tmp_path / "driver.yaml"
     path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
@@ -152,9 +154,9 @@ def real(value: float) -> ParameterValue:
 def test_tuning_changes_while_running_and_identity_does_not(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A new ``linear_scale`` applies to the next command; ``port`` cannot be changed.
+    """A user changes ``linear_scale``, and the next command uses the new value.
 
-    Values out of range are rejected.
+    The parameter ``port`` cannot be changed, and values out of range are rejected.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))
@@ -179,7 +181,10 @@ def test_tuning_changes_while_running_and_identity_does_not(
 def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A new ``linear_scale`` also applies to the command that the driver is repeating."""
+    """A user changes ``linear_scale`` while the driver repeats a command.
+
+    The repetition uses the new value.
+    """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, cmd_vel_timeout=10.0))
     probe.wait_for_state("nominal")
@@ -200,7 +205,7 @@ def test_the_command_that_is_repeated_is_said_in_a_new_scale(
 def test_every_parameter_is_described(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Every parameter has a description with its unit, and those with limits have a range."""
+    """Every parameter has a description with its unit. A parameter with limits also has a range."""
     probe: Probe = probe_of(start_driver(start_board().path))
     names = [parameter.name for parameter in PARAMETERS.rows]
     descriptors = probe.call(DescribeParameters, "describe_parameters", names=names).descriptors
@@ -216,9 +221,9 @@ def test_every_parameter_is_described(
 def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """``max_linear_speed`` must not exceed ``fastest_linear_speed``, the limit of odometry.
+    """A user sets ``max_linear_speed`` above ``fastest_linear_speed``, the limit of odometry.
 
-    The driver refuses a change of either parameter that breaks this rule, and keeps the old value.
+    The driver refuses this, whichever of the two parameters is changed, and keeps the old value.
     One request may raise both parameters. The same holds for the angular speeds.
     """
     board = start_board()

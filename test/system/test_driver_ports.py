@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ports that are missing, busy or wrong, that appear late, or that deliver garbage."""
+"""Tests of ports that are missing, busy or wrong, that appear late, or that deliver garbage."""
 
 import os
 import signal
@@ -32,7 +32,10 @@ def descriptors(driver: Driver) -> int:
 def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The driver reports a missing port once, and starts a board that is plugged in later."""
+    """The port is missing.
+
+    The driver reports this once, and starts a board that is plugged in later.
+    """
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)
     driver.wait_for_line("does not exist.*by-id")
@@ -46,7 +49,10 @@ def test_a_missing_port_is_named_once_and_the_driver_waits_for_it(
 def test_an_unplugged_board_is_found_again(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The driver opens the port of a replugged board, and does not leak file descriptors."""
+    """A board is unplugged twice and plugged in again. The driver opens its port each time.
+
+    No file descriptors are left open.
+    """
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):
         driver: Driver = start_driver(str(link), reconnect_interval=0.05)
@@ -67,7 +73,10 @@ def test_an_unplugged_board_is_found_again(
 def test_a_stop_that_cannot_be_sent_is_said_at_the_end(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """If the board is unplugged while driving, the driver logs at its end that no stop was sent."""
+    """The board is unplugged during a drive, and the driver ends.
+
+    Its log says that no stop was sent.
+    """
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)) as board:
         driver: Driver = start_driver(str(link), cmd_vel_timeout=10.0)
@@ -85,9 +94,11 @@ def test_a_stop_that_cannot_be_sent_is_said_at_the_end(
 def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
     start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """With the port closed, ``~/estop`` answers that the stop will be sent once it opens.
+    """The board is unplugged, and a user calls ``~/estop``.
 
-    The log says that the service latched the e-stop.
+    The stop will be sent when the port opens.
+
+    The answer says so. The log says that the service latched the e-stop.
     """
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):
@@ -103,7 +114,10 @@ def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
 def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
     start_board: Start, start_driver: Start
 ) -> None:
-    """The second driver says that the port is in use; two drivers would contradict each other."""
+    """A second driver starts on the same port. It says that the port is in use.
+
+    Two drivers would send contradictory commands.
+    """
     board = start_board()
     first: Driver = start_driver(board.path)
     first.wait_for_line("is open")
@@ -128,7 +142,10 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """For an impossible port the driver logs the reason and keeps trying until SIGINT ends it."""
+    """The port's name is impossible.
+
+    The driver logs the reason and keeps trying until SIGINT ends it.
+    """
     driver: Driver = start_driver(port)
     driver.wait_for_line(reason)
     assert driver.process.poll() is None
@@ -139,7 +156,10 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
     start_driver: Start, probe_of: Start, silent_port: str, write_to_silent_port: Start
 ) -> None:
-    """Garbage, such as after a wrong baud rate, is not published; valid frames after it are."""
+    """The line delivers garbage, as with a wrong baud rate. The driver does not publish it.
+
+    Valid frames after the garbage are published.
+    """
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     imu = probe.listen(Imu, "imu/data_raw")
@@ -153,7 +173,7 @@ def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(
 
 
 def test_a_port_that_flaps_is_told_once(start_driver: Start) -> None:
-    """If a server closes each connection at once, the driver reports the open port only once."""
+    """A server closes each connection at once. The driver reports the open port only once."""
     server = socket.create_server(("127.0.0.1", 0))
     port = f"socket://127.0.0.1:{server.getsockname()[1]}"
     driver: Driver = start_driver(port, reconnect_interval=0.05)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that call each service from another process and check the board's commands and modes."""
+"""Tests that call the driver's services and check the board's commands and modes."""
 
 import math
 import signal
@@ -43,9 +43,9 @@ def drive(probe: Probe, board: PtyBoard) -> None:
 
 
 def drive_away(probe: Probe, board: PtyBoard) -> None:
-    """Drive forward and stop, again if necessary, until the robot is more than 0.1 m away.
+    """Drive forward and stop. Repeat this until the robot is more than 0.1 m away.
 
-    On a busy computer the robot may stop earlier.
+    On a busy computer the robot may stop early.
     """
     for _ in range(20):
         drive(probe, board)
@@ -57,7 +57,7 @@ def drive_away(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
-    """The driver answers each of a hundred simultaneous calls of ``~/estop``.
+    """A hundred calls of ``~/estop`` arrive at once. The driver answers each of them.
 
     The last call decides whether the e-stop is latched.
     """
@@ -70,10 +70,9 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """The value true on ``estop`` latches the e-stop, even if false follows at once.
+    """A button publishes true on ``estop``, and false as soon as the user releases it.
 
-    In the test all messages wait while the driver is suspended. A real button publishes false when
-    the user releases it.
+    The driver is suspended, so all messages wait and arrive together. The e-stop is still latched.
     """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
@@ -86,9 +85,9 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
-    """Repeated calls of ``~/pause`` keep the requested mode, because the driver sends P only once.
+    """A user calls ``~/pause`` twice with the same value. The board keeps the requested mode.
 
-    P toggles between running and paused.
+    The command P toggles between running and paused, so the driver sends it only once.
     """
     for data, mode in [
         (True, BoardMode.PAUSED),
@@ -106,7 +105,10 @@ def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board
 def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
     probe: Probe, board: PtyBoard
 ) -> None:
-    """The driver sends Stop before P; after the pause the robot rests until a new command."""
+    """A user pauses a driving robot. The driver sends Stop before P.
+
+    After the pause, the robot rests until a new command.
+    """
     drive(probe, board)
     assert probe.call(SetBool, "pause", data=True).success
     probe.wait_for_state("paused")
@@ -121,7 +123,10 @@ def test_pausing_a_driving_robot_stops_it_first_and_unpausing_does_not_move_it(
 def test_start_starts_a_board_that_was_left_paused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """With ``auto_start: false`` the driver sends nothing until ``~/start`` is called."""
+    """The parameter ``auto_start`` is false.
+
+    The driver sends nothing until a user calls ``~/start``.
+    """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, auto_start=False))
     probe.wait_for_state("paused")
@@ -133,7 +138,10 @@ def test_start_starts_a_board_that_was_left_paused(
 
 
 def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: PtyBoard) -> None:
-    """``~/reset`` sends Stop, R and S; the board's odometry restarts at 0, but odom continues."""
+    """A user calls ``~/reset`` after a drive. The driver sends Stop, R and S.
+
+    The board's own odometry restarts at 0, but odom continues.
+    """
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     with board.lock:
@@ -152,7 +160,8 @@ def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: P
 
 
 def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBoard) -> None:
-    """Releasing the e-stop does not move the robot; only a new command does."""
+    """A user latches the e-stop during a drive and releases it. Only a new command moves the robot.
+    """
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     drive(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
@@ -171,7 +180,9 @@ def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBo
 def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """If the board ignores commands after an e-stop, the driver recommends ``~/reset``.
+    """A board still ignores commands after the e-stop is released.
+
+    The driver recommends ``~/reset``.
 
     After a reset the robot drives again.
     """
@@ -197,7 +208,10 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
 def test_commands_under_estop_are_refused_and_told_what_to_do(
     probe: Probe, driver: Driver, board: PtyBoard
 ) -> None:
-    """Refused commands move the robot neither during the e-stop nor after its release."""
+    """A command arrives while the e-stop is latched, and is refused.
+
+    It does not move the robot, not even after the e-stop is released.
+    """
     assert probe.call(SetBool, "estop", data=True).success
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -212,7 +226,10 @@ def test_commands_under_estop_are_refused_and_told_what_to_do(
 def test_estop_answers_while_a_reset_waits(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """``~/estop`` answers at once while ``~/reset`` waits seconds for the board's restart."""
+    """A call of ``~/reset`` waits seconds for the board's restart.
+
+    ``~/estop`` still answers at once.
+    """
     board = start_board(boot_time_s=4.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -227,7 +244,8 @@ def test_estop_answers_while_a_reset_waits(
 def test_a_second_request_is_refused_while_one_is_under_way(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """During a reset the driver refuses ``~/pause`` with a message that names the reset."""
+    """A user calls ``~/pause`` during a reset. The driver refuses, and its message names the reset.
+    """
     board = start_board(boot_time_s=3.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
     probe.wait_for_state("nominal")
@@ -241,7 +259,8 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 
 
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
-    """``~/reset_odometry`` makes the robot's present pose the origin of odom."""
+    """A user calls ``~/reset_odometry`` after a drive. The present pose becomes the origin of odom.
+    """
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
@@ -253,7 +272,8 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
 def test_services_answer_with_a_reason_when_the_board_is_silent(
     start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
 ) -> None:
-    """If the board is silent, start and pause fail with a message that says what to check."""
+    """The board is silent. ``~/start`` and ``~/pause`` fail with a message that says what to check.
+    """
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("connecting")
@@ -263,7 +283,8 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
-    """Without a port, start, pause and reset fail at once, but the e-stop still latches."""
+    """The port does not exist. Start, pause and reset fail at once, but the e-stop still latches.
+    """
     probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
     for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:
         answer = probe.call(kind, service)
@@ -275,7 +296,7 @@ def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: S
 
 
 def test_the_twist_after_a_pause_is_that_of_the_robot(probe: Probe) -> None:
-    """After a pause of any length, the twist of a robot at rest is zero."""
+    """A robot at rest is paused and started again. Its twist is zero."""
     odometry = probe.listen(Odometry, "odom")
     probe.call(SetBool, "pause", data=True)
     probe.call(SetBool, "pause", data=False)

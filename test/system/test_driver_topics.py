@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Topics of the driver, as another process receives them over real DDS."""
+"""Tests of the driver's topics, as another process receives them over real DDS."""
 
 import math
 import struct
@@ -56,7 +56,10 @@ def test_every_imu_frame_is_published_once_and_in_order(probe: Probe, board: Pty
 
 
 def test_imu_messages_follow_rep_145(probe: Probe) -> None:
-    """IMU messages have covariances, the sensor's frame and rising stamps, but no orientation."""
+    """An IMU message has covariances and the sensor's frame, but no orientation.
+
+    Its stamps increase.
+    """
     received = probe.listen(Imu, "imu/data_raw")
     probe.wait_for(lambda: len(received) >= 50)
     message = received[0]
@@ -91,7 +94,10 @@ def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
 def test_a_board_at_10_hz_needs_its_delta_period(
     start_board: Start, start_driver: Start, probe_of: Start, told_s: float
 ) -> None:
-    """With the right ``delta_period`` the twist is right; else the driver names the right value."""
+    """A board sends displacements every 0.1 s. With this ``delta_period``, the twist is right.
+
+    With another ``delta_period``, the driver names the right value.
+    """
     board: PtyBoard = start_board(running=True, delta_period_s=0.1)
     driver: Driver = start_driver(board.path, delta_period=told_s)
     probe: Probe = probe_of(driver)
@@ -118,7 +124,7 @@ def test_a_board_at_10_hz_needs_its_delta_period(
 
 
 def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
-    """A drive of 0.5 m to the left shows in the pose and the twist of odom."""
+    """The robot drives 0.5 m to the left. The pose and the twist in odom show this."""
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     probe.wait_for(lambda: odometry)
@@ -149,7 +155,7 @@ def test_odometry_moves_with_the_robot(probe: Probe, board: PtyBoard) -> None:
 
 
 def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Start) -> None:
-    """A late subscriber to the state topic receives the current state."""
+    """A node subscribes to the state topic late. It still receives the current state."""
     late: Probe = probe_of(driver)
     states = late.listen(String, "omnibot_driver/state", latched=True)
     late.wait_for(lambda: states)
@@ -159,7 +165,7 @@ def test_the_state_topic_is_latched(probe: Probe, driver: Driver, probe_of: Star
 def test_an_imu_only_board_is_shown_as_such(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """For a board that sends only IMU frames, the state is ``imu_only``, and odom stays empty."""
+    """A board sends only IMU frames. The state is ``imu_only``, and odom has no messages."""
     board = start_board(imu_only=True)
     probe: Probe = probe_of(start_driver(board.path))
     imu, odometry = probe.listen(Imu, "imu/data_raw"), probe.listen(Odometry, "odom")
@@ -172,9 +178,9 @@ def test_an_imu_only_board_is_shown_as_such(
 def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver's odom begins at the identity even if the board's pose begins elsewhere.
+    """A board has driven before, so its own pose begins elsewhere, with a heading of 90°.
 
-    The board's heading begins at 90°; driving forward is still along x in odom.
+    The driver's odom still begins at the identity. A drive forward is along x in odom.
     """
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))

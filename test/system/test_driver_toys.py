@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two toy boards with the complete driver, on real terminals and sockets.
+"""Tests of two toy boards with the complete driver, on real terminals and sockets.
 
-The toys test the interface for boards: the driver knows them only by profiles that are registered
+The toys test the interface for boards. The driver knows them only by profiles that are registered
 under their names.
 """
 
@@ -37,7 +37,10 @@ ROBOTS: Final = {"line_board": line_robot.LineRobot, "request_board": request_ro
 
 
 class Toy:
-    """A simulated toy board in real time, and the driver's port parameters for it."""
+    """A simulated toy board that runs in real time.
+
+    ``ports``: the parameters that connect the driver to the board.
+    """
 
     def __init__(self, name: str, served: "ServedBoard[Any]") -> None:
         self.name, self.served = name, served
@@ -54,7 +57,7 @@ class Toy:
     def comes_to_a_stand(self) -> None:
         """Wait until the robot has been at rest for 1.5 s.
 
-        A robot with blocking moves also rests between two moves, but for a shorter time.
+        Some robots also rest between two moves of a drive, but for a shorter time.
         """
         ways: deque[float] = deque(maxlen=150)
 
@@ -80,9 +83,7 @@ def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, toy: Toy) -> Iterator[None]:
-    """Command the robot at 10 Hz until the context ends.
-
-    The context begins when the robot moves.
+    """Command the robot at 10 Hz until the context ends. The context begins when the robot moves.
     """
     with probe.commanding(0.2):
         toy.wait_for(lambda robot: not robot.stands)
@@ -90,7 +91,7 @@ def driven(probe: Probe, toy: Toy) -> Iterator[None]:
 
 
 def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: Toy) -> None:
-    """A toy robot obeys cmd_vel, its motion shows in odom, and it stops when commands end."""
+    """A toy robot obeys cmd_vel, and odom shows its motion. It stops when the commands end."""
     probe: Probe = probe_of(start_toy(start_driver, toy))
     odometry = probe.listen(Odometry, "odom")
     probe.wait_for_state("nominal")
@@ -105,7 +106,10 @@ def test_a_toy_drives_and_is_heard(start_driver: Start, probe_of: Start, toy: To
 def test_the_estop_stops_a_toy_until_it_is_released(
     start_driver: Start, probe_of: Start, toy: Toy
 ) -> None:
-    """During the e-stop a toy robot stays at rest, although commands continue to arrive."""
+    """The e-stop is latched while commands continue to arrive. The toy robot stays at rest.
+
+    After the release, the commands move the robot again.
+    """
     probe: Probe = probe_of(start_toy(start_driver, toy))
     probe.wait_for_state("nominal")
     with driven(probe, toy):
@@ -119,7 +123,10 @@ def test_the_estop_stops_a_toy_until_it_is_released(
 def test_whatever_ends_the_driver_stops_a_toy(
     start_driver: Start, probe_of: Start, toy: Toy, number: signal.Signals
 ) -> None:
-    """When a signal ends or suspends the driver, the driver or its guard stops the robot."""
+    """A signal ends or suspends the driver while the robot drives.
+
+    The driver or its guard stops the robot.
+    """
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
@@ -143,7 +150,10 @@ def test_each_toy_runs_inside_the_driver_too(start_driver: Start, probe_of: Star
 def test_wheels_have_the_boards_number_and_names(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The toy board has two wheels: a command of two values drives it, one of three is rejected."""
+    """The toy board has two wheels. A command with two values turns them.
+
+    A command with three values is rejected.
+    """
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
@@ -158,7 +168,8 @@ def test_wheels_have_the_boards_number_and_names(
 def test_the_raw_bytes_of_each_line_have_a_topic(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """With ``publish_raw`` each line of a board has raw topics of its own, named after the line."""
+    """A board has two lines, and ``publish_raw`` is true. Each line has raw topics with its name.
+    """
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     probe: Probe = probe_of(start_toy(start_driver, toy, publish_raw=True))
     told = probe.listen(UInt8MultiArray, "omnibot_driver/raw_rx/sense")
@@ -175,7 +186,7 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
 def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """If one of two lines is missing, the driver names it, and the guard uses the other line."""
+    """One of two lines is missing. The driver names it, and the guard uses the other line."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)
@@ -192,7 +203,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
 
 
 def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """The driver reports missing data if no server exists at its UDP address."""
+    """The board's UDP address does not answer. The driver reports that no data arrives."""
     driver = start_driver("udp://127.0.0.1:9", before=TOYS, board="request_board")
     driver.wait_for_line("no data from the board for 1.5 s")
 
@@ -200,7 +211,7 @@ def test_a_host_that_does_not_answer_is_told(start_driver: Start) -> None:
 def test_a_line_that_is_lost_leaves_the_robot_standing(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """If a line is lost while driving, the driver repeats the stop on the line that remains."""
+    """One of two lines is lost during a drive. The driver repeats the stop on the other line."""
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     far, near = os.openpty()
     stack.callback(os.close, near)

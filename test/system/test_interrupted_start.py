@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ctrl-C while a program is still loading its libraries, which takes about half a second."""
+"""Tests of ctrl-C while a program still loads its libraries, which takes about half a second."""
 
 import subprocess
 import sys
@@ -32,7 +32,10 @@ runpy.run_module({module!r}, run_name="__main__")
 def test_it_ends_as_it_does_later(
     module: str, arguments: list[str], library: str, exit_code: int, said: str
 ) -> None:
-    """Ctrl-C during the imports gives the usual exit code for ctrl-C, without a traceback."""
+    """The user presses ctrl-C during the imports. The exit code is the usual one for ctrl-C.
+
+    No traceback is printed.
+    """
     program = INTERRUPTED_AT.format(module=module, library=library)
     done = subprocess.run(
         [sys.executable, "-c", program, *arguments], capture_output=True, text=True, check=False

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Several robots in one ROS domain: each obeys its own commands and uses its own frames."""
+"""Tests of several robots in one ROS domain. Each has its own commands and frames."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -73,7 +73,8 @@ def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
 
 
 def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
-    """One robot drives forward, another one backward, and the third one stays at rest."""
+    """Two of three robots get commands. One drives forward, one backward, and the third one rests.
+    """
     forward, still, backward = fleet
     speeds = {forward.name: 0.3, backward.name: -0.3}
     publishers = {
@@ -94,7 +95,10 @@ def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
 
 
 def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
-    """Latching or releasing the e-stop of one robot does not affect the others."""
+    """The e-stops of two robots are latched, and one is released.
+
+    The other robots keep their states.
+    """
     first, second, third = fleet
     for robot in (first, second):
         assert robot.probe.call(SetBool, "estop", data=True).success
@@ -106,7 +110,7 @@ def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
 
 
 def test_two_drivers_of_one_name_report_each_other() -> None:
-    """Of two drivers with the same name, each reports the other, whichever started first."""
+    """Two drivers have the same name. Each reports the other, whichever started first."""
     with Driver(port="sim://") as first, Driver(port="sim://", namespace=first.namespace) as second:
         for driver in (first, second):
             driver.wait_for_line(f"another node has the name /{first.namespace}/omnibot_driver,")

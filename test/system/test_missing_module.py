@@ -17,7 +17,7 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("library", ["rclpy", "nav_msgs", "serial"])
 def test_it_says_what_is_missing_and_what_to_do(library: str) -> None:
-    """If a library is missing, the driver names it in one line and says how to set up ROS."""
+    """A library is missing. The driver names it in one line and says how to set up ROS."""
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT.format(library=library)],
         capture_output=True,

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor in a terminal and in a pipe, with a real driver on a simulated board."""
+"""Tests of the monitor, in a terminal and in a pipe, with a driver on a simulated board."""
 
 import json
 import os
@@ -37,11 +37,10 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
-    """Press the key w, again if necessary, until the robot drives.
+    """Press the key w until the robot drives and the test has received the command.
 
-    ``said`` must also have the command of the key. After a stall of the computer the monitor may
-    discard a key press as outdated. It may also discover the driver earlier than the subscription
-    of the test.
+    One press may not be enough. After a stall of the computer the monitor discards a key press as
+    outdated. The monitor may also discover the driver before it discovers the test's subscription.
     """
     for _ in range(20):
         said.clear()
@@ -71,7 +70,10 @@ def monitor_of(stack: ExitStack) -> Callable[..., PseudoTerminal]:
 def test_a_snapshot_in_a_pipe_tells_what_is_so(
     probe: Probe, driver: Driver, board: PtyBoard, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """After a drive of 0.5 m to the left, the monitor's JSON has the true pose, rates and state."""
+    """The robot drives 0.5 m to the left.
+
+    The monitor's JSON has the true pose, the rates and the state.
+    """
     odometry = probe.listen(Odometry, "odom")
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -103,7 +105,10 @@ def test_a_snapshot_in_a_pipe_tells_what_is_so(
 def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The space bar sends the e-stop, and the screen shows it; the keys R and y release it."""
+    """The user presses the space bar. The e-stop is latched, and the screen shows it.
+
+    The keys R and y release it.
+    """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")
     terminal.type(" ")
@@ -121,9 +126,11 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """A single key press sends a motion, then a few zero commands, then nothing.
+    """The user presses a key once.
 
-    Quitting the monitor sends another zero command.
+    The monitor sends a motion, then a few zero commands, then nothing.
+
+    When the user quits the monitor, it sends another zero command.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -149,9 +156,9 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
     probe_of: Callable[[Driver], Probe],
     monitor_of: Callable[..., PseudoTerminal],
 ) -> None:
-    """A monitor that ends by SIGTERM, or whose window is closed, stops the robot.
+    """A held key moves the robot. The monitor ends by SIGTERM, or its window is closed.
 
-    Until then a key is held and moves the robot. The commands are stamped.
+    The monitor stops the robot at its end. The commands are stamped.
     """
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
@@ -172,9 +179,11 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 def test_keys_pressed_while_it_was_suspended_move_nothing(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """Keys that are pressed while the monitor is suspended do not move the robot later.
+    """The monitor is suspended while it steers, so the driver stops the robot.
 
-    The driver stops the robot during the suspension.
+    The user presses keys.
+
+    When the monitor resumes, these keys do not move the robot.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -197,9 +206,9 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """After SIGSTOP and SIGCONT the monitor still ends with q and restores the terminal.
+    """The monitor is suspended by SIGSTOP, so it cannot restore the terminal, and resumes.
 
-    At SIGSTOP the monitor has no chance to restore the terminal.
+    The key q then ends it, and it restores the terminal.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor reports what is missing or wrong by a sentence and an exit code."""
+"""Tests of the monitor's messages and exit codes if something is missing or wrong."""
 
 import json
 import math
@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def fake(stack: ExitStack) -> Probe:
-    """A fake driver that repeats the state nominal and publishes no measurements."""
+    """An imitation of a driver that repeats the state nominal and publishes no measurements."""
     probe = stack.enter_context(Probe("fake"))
     estop = probe.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
     estop.publish(Bool(data=False))
@@ -46,7 +46,9 @@ def measure(fake: Probe, odometry: Odometry) -> None:
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
-    """Without the service ``~/estop`` the monitor repeats the e-stop on the topic ``estop``.
+    """The service ``~/estop`` is missing.
+
+    The monitor sends the e-stop on the topic ``estop`` instead.
 
     It repeats the message until the driver reports a latched e-stop.
     """
@@ -66,7 +68,7 @@ def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
 
 
 def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """Run the monitor, which must fail; return its only line on stderr."""
+    """Run the monitor, which must fail, and return its only line on stderr."""
     assert main(arguments) == 1
     (line,) = capsys.readouterr().err.splitlines()
     return line
@@ -75,7 +77,7 @@ def sentence(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_without_a_driver_one_sentence_says_how_to_start_one(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If no driver runs, the message names the ROS domain and says how to start a driver."""
+    """No driver runs. The message names the ROS domain and says how to start a driver."""
     monkeypatch.setenv("ROS_DOMAIN_ID", "100")
     said = sentence(capsys, "--once", "--timeout", "1")
     assert "no driver is running in ROS domain 100: start one" in said
@@ -84,14 +86,17 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
 def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     fake: Probe, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """For a wrong namespace the message names the running drivers, and the option for the first."""
+    """The user gives a wrong namespace. The message names the running drivers.
+
+    It also shows the option for the first of them.
+    """
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
     assert "/elsewhere/omnibot_driver is running, but these are: /fake/omnibot_driver; try" in said
     assert said.endswith("try --namespace /fake")
 
 
 def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The monitor names topics without messages, and prints all other data."""
+    """Some topics have no messages. The monitor names these topics, and prints all other data."""
     assert main(["--once", "--namespace", "fake", *QUICKLY]) == 1
     output = capsys.readouterr()
     assert output.out.startswith("/fake/omnibot_driver  nominal")
@@ -99,7 +104,8 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
 
 
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The monitor reports two drivers of one name, because its output would mix both."""
+    """Two drivers have the same name. The monitor reports this, because its output would mix both.
+    """
     fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
     measure(fake, Odometry())
     assert main(["--once", "--namespace", "fake"]) == 1
@@ -107,7 +113,10 @@ def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFix
 
 
 def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """The monitor prints NaN as nan, and one sentence names the fields with NaN."""
+    """A measurement has NaN.
+
+    The monitor prints it as nan, and one sentence names the fields with NaN.
+    """
     bad = Odometry()
     bad.pose.pose.position.x = bad.twist.twist.linear.y = float("nan")
     measure(fake, bad)
@@ -118,7 +127,10 @@ def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str])
 
 
 def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """A turn of 145° to the left is shown as such even if its quaternion has a negative w."""
+    """The robot has turned by 145° to the left, and its quaternion has a negative w.
+
+    The monitor shows a heading of 145°.
+    """
     odometry = Odometry()
     turn = odometry.pose.pose.orientation
     turn.z, turn.w = -math.sin(math.radians(72.5)), -math.cos(math.radians(72.5))
@@ -129,7 +141,7 @@ def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixt
 
 
 def test_a_pipe_cannot_steer(capsys: pytest.CaptureFixture[str]) -> None:
-    """Without a terminal ``--teleop`` is refused, as a pipe does not deliver key presses."""
+    """``--teleop`` is refused without a terminal, because a pipe does not deliver key presses."""
     assert "--teleop needs a terminal" in sentence(capsys, "--teleop")
 
 
@@ -168,7 +180,7 @@ def test_without_ros_one_sentence_says_so() -> None:
 
 @pytest.mark.parametrize("wrong", [["--timeout", "0"], ["--teleop", "--once"], ["--nonsense"]])
 def test_wrong_usage_has_exit_code_2(wrong: list[str], capsys: Any) -> None:
-    """After wrong arguments the monitor shows its usage and exits with code 2."""
+    """The user gives wrong arguments. The monitor shows its usage and exits with code 2."""
     with pytest.raises(SystemExit) as ended:
         main(wrong)
     assert ended.value.code == 2

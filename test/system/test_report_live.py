@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The report on a running driver, and its message if no driver runs."""
+"""Tests of the report on a running driver."""
 
 import os
 import subprocess

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Compare config/omnibot.policy.xml with SROS2's schema 0.2.0 and with the running driver."""
+"""Tests that compare config/omnibot.policy.xml with SROS2's schema 0.2.0 and a running driver."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -36,11 +36,11 @@ QUALIFIERS: Final = {
 MOVES_OR_STOPS: Final = ("/cmd_vel", "/wheel_cmd", "/cmd_pose", "/estop")
 
 Rules = dict[str, set[str]]
-"""Names that a profile allows, by qualifier, such as ``publish``."""
+"""The names that a profile allows. The keys are the qualifiers, such as ``publish``."""
 
 
 def profiles() -> dict[str, Element]:
-    """Return the only profile of each enclave, by the path of the enclave."""
+    """Return the only profile of each enclave. The keys are the paths of the enclaves."""
     enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
     return {enclave.attrib["path"]: next(enclave.iter("profile")) for enclave in enclaves}
 
@@ -103,7 +103,8 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def seen(graph: Node, home: str) -> Rules:
-    """Return the names that the driver uses according to the ROS graph, by qualifier."""
+    """Return the names that the driver uses, as the ROS graph shows them. The keys are qualifiers.
+    """
 
     def names(found: list[tuple[str, list[str]]]) -> set[str]:
         return {name.removeprefix(home) for name, _ in found}
@@ -130,7 +131,7 @@ def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: s
 
 
 def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
-    """Only the expected enclaves may publish commands, and only the operator may call services."""
+    """Only the expected enclaves may publish commands. Only the operator may call services."""
     rules = {path: allowed(profile) for path, profile in profiles().items()}
     who = {
         name: {path for path, rule in rules.items() if name in rule["publish"]}

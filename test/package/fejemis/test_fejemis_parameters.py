@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a Fejemis: values written to the boards, and values that are refused."""
+"""Tests of the parameters of a Fejemis: what is written to the boards, and what is refused."""
 
 import math
 from pathlib import Path
@@ -19,7 +19,8 @@ def check(**given: Any) -> dict[str, Any]:
 
 
 def test_nothing_is_written_by_default() -> None:
-    """The driver must not overwrite a board's own settings."""
+    """By default the driver writes nothing, because it must not overwrite a board's own settings.
+    """
     values = check()
     assert settings(values).written == {}
     assert kinematics(values).track_m == 0.4
@@ -27,10 +28,10 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """Parameters that are given are written in the units of the boards.
+    """The driver writes the parameters that are given, in the units of the boards.
 
-    ``confw`` has wheel radii, gear, encoder ticks and track, ``confs`` has track and steering
-    distance, and ``fwoffset`` has the front wheel's offset in degrees.
+    ``confw`` has the wheel radii, the gear, the encoder ticks and the track width. ``confs`` has
+    the track width and the steering distance. ``fwoffset`` has the front wheel's offset in degrees.
     """
     values = check(
         wheel_radii=[0.08, 0.081],
@@ -60,19 +61,22 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """Parameters of one command must be set together, as the driver cannot guess missing values."""
+    """One command writes several parameters, and the user gives only some of them. This is refused.
+
+    The driver cannot guess the missing values.
+    """
     with pytest.raises(ParameterError, match=f"parameter '{missing}' must be set too"):
         check(**given)
 
 
 def test_a_track_alone_is_refused() -> None:
-    """``track`` alone is refused, because two commands contain it, each with further values."""
+    """``track`` alone is refused, because two commands contain it, and both need further values."""
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)
 
 
 def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
-    """One port cannot serve both boards, even if the second parameter gives it by another name."""
+    """One port cannot serve both boards, not even under two names. This is refused."""
     link = tmp_path / "front"
     link.symlink_to("/dev/ttyACM0")
     for front in ("/dev/ttyACM0", str(link)):
@@ -81,7 +85,7 @@ def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
 
 
 def test_ports_are_not_compared_for_a_simulated_pair() -> None:
-    """``front_port`` may equal ``port`` for a simulated pair, which does not use ``front_port``."""
+    """A simulated pair of boards does not use ``front_port``. Any value is accepted."""
     assert check(port="sim://")["front_port"] == "/dev/ttyACM1"
 
 

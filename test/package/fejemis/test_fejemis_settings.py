@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of other packages for a Fejemis, and its description: topics, limits, frames, sizes."""
+"""Tests of the settings of other packages for a Fejemis, and of its robot description."""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,10 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
-    """The filter does not fuse poses, accelerations, or the board's yaw, which uses the gyro."""
+    """The filter fuses only velocities and the yaw rate of the gyro.
+
+    It fuses no poses and accelerations, and not the board's yaw, which is computed from the gyro.
+    """
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}
@@ -45,7 +48,10 @@ def test_the_filter_fuses_velocities_and_the_gyro() -> None:
 
 
 def test_nav2_plans_and_follows_curves_forward() -> None:
-    """Nav2's planner and controller have the same turning radius; speed limits are the driver's."""
+    """Nav2's planner and controller have the same turning radius.
+
+    Their speed limits are the driver's.
+    """
     file = load("nav2_fejemis.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     planner = file["planner_server"]["ros__parameters"]["GridBased"]
@@ -70,7 +76,7 @@ def description() -> Any:
 
 
 def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
-    """The description has the driver's joints and frames; the steering axis points up."""
+    """The description has the driver's joints and frames. The steering axis points up."""
     robot = description()
     assert robot.get_root() == PARAMETERS.by_name["base_frame"].default
     turning = [joint.name for joint in robot.joints if joint.type != "fixed"]
@@ -81,7 +87,7 @@ def test_the_description_has_every_joint_and_frame_of_the_driver() -> None:
 
 
 def test_the_description_has_the_drivers_sizes() -> None:
-    """Track and wheelbase of the description are those of the default parameters."""
+    """The track width and the wheelbase of the description are the driver's defaults."""
     joints = description().joint_map
     left, right = (joints[name].origin.xyz for name in WHEELS.joints)
     assert left[1] - right[1] == WHEELS.track_m
@@ -89,7 +95,7 @@ def test_the_description_has_the_drivers_sizes() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """Both costmaps of Nav2 have the same footprint, which encloses the described wheels."""
+    """Both costmaps of Nav2 have the same footprint. It encloses the wheels of the description."""
     file = load("nav2_fejemis.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of other packages for the LOIS ECU: its topics, its limits, and no sideways motion."""
+"""Tests of the settings of other packages for the LOIS ECU: topics, limits, no sideways motion."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,10 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_heading() -> None:
-    """The filter fuses the heading relative to its first value, and not the wheels' pose."""
+    """The filter fuses the velocities, and the heading relative to its first value.
+
+    It does not fuse the pose from the wheels.
+    """
     ekf = load("ekf_lois_ecu.yaml")["/**"]["ros__parameters"]
     fused = {
         sensor: {s for s, used in zip(STATES, ekf[f"{sensor}_config"], strict=True) if used}
@@ -40,7 +43,7 @@ def test_the_filter_fuses_velocities_and_the_heading() -> None:
 
 
 def test_nav2_keeps_to_the_drivers_limits_and_does_not_move_sideways() -> None:
-    """Each speed limit in Nav2 is the driver's default."""
+    """Each speed limit in Nav2 is the driver's default limit. Sideways speeds are zero."""
     file = load("nav2_lois_ecu.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]
     assert mppi["motion_model"] == "DiffDrive"
@@ -58,7 +61,7 @@ def test_nav2_keeps_to_the_drivers_limits_and_does_not_move_sideways() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """Both costmaps of Nav2 have the same footprint, which is not round for this board."""
+    """Both costmaps of Nav2 have the same footprint. For this board it is not round."""
     file = load("nav2_lois_ecu.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

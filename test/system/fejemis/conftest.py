@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated Fejemis on two pseudo-terminals, a driver on it, and a probe of its topics."""
+"""Fixtures: a simulated Fejemis on two pseudo-terminals, and a driver for it."""
 
 from collections.abc import Callable
 from contextlib import ExitStack

@@ -29,9 +29,9 @@ def started(robot: TwoPorts, start_driver: Start, **parameters: object) -> Drive
 
 @contextmanager
 def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command ``vx`` and ``yaw`` at 10 Hz until the context ends.
+    """Command a velocity at 10 Hz until the context ends. The context begins when the robot moves.
 
-    The context begins when the robot moves.
+    ``vx`` is in m/s, and ``yaw`` in rad/s.
     """
     with probe.commanding(vx, yaw):
         robot.wait_until(lambda board: not board.standing)
@@ -39,7 +39,7 @@ def driven(probe: Probe, robot: TwoPorts, vx: float = 0.3, yaw: float = 0.0) -> 
 
 
 def moves_again(probe: Probe, robot: TwoPorts) -> None:
-    """Command the robot until it moves, then wait until it stands; fail if it does not move."""
+    """Command the robot until it moves, then wait until it stands. Fail if it does not move."""
     with driven(probe, robot):
         pass
     robot.stands_for_good()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a simulated Fejemis on two real pseudo-terminals."""
+"""Tests of the driver with a simulated Fejemis on two real pseudo-terminals."""
 
 import math
 import signal
@@ -27,9 +27,9 @@ Start = Callable[..., Any]
 
 
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
-    """The pose in odom is within 2 cm of the truth after a straight drive, a turn and a curve.
+    """The robot drives straight, turns, drives a curve, and stops when the commands end.
 
-    The robot stops when the commands end.
+    The pose in odom is then within 2 cm of the truth.
     """
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
@@ -100,7 +100,10 @@ def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: 
 
 
 def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe: Probe) -> None:
-    """The e-stop switches brush and lift off, and its release does not switch them on again."""
+    """The user latches the e-stop while brush and lift work. The driver switches both off.
+
+    The release of the e-stop does not switch them on again.
+    """
     lift, led = probe.publisher(Float32, "lift_cmd"), probe.publisher(ColorRGBA, "led_cmd")
     led.publish(ColorRGBA(r=1.0, g=0.5, b=0.0, a=1.0))
     robot.wait_until(lambda board: board.front.leds[5] == (255, 128, 0))
@@ -125,7 +128,12 @@ def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe
 def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
     robot: TwoPorts, driver: Driver, probe: Probe
 ) -> None:
-    """A refused lift command does not move the lift, and the base obeys the next command."""
+    """A lift command arrives while the driver is suspended.
+
+    It is refused, and the lift does not move.
+
+    The base obeys the next velocity command.
+    """
     probe.wait_for_state("nominal")
     lift = probe.publisher(Float32, "lift_cmd")
     driver.process.send_signal(signal.SIGSTOP)
@@ -140,7 +148,10 @@ def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
 
 
 def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) -> None:
-    """During the e-stop the robot stays at rest, although commands continue to arrive."""
+    """The e-stop is latched while commands continue to arrive. The robot stays at rest.
+
+    After the release, the commands move the robot again.
+    """
     with driven(probe, robot):
         assert probe.call(SetBool, "estop", data=True).success
         robot.stands_for_good()
@@ -150,7 +161,10 @@ def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) 
 
 
 def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None:
-    """A paused robot stays at rest, and after the pause only a new command moves it."""
+    """A user pauses the robot during a drive. The robot stays at rest, and the state is "paused".
+
+    After the pause, only a new command moves the robot.
+    """
     with driven(probe, robot):
         assert probe.call(SetBool, "pause", data=True).success
         robot.stands_for_good()
@@ -166,7 +180,8 @@ def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     robot: TwoPorts, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """When the driver ends or hangs, the robot, the brush and the lift are stopped."""
+    """A signal ends or suspends the driver during a drive. The robot, the brush and the lift stop.
+    """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
         driver.process.send_signal(number)
@@ -193,7 +208,10 @@ def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
 def test_power_off_is_refused_while_driving(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """``~/power_off`` is refused while driving; at rest the power goes off after a delay."""
+    """A user calls ``~/power_off`` during a drive. The driver refuses.
+
+    At rest, the power goes off after a delay.
+    """
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))
     probe.wait_for_state("nominal")

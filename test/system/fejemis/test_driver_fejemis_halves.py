@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a simulated Fejemis whose halves are lost, swapped, broken or of another kind."""
+"""Tests of the driver with a Fejemis whose halves are lost, swapped, broken or of another kind."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -23,9 +23,9 @@ Start = Callable[..., Any]
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """The driver stops the half of the Fejemis that is still connected.
+    """One half is unplugged during a drive. The driver stops the half that is still connected.
 
-    When the other half is plugged in again, the driver stops it, too. The brush stays off.
+    When the unplugged half is plugged in again, the driver stops it, too. The brush stays off.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
@@ -50,7 +50,10 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """The robot stops if a half of the Fejemis fails, and obeys again once both halves work."""
+    """One half restarts or becomes silent during a drive. The robot stops.
+
+    When both halves work again, the robot obeys new commands.
+    """
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))
         if what != "restart":
@@ -67,7 +70,10 @@ def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
 def test_a_broken_angle_sensor_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, what: str
 ) -> None:
-    """The driver stops the robot and logs that the angle sensor is faulty."""
+    """The angle sensor of the front wheel breaks during a drive. The driver stops the robot.
+
+    The log says that the angle sensor is faulty.
+    """
     with driven(probe, robot):
         robot.do(lambda board: board.befall("front", what))
         robot.stands_for_good()
@@ -79,7 +85,10 @@ def test_a_broken_angle_sensor_stops_the_robot(
 def test_swapped_ports_are_found_out(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver recognises swapped ports by the ids in the heartbeats, and still drives."""
+    """The two ports are swapped.
+
+    The driver recognises this by the ids in the heartbeats, and drives.
+    """
     robot = robot_of(stack, tmp_path, swapped=True)
     driver = started(robot, start_driver)
     probe: Probe = probe_of(driver)
@@ -91,7 +100,9 @@ def test_swapped_ports_are_found_out(
 def test_it_drives_without_sums(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The driver learns from the heartbeats that the firmware uses no checksums, and omits them.
+    """The firmware uses no checksums.
+
+    The driver learns this from the heartbeats and omits them, too.
 
     The firmware then accepts every line from the driver.
     """
@@ -104,7 +115,7 @@ def test_it_drives_without_sums(
 
 
 def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
-    """If the same port is given twice, the driver asks for two ports and exits with code 2."""
+    """The user gives the same port twice. The driver asks for two ports and exits with code 2."""
     driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
     driver.wait_for_line("'front_port' must not be .* have a port each")
     assert driver.end() == 2
@@ -122,7 +133,8 @@ def test_a_teensy_of_another_kind_is_named_and_nothing_moves(
     ids: tuple[int, int],
     wrong: str,
 ) -> None:
-    """The driver logs what is wrong with the ids of the boards, and the robot stays at rest."""
+    """A port leads to a board with a wrong id. The driver logs what is wrong, and the robot rests.
+    """
     robot = robot_of(stack, tmp_path, ids=ids)
     driver = started(robot, start_driver)
     probe: Probe = probe_of(driver)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Compare config/fejemis.policy.xml with the running driver of a Fejemis."""
+"""Tests that compare config/fejemis.policy.xml with the running driver of a Fejemis."""
 
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -21,7 +21,7 @@ POLICY: Final = Path(__file__).parents[3] / "config" / "fejemis.policy.xml"
 
 
 def rules() -> dict[str, Rules]:
-    """Return the rules of each enclave in the policy, by the path of the enclave."""
+    """Return the rules of each enclave in the policy. The keys are the paths of the enclaves."""
     enclaves = ElementTree.parse(POLICY).getroot().iter("enclave")
     return {one.attrib["path"]: allowed(next(one.iter("profile"))) for one in enclaves}
 
@@ -49,7 +49,10 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """Only the operator's enclave may call services and publish lift commands."""
+    """The other enclaves may use only topics and services that the driver has.
+
+    Only the operator's enclave may call services and publish lift commands.
+    """
     every = rules()
     driver = every.pop("/omnibot/driver")
     everywhere = {"/rosout", "/parameter_events", "/clock"}

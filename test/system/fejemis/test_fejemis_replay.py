@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A driver that replays the recorded bytes of both Teensys publishes the same odometry."""
+"""Test that a replay of the bytes from both Teensys publishes the same odometry."""
 
 import signal
 from contextlib import ExitStack
@@ -22,14 +22,14 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets, about 1 s at rest, by which a replay recognises both Teensys.
+"""Number of recorded packets that a replay needs to recognise both Teensys, at rest for about 1 s.
 
-The recording may begin after the Teensys have answered the driver's first questions.
+A recording may begin after the Teensys have answered the driver's first questions.
 """
 
 
 def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
-    """The replay ends within 1 cm of the place in odom at which the recorded drive ended."""
+    """A drive is recorded and replayed. Both end at the same place in odom, within 1 cm."""
     with ExitStack() as stack:
         driver = stack.enter_context(Driver(port="sim://", board="fejemis", publish_raw="true"))
         probe = stack.enter_context(Probe(driver.namespace))

@@ -2,7 +2,7 @@
 
 """A simulated Fejemis on two pseudo-terminals, each of which can be unplugged alone.
 
-The module knows descriptors and bytes, but not the meaning of the bytes.
+This module knows descriptors and bytes; it does not know the meaning of the bytes.
 """
 
 import select
@@ -19,15 +19,16 @@ from omnibot_driver.simulator.fejemis import CHANNELS, SimulatedFejemis
 
 PATIENCE_S: Final = 30.0
 STANDS_TICKS: Final = 750
-"""A time of 1.5 s in ticks of the simulated boards."""
+"""Ticks of the simulated boards in 1.5 s."""
 DRIVE, FRONT = 0, 1
 
 
 class TwoPorts(RunningBoard[SimulatedFejemis]):
     """A simulated Fejemis on two pseudo-terminals.
 
-    ports: paths of links to the terminals, like those that udev makes. heard: bytes that each port
-    has received since it was last plugged in.
+    ``ports``: paths of two symbolic links to the terminals, like the links that udev makes.
+
+    ``heard``: bytes that each port has received since it was last plugged in.
     """
 
     def __init__(self, board: SimulatedFejemis, folder: Path) -> None:
@@ -54,13 +55,16 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
             self.unplug(channel)
 
     def plug(self, channel: int) -> None:
-        """Open a new terminal, usually of another name, and let the channel's link lead to it."""
+        """Open a new terminal and let the channel's link point to it.
+
+        Its name is usually another one.
+        """
         with self._plugging:
             self.heard[channel] = bytearray()
             self._terminals[channel] = Terminal(self.ports[channel])
 
     def unplug(self, channel: int) -> None:
-        """Close the terminal, as if the cable were unplugged; the Teensy keeps its last command."""
+        """Close the terminal, as if the cable were unplugged. The Teensy keeps its last command."""
         with self._plugging:
             terminal, self._terminals[channel] = self._terminals[channel], None
             if terminal is not None:
@@ -72,7 +76,7 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
         assert found, {**self.facts, "last": self.last()}
 
     def do(self, action: Callable[[SimulatedFejemis], Any]) -> Any:
-        """Return the result of ``action``, called with the board while no tick is running."""
+        """Call ``action`` with the board while no tick runs, and return its result."""
         with self.lock:
             return action(self.board)
 

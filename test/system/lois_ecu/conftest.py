@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Fixtures: a driver, and a simulated LOIS ECU with the documented or the real behaviour."""
+"""Fixtures: a driver, and a simulated LOIS ECU that follows the manual or the public firmware."""
 
 from collections.abc import Callable
 from contextlib import ExitStack

@@ -57,9 +57,9 @@ def ecu_of(firmware: Any, stack: ExitStack, **settings: Any) -> Ecu:
 
 @contextmanager
 def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterator[None]:
-    """Command ``vx`` and ``yaw`` at 10 Hz until the context ends.
+    """Command a velocity at 10 Hz until the context ends. The context begins when the robot moves.
 
-    The context begins when the robot moves.
+    ``vx`` is in m/s, and ``yaw`` in rad/s.
     """
     with probe.commanding(vx, yaw):
         ecu.wait_for(lambda board: not board.standing)
@@ -67,7 +67,7 @@ def driven(probe: Probe, ecu: Ecu, vx: float = 0.3, yaw: float = 0.0) -> Iterato
 
 
 def set_parameter(probe: Probe, name: str, value: str | float) -> None:
-    """Set a parameter of the running driver; numbers are sent as doubles."""
+    """Set a parameter of the running driver. A number is sent as a double."""
     if isinstance(value, str):
         given = ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
     else:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a LOIS ECU on a real pseudo-terminal: how the robot is driven and stopped."""
+"""Tests of the driver with a simulated LOIS ECU on a pseudo-terminal: driving and stopping."""
 
 import math
 import signal
@@ -38,13 +38,16 @@ GAINS: Final = {
     "right_tn": 0.232542,
     "right_td": 0.60868,
 }
-"""Controller gains from docs/boards/lois_ecu.md, with which the wheel speeds do not oscillate."""
+"""Controller gains from docs/boards/lois_ecu.md.
+
+With these gains, the wheel speeds do not oscillate.
+"""
 
 
 def test_it_drives_and_odometry_tells_how_far(
     ecu: Ecu, start_driver: Start, probe_of: Start
 ) -> None:
-    """After a drive of 1 m odometry is within 4 cm, and the robot stops when the commands end.
+    """The robot drives 1 m and stops when the commands end. Odometry is within 4 cm of the truth.
 
     The test sets gains, because the robot swerves with the board's own gains. Other tests measure
     the swerve in simulated time.
@@ -71,7 +74,10 @@ def test_it_drives_and_odometry_tells_how_far(
 
 
 def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None:
-    """During the e-stop the robot stays at rest, although commands continue to arrive."""
+    """The e-stop is latched while commands continue to arrive. The robot stays at rest.
+
+    After the release, the commands move the robot again.
+    """
     with driven(probe, ecu):
         assert probe.call(SetBool, "estop", data=True).success
         ecu.stands_for_good()
@@ -83,7 +89,8 @@ def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """If a signal ends or suspends the driver, the driver or its guard stops the robot."""
+    """A signal ends or suspends the driver during a drive. The driver or its guard stops the robot.
+    """
     with driven(probe, ecu):
         driver.process.send_signal(number)
         ecu.stands_for_good()
@@ -95,9 +102,10 @@ def test_whatever_ends_the_driver_stops_it(
 def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """A press of the board's button latches the e-stop, which only the service releases.
+    """A user presses the board's button during a drive. The e-stop is latched, and the robot stops.
 
-    The driver does not publish the state of the button before the first press.
+    Only the service releases the e-stop, not the button. Before the first press, the driver does
+    not publish the state of the button.
     """
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
@@ -117,7 +125,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """After a restart of the board the driver writes the setting of the low-pass filter again.
+    """The board restarts after a drive. The driver writes the setting of the low-pass filter again.
 
     The pose in odom continues from its value before the restart.
     """
@@ -137,7 +145,9 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 
 
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
-    """A reset sets the ticks of the wheels to 0, but the pose in odom continues.
+    """A user calls ``~/reset`` after a drive.
+
+    The encoder ticks are then 0, but the pose in odom continues.
 
     After the reset the robot drives again.
     """
@@ -153,9 +163,11 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 
 
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
-    """The driver writes a gain when the user sets it, and again after a restart of the board.
+    """A user sets a gain.
 
-    The driver writes no gain that the user has not set.
+    The driver writes it to the board, and again after a restart of the board.
+
+    The driver does not write gains that the user has not set.
     """
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)
@@ -193,7 +205,10 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
 def test_a_record_is_a_file_and_an_estop_ends_one(
     start_driver: Start, probe_of: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """A record service answers with the path of its file; an interrupted record leaves no file."""
+    """A user calls a record service. Its answer is the path of the record's file.
+
+    If the e-stop interrupts a record, no file is written.
+    """
     ecu = ecu_of("firmware", stack, running=True)
     folder = tmp_path / "records"
     driver = start_driver(

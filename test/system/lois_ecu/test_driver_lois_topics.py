@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The topics and services of the driver that only a LOIS ECU has, on a real pseudo-terminal."""
+"""Tests of the topics and services that only a LOIS ECU has, on a real pseudo-terminal."""
 
 import math
 import signal
@@ -27,7 +27,7 @@ NODE: Final = "omnibot_driver"
 
 
 def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
-    """The services switch the LED on and off; the driver sends the ball command only once."""
+    """The services switch the LED on and off. The driver sends the ball command only once."""
     assert probe.call(SetBool, "led", data=True).success
     ecu.wait_for(lambda board: board.led)
     assert probe.call(SetBool, "led", data=False).success
@@ -39,9 +39,9 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """If the compass shows east at a declination of 0.1 rad, the heading is -0.1 rad in ENU.
+    """The compass shows east, and the declination is 0.1 rad. The heading in ENU is -0.1 rad.
 
-    Position and time of the GPS receiver are published, too.
+    The position and the time of the GPS receiver are published, too.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
@@ -65,7 +65,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 def test_a_fix_of_the_public_firmware_is_none(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The driver reports no fix, because the public firmware sends zeros instead of a position."""
+    """The public firmware sends zeros instead of a position. The driver reports no fix."""
     probe: Probe = probe_of(start_driver(ecu_of("firmware", stack).path, board="lois_ecu"))
     fixes = probe.listen(NavSatFix, "fix")
     probe.wait_for(lambda: fixes)
@@ -75,7 +75,10 @@ def test_a_fix_of_the_public_firmware_is_none(
 def test_duties_are_commanded_in_duty_mode_alone(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """In duty mode, commanded duties are limited to ``max_duty`` and expire like other commands."""
+    """The drive mode is "duty", and a user commands duties. The driver limits them to ``max_duty``.
+
+    The duties expire like other commands.
+    """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty", max_duty=40)
     probe: Probe = probe_of(driver)
@@ -93,10 +96,10 @@ def test_duties_are_commanded_in_duty_mode_alone(
 def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The driver refuses a duty that was sent while the driver was stalled.
+    """A duty arrives while the driver is suspended. The driver refuses it when it runs again.
 
-    The refusal does not depend on the sender's clock. When the first message of a sender arrives,
-    the driver does not know this clock yet.
+    It is the sender's first message, so the driver does not know the sender's clock yet. The
+    refusal does not depend on this clock.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
@@ -116,10 +119,10 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The topics of the terminal mode and of the drive mode appear when the mode is set.
+    """A user sets a terminal mode and then a drive mode. The topics of each mode appear.
 
-    In either terminal mode the public firmware forwards the lines of both GPS and compass. In this
-    test both sensors send at the same time.
+    In either terminal mode the public firmware forwards the lines of both sensors, GPS and compass.
+    Here both sensors send at the same time.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
@@ -140,9 +143,9 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 
 
 def recorded(robot: Any) -> Path:
-    """Record while the robot drives; return the path of the record.
+    """Record while the robot drives, and return the path of the record.
 
-    If a busy computer stopped the robot, try again.
+    A busy computer may stop the robot. Then the function tries again.
     """
     for _ in range(10):
         try:
@@ -156,9 +159,11 @@ def recorded(robot: Any) -> Path:
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The file has the ticks of both wheels, and the robot is at rest after the record.
+    """The calibration tool makes a record while the robot drives.
 
-    If the driver refuses a record, the tool reports the driver's reason.
+    The file has the ticks of both wheels.
+
+    After the record, the robot rests. If the driver refuses a record, the tool reports the reason.
     """
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver with a simulated MART controller on real UDP sockets of the loopback interface."""
+"""Tests of the driver with a simulated MART controller, on real UDP sockets."""
 
 import math
 import signal
@@ -27,7 +27,7 @@ Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
 SECOND_TICKS: Final = 500
 STANDS_TICKS: Final = 750
-"""A time of 1.5 s in ticks of the simulated controller; ``SECOND_TICKS`` are 1 s."""
+"""Ticks of the simulated controller in 1.5 s. ``SECOND_TICKS`` are its ticks in 1 s."""
 MOTIONS: Final = {
     "RM": (0.3, 0.2),
     "B": (-0.2, 0.0),
@@ -93,9 +93,7 @@ def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
-    """Command a velocity at 10 Hz until the context ends.
-
-    The context begins when the robot moves.
+    """Command a velocity at 10 Hz until the context ends. The context begins when the robot moves.
     """
     with probe.commanding(vx, yaw_rate):
         mart.wait_for(lambda board: board.server.chassis.moving)
@@ -103,9 +101,9 @@ def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[Non
 
 
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
-    """After a drive of 1 m odom is within 1 cm, and the robot stops when the commands end.
+    """The robot drives 1 m and stops when the commands end. The pose in odom is right within 1 cm.
 
-    The driver publishes battery, ranges and docking state.
+    The driver also publishes the battery, the ranges and the docking state.
     """
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
@@ -126,7 +124,10 @@ def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
 def test_a_download_that_cannot_be_saved_ends_with_the_reason(
     mart: Mart, start_driver: Start, probe_of: Start
 ) -> None:
-    """A download to the home directory of an unknown user fails, but the driver continues."""
+    """The folder for downloads is in the home directory of an unknown user.
+
+    A download fails with a reason, and the driver continues.
+    """
     folder = "~nobody_of_this_name/records"
     probe: Probe = probe_of(start_driver(mart.url, board="mart", record_directory=folder))
     probe.wait_for_state("nominal")
@@ -140,9 +141,9 @@ def test_a_download_that_cannot_be_saved_ends_with_the_reason(
 
 
 def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
-    """The e-stop ends each kind of motion by the stop command for this kind.
+    """The e-stop ends each kind of motion by the stop command for that kind.
 
-    Afterwards the MART server still answers.
+    The MART server still answers afterwards.
     """
     for motion in MOTIONS.values():
         with driven(probe, mart, *motion):
@@ -157,7 +158,10 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
 def test_whatever_ends_the_driver_stops_each_motion(
     mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
 ) -> None:
-    """When a signal ends the driver, the driver or its guard sends the motion's stop command."""
+    """A signal ends the driver during a motion.
+
+    The driver or its guard sends the motion's stop command.
+    """
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
         mart.stands_for_good()
@@ -167,9 +171,9 @@ def test_whatever_ends_the_driver_stops_each_motion(
 def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
     mart: Mart, driver: Driver, probe: Probe, word: str
 ) -> None:
-    """The guard stops the robot if the driver is killed just after it has sent a motion.
+    """The driver sends a velocity or a controlled move, and is killed before the server replies.
 
-    The motion is a velocity or a controlled move. The server has not replied yet.
+    The guard stops the robot.
     """
     if word == "TF":
         goal = PoseStamped()
@@ -189,7 +193,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
 
 
 def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe) -> None:
-    """The guard stops the robot after half a second without a heartbeat of the driver."""
+    """The driver is suspended during a drive. The guard stops the robot after half a second."""
     with driven(probe, mart, 0.3, 0.0):
         driver.process.send_signal(signal.SIGSTOP)
         mart.stands_for_good()
@@ -200,7 +204,7 @@ def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe
 def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
     """The services calibrate the gyro, start the log, and download the last move and the log.
 
-    A download of the log ends the MART server.
+    The MART server ends when the log is downloaded.
     """
     with driven(probe, mart, 0.3, 0.0):
         pass
@@ -222,10 +226,12 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """New values of ``range_maximum`` and ``dock_distance`` take effect while the driver runs.
+    """A user changes ``range_maximum`` and ``dock_distance``.
 
-    An integer is accepted for a real number. For a distance of 0.1 m the driver requests 2 inches,
-    because the robot may drive 1.6 times as far as requested.
+    Both take effect while the driver runs.
+
+    An integer is accepted for a real number. For a distance of 0.1 m the driver requests only 2
+    inches, because the robot may drive 1.6 times as far as requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
@@ -243,6 +249,7 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 
 
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """The driver reports missing data if no server listens at its address."""
+    """The server at the board's address does not answer. The driver reports that no data arrives.
+    """
     driver = start_driver("udp://127.0.0.1:9", board="mart")
     driver.wait_for_line("no data from the board")
