@@ -180,7 +180,7 @@ def test_every_entry_point_names_a_function(setup_arguments: dict[str, Any]) -> 
 
 
 def test_manifest_declares_what_the_package_needs_and_nothing_else() -> None:
-    """On a machine set up by rosdep nothing is missing, and nothing superfluous is installed."""
+    """package.xml declares exactly what the package needs. Optional packages are not declared."""
     started = started_by(python_files("launch"))
     needed = third_party(python_files(PACKAGE, "launch")) | (started - OPTIONAL)
     assert needed == declared("exec_depend")

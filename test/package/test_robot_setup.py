@@ -59,7 +59,10 @@ def test_only_one_adapter_is_taken_for_the_board() -> None:
 
 
 def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
-    """An FTDI adapter's timer is set to 1 ms instead of 16 ms as soon as its driver is bound."""
+    """A rule sets the timer of an FTDI adapter to 1 ms instead of 16 ms.
+
+    The rule applies as soon as the kernel's driver is bound to the adapter.
+    """
     (timer,) = [rule for rule in ACTIVE if "ATTR{latency_timer}" in rule]
     assert timer["DRIVER"] == ("==", "ftdi_sio")
     assert "bind" in timer["ACTION"][1].split("|")

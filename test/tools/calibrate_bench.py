@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A robot for calibrations in simulated time: a session and a board, without a ROS node."""
+"""A simulated robot for calibrations: a session and a board in simulated time, without a ROS node.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,12 +15,12 @@ from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Topic
 
 COMMANDED_EVERY = 2
-"""Period of the commands, in ticks of the board."""
+"""Interval between two commands, in ticks of the board."""
 STANDS_AFTER_S = 1.0
 
 
 class BenchRobot:
-    """Replacement for the ``Robot`` of a calibration; ``bench.board`` knows the true motion."""
+    """A replacement for the ``Robot`` of a calibration. ``bench.board`` has the true motion."""
 
     def __init__(self, **settings: Any) -> None:
         self.bench = Bench(BoardSettings(running=True, **settings))

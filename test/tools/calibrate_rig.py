@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A test rig: a simulated board with planted errors, a real driver, and a user who answers."""
+"""A test rig: a simulated board with planted errors, a real driver, and a user who answers.
+
+Planted errors are known to the test. A calibration must find them.
+"""
 
 import math
 import re
@@ -24,17 +27,16 @@ from omnibot_driver.tools.calibrate.robot import Robot
 Answer = Callable[[str], str]
 
 BUSY_S = 3.0
-"""Timeout of commands and data, in s; longer than the delays of a busy test machine."""
+"""Timeout of commands and data, in s. It is longer than the delays of a busy test machine."""
 
 
 def yes(_question: str) -> str:
-    """Answer yes to every question."""
     return "y"
 
 
 @dataclass
 class Rig:
-    """A simulated board with a driver; calibrations write their files to ``folder``."""
+    """A simulated board with a driver. Calibrations write their files to ``folder``."""
 
     port: PtyBoard
     driver: Driver
@@ -46,7 +48,7 @@ class Rig:
         return self.folder / "robot.yaml"
 
     def calibrate(self, *words: str, answer: Answer = yes) -> int:
-        """Run a calibration in this process; return its exit code."""
+        """Run a calibration in this process, and return its exit code."""
 
         def read(question: str) -> str:
             self.questions.append(question)
@@ -65,7 +67,8 @@ class Rig:
 def rig(
     folder: Path, parameters: dict[str, object] | None = None, **settings: Any
 ) -> Iterator[Rig]:
-    """Run a simulated board with ``settings`` and a driver with ``parameters``; yield the rig."""
+    """Run a simulated board with ``settings`` and a driver with ``parameters``, and yield the rig.
+    """
     board = SimulatedBoard(BoardSettings(running=True, **settings))
     with (
         pytest.MonkeyPatch.context() as patch,
@@ -79,7 +82,7 @@ def rig(
 
 @contextmanager
 def robot_of(driver: Driver) -> Iterator[Robot]:
-    """Connect to the driver as a calibration does; yield the ``Robot`` of the calibration."""
+    """Connect to the driver as a calibration does, and yield the ``Robot`` of the calibration."""
     with Interruption() as interruption, connect(driver.namespace, [], interruption) as robot:
         yield robot
 
@@ -91,7 +94,10 @@ def parameters_of(driver: Driver) -> dict[str, Any]:
 
 
 def row(table: str, name: str) -> tuple[float, float]:
-    """Return value and uncertainty, NaN if empty, from the row ``name`` of a printed table."""
+    """Return the value and the uncertainty in the row ``name`` of a printed table.
+
+    An empty uncertainty is NaN.
+    """
     found = re.search(rf"^[│ ]*{re.escape(name)} *│ *(\S+) *│ *(\S*) *│", table, re.MULTILINE)
     assert found, f"no row {name!r} in:\n{table}"
     return float(found[1]), float(found[2] or math.nan)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Synthetic recordings in which faults can be planted: as a log, or as a ROS bag."""
+"""Synthetic recordings of a drive, as a log or as a ROS bag. Tests can plant faults in them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -26,7 +26,8 @@ Array = NDArray[np.float64]
 
 
 def message(kind: str, *values: Any) -> Any:
-    """Return a ROS message with these field values in order; tuples stand for nested messages."""
+    """Return a ROS message whose fields have these values, in order. A tuple is a nested message.
+    """
     fields = TYPES.fielddefs[kind][1]
     filled = []
     for (_, (node, detail)), value in zip(fields, values, strict=True):
@@ -37,7 +38,7 @@ def message(kind: str, *values: Any) -> Any:
 
 @dataclass
 class Topic:
-    """The messages of one topic; each arrives ``late_s`` (in s) after its timestamp."""
+    """The messages of one topic. Each message arrives ``late_s`` (in s) after its timestamp."""
 
     stamp_s: Array
     values: Array
@@ -64,7 +65,7 @@ def _ticks(seconds: float, rate_hz: float) -> Array:
 class Drive:
     """A recording of a healthy robot that rests, drives along a curve, and rests again.
 
-    ``namespace`` is the prefix of its topics, such as ``/robot1``.
+    ``namespace``: the prefix of its topics, such as ``/robot1``.
     """
 
     seconds: float = 20.0
@@ -106,7 +107,10 @@ class Drive:
         return Topic(stamp_s, values, 0.001 + random.exponential(3e-4, len(stamp_s)))
 
     def messages(self) -> list[tuple[str, str, int, Any]]:
-        """Return topic, type, arrival in ns and content of each message, in order of arrival."""
+        """Return all messages in order of arrival.
+
+        Each item is the topic, the type, the time of arrival in ns, and the content.
+        """
         name, found = self.namespace, []
 
         def add(topic: str, kind: str, arrived_s: float, *values: Any) -> None:
@@ -158,7 +162,7 @@ class Drive:
         return zip(topic.stamp_s, topic.values.tolist(), topic.late_s, strict=True)
 
     def log(self) -> Log:
-        """Return the log that reading a bag of this drive would give."""
+        """Return the log that the report reads from a bag of this drive."""
         end_s = self.seconds
         nothing = Series(np.empty(0), np.empty(0), np.empty((0, 3)))
         series = [topic.series() for topic in (self.imu, self.odom, self.joints, self.cmd_vel)]
@@ -181,7 +185,7 @@ class Drive:
 
 
 def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
-    """Return the spans between these changes; the last one ends at ``end_s``."""
+    """Return the spans between these changes. The last span ends at ``end_s``."""
     times_s = [at_s for at_s, _ in changes] + [end_s]
     return tuple(
         Span(at_s, until_s, what)
@@ -190,7 +194,7 @@ def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
 
 
 def header(at_s: float, frame: str) -> tuple[tuple[int, int], str]:
-    """Return a message header: the timestamp in s and ns, and the frame."""
+    """Return a message header: the timestamp as seconds and nanoseconds, and the frame."""
     return divmod(START_NS + round(1e9 * at_s), 10**9), frame
 
 
@@ -200,7 +204,7 @@ def write(
     plugin: StoragePlugin = StoragePlugin.MCAP,
     compression: CompressionMode = CompressionMode.NONE,
 ) -> Path:
-    """Write a bag of these drives; return its path."""
+    """Write a bag of these drives, and return its path."""
     messages = sorted((item for drive in drives for item in drive.messages()), key=lambda i: i[2])
     writer = Writer(path, version=9, storage_plugin=plugin)
     if compression is not CompressionMode.NONE:

@@ -40,7 +40,7 @@ def view(**changes: Any) -> View:
 
 
 class FakeRobot:
-    """A robot that shows a given view and records the requests made to it."""
+    """A robot that shows a given view and keeps the requests that it gets."""
 
     def __init__(self, *, teleop: bool = False) -> None:
         self.dead_man = DeadMan() if teleop else None

@@ -1,15 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated user who sees the robot's wheels turn and holds the robot as asked."""
+"""A simulated user who sees the robot's wheels turn, and who holds the robot as the tool asks."""
 
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Number of control ticks that the user looks at: the end of a motion and the halt after it."""
+"""Number of control ticks that the user looks at.
+
+They contain the end of a motion and the halt after it.
+"""
 
 
 class User:
-    """A user who first gives the answers ``wrong``.
+    """A user who answers the tool's questions. The first answers are those in ``wrong``.
 
     All later answers describe how the wheels really turned.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A calibration finds the driver in its namespace, or explains why it cannot use one."""
+"""Tests that a calibration finds the driver in its namespace, or explains why it cannot use one."""
 
 import re
 from dataclasses import replace
@@ -24,7 +24,8 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For a wrong namespace the tool names the drivers that run, and returns exit code 1."""
+    """The user gives a wrong namespace. The tool names the running drivers and exits with code 1.
+    """
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
     said = capsys.readouterr().err
@@ -33,7 +34,7 @@ def test_a_wrong_namespace_names_the_drivers_there_are(
 
 
 def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) -> None:
-    """If two drivers have the same name, the tool sends no command, as both would obey."""
+    """Two drivers have the same name. The tool sends no command, because both would obey it."""
     before = len(rigged.port.board.commands)
     twin = robot._node.create_publisher(String, f"{robot.driver}/state", listener.LATCHED)
     assert robot._wait(lambda: robot._node.count_publishers(twin.topic_name) == 2, PATIENCE_S)
@@ -46,7 +47,8 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
 def test_a_driver_of_another_version_is_told(
     rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If the driver lacks one of the tool's parameters, the message says that versions differ."""
+    """The driver lacks one of the tool's parameters. The message says that their versions differ.
+    """
     newer = Parameter("of_tomorrow", 1, "", "")
     table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})
     monkeypatch.setattr(omnibot, "PARAMETERS", table)
@@ -55,7 +57,8 @@ def test_a_driver_of_another_version_is_told(
 
 
 def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
-    """The driver refuses a value out of range, and the tool's error names the parameter."""
+    """The tool sets a value out of range, and the driver refuses it. The error names the parameter.
+    """
     with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
         robot.set_parameters({"linear_scale": -1.0})
 
@@ -70,7 +73,10 @@ def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
 def test_what_ros_cannot_take_is_a_sentence(
     words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Invalid ROS arguments give a message and exit code 1, not a traceback."""
+    """The ROS arguments are invalid.
+
+    The tool prints a message without a traceback and exits with code 1.
+    """
     assert main(["imu", "--plot", str(tmp_path), *words]) == 1
     assert sentence in capsys.readouterr().err
 
@@ -78,7 +84,7 @@ def test_what_ros_cannot_take_is_a_sentence(
 def test_no_driver_at_all_says_how_to_start_one(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In an empty ROS domain the message names the command that starts a driver."""
+    """No driver runs in the ROS domain. The message names the command that starts a driver."""
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 0.2)
     monkeypatch.setenv("ROS_DOMAIN_ID", "101")
     assert main(["imu", "--plot", str(tmp_path)]) == 1

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate commission`` with a real driver, and a simulated user who sees the wheels."""
+"""Tests of ``calibrate commission`` with a real driver, and a simulated user who sees the wheels.
+"""
 
 import math
 from pathlib import Path
@@ -38,10 +39,12 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """``calibrate commission`` finds the planted axis signs, delta frame and IMU mounting.
+    """The robot has reversed axes, another delta frame and a turned IMU.
 
-    The tool explains an impossible answer and repeats the question. A driver loads the written
-    file.
+    The tool finds all of these.
+
+    The user's first answer is impossible, so the tool explains this and asks again. At the end, a
+    driver loads the written file.
     """
     with rig(
         tmp_path,
@@ -88,7 +91,7 @@ def test_switch_and_deltas_are_told_by_the_data(
 
 
 class Deaf:
-    """A robot that accepts every command and measures nothing."""
+    """A robot that accepts every command, but sends no measurements."""
 
     parameters: ClassVar[dict[str, Any]] = {one.name: one.default for one in PARAMETERS.rows}
 
@@ -97,7 +100,8 @@ class Deaf:
 
 
 def walk(*answers: str) -> Found:
-    """Run the part of the procedure for wheels and axes with these answers; return its findings."""
+    """Run the part of the procedure for wheels and axes with these answers. Return what it finds.
+    """
     left = list(answers)
     found = Found(before=Deaf.parameters)
     commission.Walk(Deaf(), Console(read=lambda _question: left.pop(0))).wheels(found)
@@ -108,9 +112,9 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The tool finds that one axis is reversed, and notes that the signs mirror the robot.
+    """One axis is reversed. The tool finds this, and notes that such signs mirror the robot.
 
-    The answer r repeats the motion, and an invalid answer repeats the question.
+    The answer "r" repeats the motion, and an invalid answer repeats the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)
@@ -119,7 +123,7 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 
 
 def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
-    """If all wheels are reversed, the axis signs correct cmd_vel and odom.
+    """All wheels are reversed. The tool finds axis signs that correct cmd_vel and odom.
 
     A note names wheel_cmd and joint_states, which stay reversed.
     """
@@ -129,19 +133,23 @@ def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
 
 
 def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
-    """If a single wheel is reversed, the error names the wheel, whose wiring must be corrected."""
+    """A single wheel is reversed. The error names the wheel, because its wiring must be corrected.
+    """
     with pytest.raises(ToolError, match="wheel B turns in the opposite direction to the other two"):
         walk("+00", "0-0", "00+")
 
 
 def test_repeated_contradictory_answers_refer_to_the_documentation() -> None:
-    """After three contradictory answers the tool ends and refers to the documentation."""
+    """The user gives three contradictory answers. The tool ends and refers to the documentation."""
     with pytest.raises(ToolError, match=r"wheel B was seen to turn.*docs/commissioning.md"):
         walk("000", "+++", "0-0")
 
 
 def test_a_board_on_positional_control_leaves_the_axes_out() -> None:
-    """Under positional control the tool checks the wheels, but it cannot check the axes."""
+    """The board is under positional control.
+
+    The tool checks the wheels, but it cannot check the axes.
+    """
     found = Found(before=Deaf.parameters, control_method="position")
     answers = ["+00", "0+0", "00+"]
     commission.Walk(Deaf(), Console(read=lambda _question: answers.pop(0))).wheels(found)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A finished measurement is kept if drawing, saving or printing its result fails."""
+"""Tests that a finished measurement is kept if its result cannot be drawn, saved or printed."""
 
 import os
 import sys
@@ -32,7 +32,7 @@ def failing(_figure: Any) -> None:
 
 
 def failing_late(figure: Any) -> None:
-    """Set a title with a broken formula, which Matplotlib notices only when it saves."""
+    """Set a title with a broken formula. Matplotlib notices this only when it saves the picture."""
     figure.subplots().set_title("$\\frac{$")
 
 
@@ -74,7 +74,7 @@ def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
     draw: Callable[[Any], None], ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If the picture cannot be drawn, the result is still saved, and the error says so."""
+    """The picture cannot be drawn. The result is still saved, and the error says so."""
     assert ending(draw=draw) == 1
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     said = capsys.readouterr()
@@ -85,7 +85,7 @@ def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
 def test_a_file_that_cannot_be_written_costs_the_file_alone(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If the file cannot be written, the table is still printed, so the user can copy values."""
+    """The file cannot be written. The table is still printed, so the user can copy the values."""
     assert ending(found={"linear_scale": 1e9}) == 1
     assert not (tmp_path / "robot.yaml").exists()
     said = capsys.readouterr()
@@ -96,7 +96,7 @@ def test_a_file_that_cannot_be_written_costs_the_file_alone(
 def test_a_broken_pipe_loses_nothing(
     ending: Ending, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The result is saved even if the reader of stdout is gone before the table is printed."""
+    """The reader of stdout is gone before the table is printed. The result is still saved."""
     reader, writer = os.pipe()
     os.close(reader)
     with os.fdopen(writer, "w") as gone:
@@ -108,7 +108,8 @@ def test_a_broken_pipe_loses_nothing(
 def test_what_is_to_be_copied_stands_on_one_line(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Text for copying is not wrapped, since a shell would read a wrapped path as two arguments."""
+    """Text for copying is on one line, because a shell would read a wrapped path as two arguments.
+    """
     folder = tmp_path / ("a_long_name_" * 12)
     assert ending(folder=folder) == 0
     assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry`` finds the sizes of wheels and base by tape measure."""
+"""Tests of ``calibrate geometry``, which finds the sizes of wheels and base by tape measure."""
 
 import argparse
 import io
@@ -38,9 +38,10 @@ def arguments(*words: str) -> argparse.Namespace:
 
 
 def paths() -> list[tuple[str, Column, bool]]:
-    """Return for each drive its name, its odometry path, and whether the heading is measured.
+    """Return all drives of the calibration, each with its odometry path.
 
-    The odometry goes exactly through the places of the drive.
+    Each item is the name of the drive, the path, and whether the user measures the heading at its
+    end. The odometry goes exactly through the places of the drive.
     """
     found = []
     for drive in geometry.plan(1.0, 3, squares=True):
@@ -56,9 +57,9 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """Return noisy tape readings of a slipping robot with the sizes ``factors`` and ``base``.
+    """Return noisy tape readings of a robot with slip, whose sizes are ``factors`` and ``base``.
 
-    The sizes are relative to those that the tool believes.
+    The sizes are relative to the sizes that the tool assumes.
     """
     made = []
     for name, path, heading in paths():
@@ -81,7 +82,7 @@ unlike = st.floats(-0.01, 0.01)
 def test_any_geometry_is_found_within_what_is_claimed(
     wheels: float, base: float, a: float, b: float, seed: int
 ) -> None:
-    """The fit finds wheel size, base size and wheel differences within five claimed sigmas."""
+    """The robot has any sizes of wheels and base. The fit finds them within five claimed sigmas."""
     factors = wheels * (1 + np.array([a, b, -a - b]))
     found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M, DRIFT)
     wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
@@ -92,9 +93,11 @@ def test_any_geometry_is_found_within_what_is_claimed(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """Errors divided by claimed uncertainties have a standard deviation near 1.
+    """The sizes of 60 robots with slip are fitted.
 
-    The test fits 60 slipping robots.
+    The claimed uncertainties agree with the true errors.
+
+    An error divided by its claimed uncertainty has a standard deviation near 1.
     """
     scores = []
     for seed in range(60):
@@ -107,7 +110,8 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """``rolled`` with the believed sizes returns the path itself, relative to its start."""
+    """``rolled`` gets the sizes that the tool assumes. It returns the path itself, from its start.
+    """
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
 
@@ -120,7 +124,7 @@ def test_a_square_comes_back() -> None:
 
 
 def test_readings_with_a_wrong_sign_are_turned_away() -> None:
-    """Readings with a wrong sign are rejected, as they would give an impossible robot."""
+    """The user's readings have a wrong sign. They are rejected, because no robot fits them."""
     wrong = readings(PERFECT, 1.0, np.random.default_rng(0))
     for one in wrong[2:4]:
         one.end[:2] *= -1
@@ -135,10 +139,10 @@ def test_readings_with_a_wrong_sign_are_turned_away() -> None:
 def test_planted_sizes_are_found_on_the_simulated_robot(
     factors: tuple[float, float, float], base: float, slip: float
 ) -> None:
-    """``calibrate geometry`` finds the planted sizes of a robot in simulated time.
+    """A robot in simulated time has other sizes than usual. ``calibrate geometry`` finds them.
 
-    Slip shortens every distance as a smaller wheel does. The sizes in the driver's parameters have
-    no effect, because the board computes its odometry with sizes of its own.
+    Slip shortens every distance, as a smaller wheel would. The sizes in the driver's parameters
+    have no effect, because the board computes its odometry with its own sizes.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}
@@ -159,7 +163,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 
 
 def test_sizes_that_were_found_are_those_believed_next_time() -> None:
-    """A second calibration starts from the sizes that the first one found."""
+    """A second calibration begins with the sizes that the first one has found."""
     now = {name: parameter.default for name, parameter in PARAMETERS.by_name.items()}
     found = {
         "wheel_radius": 0.029 * 1.02,
@@ -175,7 +179,10 @@ def test_sizes_that_were_found_are_those_believed_next_time() -> None:
 def test_planted_sizes_are_found_through_a_driver_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """``calibrate geometry`` finds planted sizes through a real driver; ``--apply`` sets them."""
+    """A robot has other sizes than usual. ``calibrate geometry`` finds them through a real driver.
+
+    ``--apply`` sets them in the driver.
+    """
     quick = {"max_angular_speed": 1.5}
     planted: dict[str, Any] = {"wheel_radius_scale": (1.04,) * 3, "base_radius_scale": 0.97}
     with rig(tmp_path, quick, **planted) as robot:

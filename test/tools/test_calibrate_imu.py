@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate imu`` finds planted sensor errors within the uncertainties that it claims."""
+"""Tests of ``calibrate imu``: it finds planted sensor errors within its claimed uncertainties."""
 
 import math
 from pathlib import Path
@@ -27,7 +27,10 @@ UPSIDE_DOWN = np.array([0.0, 0.0, -9.80665])
 
 
 def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost: int = 0) -> Imu:
-    """Return IMU readings with bias, force and white noise, of which ``lost`` are missing."""
+    """Return IMU readings with bias, force and white noise.
+
+    ``lost`` readings are missing in the middle.
+    """
     random = np.random.default_rng(seed)
     count = round(seconds / PERIOD_S)
     rates = BIAS + NOISE * random.standard_normal((count, 3))
@@ -38,7 +41,7 @@ def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost:
 
 
 def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
-    """Return a log of these IMU readings, with an odometry that moves by ``moved_m`` in total."""
+    """Return a log of these IMU readings, and of an odometry that moves by ``moved_m`` in total."""
     rows = np.column_stack((imu.stamp_s, imu.force_mps2, imu.rate_radps))
     way = np.linspace(0.0, moved_m, len(rows) // 4)
     odometry = [(4 * n * PERIOD_S, x, 0.0, 0.0, 0.0, 0.0, 0.0) for n, x in enumerate(way)]
@@ -46,9 +49,9 @@ def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """Errors of the bias divided by claimed uncertainties have a standard deviation near 1.
+    """The bias is measured in 200 rests. The claimed uncertainties agree with the true errors.
 
-    The test uses 200 simulated rests.
+    An error divided by its claimed uncertainty has a standard deviation near 1.
     """
     rests = [rest(sensor(20.0, seed)) for seed in range(200)]
     biases = np.array([(one.bias_radps - BIAS) / one.bias_sigma for one in rests])
@@ -65,7 +68,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
 ) -> None:
-    """Roll and pitch found at rest agree with the rotation matrix written out in this test."""
+    """A tilted sensor rests. The roll and pitch that are found agree with its rotation matrix."""
     roll += mounting
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
@@ -77,7 +80,10 @@ def test_level_is_the_turn_that_makes_gravity_point_up(
 
 
 def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
-    """The Allan deviation gives the noise density and the random walk of an hour of readings."""
+    """An hour of readings has noise and a drifting bias.
+
+    The Allan deviation gives the size of each.
+    """
     random = np.random.default_rng(3)
     walk, density = 2e-5, 5e-4
     count, period_s = 36_000, 0.1
@@ -89,7 +95,8 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
 
 
 def test_a_bias_that_walks_is_known_less_well() -> None:
-    """The claimed uncertainty of a drifting bias covers its value after a rest of ten minutes."""
+    """The bias drifts during a rest of ten minutes. The claimed uncertainty covers its last value.
+    """
     scores = []
     for seed in range(12):
         imu = sensor(600.0, seed)
@@ -102,9 +109,9 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 
 
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
-    """The picture of a long rest is smaller than 170 kB.
+    """The picture of a long rest is smaller than 170 kB, because it shows only some of the points.
 
-    A picture of noise does not compress well, so it shows fewer points than were measured.
+    A picture of noise does not compress well.
     """
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
@@ -114,7 +121,10 @@ def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
 
 
 def test_readings_that_say_nothing_are_turned_away() -> None:
-    """Too few, non-finite, stuck or interrupted readings are each rejected with a message."""
+    """The readings are too few, not finite, stuck or interrupted.
+
+    The tool rejects them with a message.
+    """
     with pytest.raises(ToolError, match="too few"):
         rest(sensor(0.5))
     imu = sensor(3.0)
@@ -130,7 +140,8 @@ def test_readings_that_say_nothing_are_turned_away() -> None:
 
 
 def test_a_robot_that_moves_is_not_at_rest() -> None:
-    """The tool rejects a rest in which odometry moves or the gyro rate exceeds any bias."""
+    """The tool rejects a rest during which the odometry moves or the gyro's rate exceeds any bias.
+    """
     still(np.zeros(3))(log_of(sensor(3.0)))
     with pytest.raises(ToolError, match="its wheels turn"):
         still(np.zeros(3))(log_of(sensor(3.0), moved_m=0.02))
@@ -141,7 +152,9 @@ def test_a_robot_that_moves_is_not_at_rest() -> None:
 def test_planted_errors_are_found_and_the_driver_loads_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In 4 s ``calibrate imu`` finds bias, noise, tilt and gravity through a real driver.
+    """The IMU has a bias, noise and a tilt.
+
+    ``calibrate imu`` finds them in 4 s through a real driver.
 
     Another driver loads the written file.
     """

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate geometry`` and ``scale`` find a two-wheeled base's odometry scales by tape."""
+"""Tests that ``calibrate geometry`` and ``scale`` find the odometry scales of a two-wheeled base.
+
+The user measures with a tape.
+"""
 
 import argparse
 import math
@@ -23,7 +26,7 @@ TRUE_LINEAR, TRUE_ANGULAR = 1.04, 0.97
 
 
 class TwoWheels:
-    """A robot whose odometry reports too short distances and too large angles."""
+    """A robot whose odometry reports distances that are too short and angles that are too large."""
 
     def __init__(self, **parameters: Any) -> None:
         self.parameters = {
@@ -63,7 +66,7 @@ def arguments(subcommand: str, *words: str) -> argparse.Namespace:
 
 
 def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
-    """Return a console whose user measures exactly, but adds ``misread_mm`` to the last reading."""
+    """Return a console whose user measures exactly. ``misread_mm`` is added to the last reading."""
     marks = [drive.wanted for drive in plan(1.0, 3)]
     asked = 0
 
@@ -82,7 +85,7 @@ def answers(robot: TwoWheels, misread_mm: float = 0.0) -> Console:
 @pytest.mark.parametrize("subcommand", [geometry, scale])
 @pytest.mark.parametrize("before", [1.0, 1.2])
 def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
-    """Both subcommands find the true scales, whatever ``odom_linear_scale`` was before."""
+    """Both subcommands find the true scales, for any former value of ``odom_linear_scale``."""
     robot = TwoWheels(odom_linear_scale=before)
     name = subcommand.__name__.rpartition(".")[2]
     found = subcommand.run(robot, answers(robot), arguments(name))
@@ -93,7 +96,7 @@ def test_both_scales_are_found_by_tape(subcommand: Any, before: float) -> None:
 
 
 class Encoder(TwoWheels):
-    """A robot whose driver has the parameter ``metres_per_count``, and a gyro for the heading."""
+    """A robot with a gyro for the heading. Its driver has the parameter ``metres_per_count``."""
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
@@ -107,9 +110,9 @@ class Encoder(TwoWheels):
 
 
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
-    """For a driver with ``metres_per_count`` the tool finds this value and ``linear_scale``.
+    """The driver has the parameter ``metres_per_count``. The tool finds it and ``linear_scale``.
 
-    The user measures only two lines, as this driver has no scales for its odometry.
+    The user measures only two lines, because this driver has no scales for its odometry.
     """
     robot = Encoder()
     console = Console(
@@ -131,9 +134,9 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
     shown: str, found: dict[str, float]
 ) -> None:
-    """The tool writes the motor balance that the driver has measured, unless it is unknown.
+    """The driver has measured the balance of the motors. The tool writes it to the file.
 
-    The balance is unknown before a drive forward.
+    Before a drive forward, the balance is unknown and is not written.
     """
     robot = Encoder(motor_balance=1.0)
     robot.diagnosed = {"Motor balance": shown}.__getitem__
@@ -146,7 +149,7 @@ def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
 
 
 def test_a_line_that_was_misread_is_told() -> None:
-    """After a misread line a note says that two lines of equal length differ too much."""
+    """The user misreads the tape on one line. A note says that two equal lines differ too much."""
     robot = TwoWheels()
     found = geometry.run(robot, answers(robot, misread_mm=100.0), arguments("geometry"))
     (note,) = found.notes
@@ -154,7 +157,10 @@ def test_a_line_that_was_misread_is_told() -> None:
 
 
 def test_a_robot_that_may_not_move_is_not_driven() -> None:
-    """If the driver's ``max_angular_speed`` is 0, the tool ends with an error that names it."""
+    """The driver's ``max_angular_speed`` is 0.
+
+    The tool ends with an error that names this parameter.
+    """
     robot = TwoWheels(max_angular_speed=0.0)
     with pytest.raises(ToolError, match="max_angular_speed is 0"):
         geometry.run(robot, answers(robot), arguments("geometry"))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parts that all calibrations share: bounds, questions, tables, files."""
+"""Tests of the parts that all calibrations share: bounds, questions, tables and files."""
 
 import io
 import math
@@ -32,7 +32,7 @@ commands = st.tuples(speeds, speeds, speeds)
 def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
     """Check for two simulated seconds that a robot obeys ``command``.
 
-    ``measured``: the constant velocity of the robot.
+    ``measured``: the robot's velocity, which is constant.
     """
     obedience = Obedience(topic, PARAMETERS.by_name)
     for tick in range(200):
@@ -40,7 +40,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 
 
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
-    """A robot with slow odometry has 3 s to move before the tool reports an error.
+    """The robot has slow odometry and does not move. The tool reports this only after 3 s.
 
     The error does not mention scales, because this robot has no parameter for them.
     """
@@ -53,7 +53,7 @@ def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
 
 
 def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
-    """Return a console that gets these answers in order, and the text that it shows."""
+    """Return a console with these answers, in order, and the text that it shows."""
     shown, left = io.StringIO(), list(answers)
     return Console(yes=yes, read=lambda _question: left.pop(0), file=shown), shown
 
@@ -62,9 +62,9 @@ def console(*answers: str, yes: bool = False) -> tuple[Console, io.StringIO]:
 def test_a_command_changes_no_faster_than_allowed(
     now: tuple[float, float, float], wanted: tuple[float, float, float], seconds: float
 ) -> None:
-    """Commands change no faster than the acceleration limits allow, and reach the target.
+    """Commands approach a target as fast as the acceleration limits allow, and reach it.
 
-    The linear velocity is limited as a vector, the yaw rate separately.
+    The linear velocity is limited as a vector, and the yaw rate separately.
     """
     then = BOUNDS.approach("cmd_vel", now, wanted, seconds)
     assert math.dist(then[:2], now[:2]) <= 0.3 * seconds + 1e-12
@@ -78,7 +78,7 @@ def test_a_command_changes_no_faster_than_allowed(
     "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
-    """A command above a bound or with NaN is refused; x and y count together as a vector."""
+    """A command above a bound or with NaN is refused. For the bound, x and y are one vector."""
     with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
         BOUNDS.require_allowed("cmd_vel", command)
     wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
@@ -88,7 +88,7 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """The error says how far the robot drove, how much it turned, or how long it took.
+    """A robot drives too far, turns too much or takes too long. The error says by how much.
 
     A pose that is not finite is an error, too.
     """
@@ -105,9 +105,9 @@ def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
 
 
 def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
-    """A robot obeys if it reaches a fifth of the command.
+    """A robot obeys if it reaches a fifth of the command. Otherwise the tool reports an error.
 
-    Slow commands are not judged, and NaN does not count as motion.
+    Very slow commands are not judged. NaN is not a motion.
     """
     watch("cmd_vel", (0.2, 0.0, 0.4), (0.05, 0.0, 0.1))
     watch("cmd_vel", (0.02, 0.0, 0.0), HALT)
@@ -119,7 +119,7 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """``stairs`` gives each command for its time, then None, which ends the motion."""
+    """``stairs`` gives each command for its time. Then it gives None, which ends the motion."""
     law = stairs([(1.0, (1.0, 0.0, 0.0)), (2.0, HALT), (1.0, (0.0, 1.0, 0.0))])
     assert [law(t, Pose()) for t in (0.0, 0.99, 1.0, 2.9, 3.5)] == [
         (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), HALT, HALT, (0.0, 1.0, 0.0),
@@ -128,7 +128,7 @@ def test_stairs_are_climbed_one_by_one() -> None:
 
 
 def test_an_empty_log_has_empty_columns() -> None:
-    """The columns of an empty log have zero rows, so calculations need no special case."""
+    """The log is empty. Its columns have zero rows, so that calculations need no special case."""
     log = Log()
     assert log.imu.rate_radps.shape == log.odometry.pose.shape == (0, 3)
     assert log.wheels.angle_rad.shape == log.wheels.rate_radps.shape == (0, 0)
@@ -136,14 +136,17 @@ def test_an_empty_log_has_empty_columns() -> None:
 
 
 def test_wheels_are_as_many_as_the_robot_has() -> None:
-    """A log splits each wheel row into the angles of all wheels and their rates."""
+    """A wheel row of the log has the angles of all wheels, then their rates.
+
+    The log separates them.
+    """
     log = Log(wheel_rows=[(0.0, 1.0, 2.0, 3.0, 4.0), (1.0, 5.0, 6.0, 7.0, 8.0)])
     assert log.wheels.angle_rad.tolist() == [[1.0, 2.0], [5.0, 6.0]]
     assert log.wheels.rate_radps.tolist() == [[3.0, 4.0], [7.0, 8.0]]
 
 
 def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
-    """The console repeats a question after an invalid answer.
+    """The console repeats a question until its answer is valid.
 
     A decimal comma is accepted, and an empty answer means no.
     """
@@ -157,7 +160,7 @@ def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
 
 
 def test_a_table_in_a_pipe_is_plain_text() -> None:
-    """A table in a pipe has no colours, and as many digits as the uncertainty allows."""
+    """A table in a pipe has no colours. A value has as many digits as its uncertainty allows."""
     asks, shown = console()
     findings = [
         Finding(name="linear_scale", value=80.12345, sigma=0.0234, unit="LSB/(m/s)", before=70.0),
@@ -179,7 +182,7 @@ def result(**parameters: object) -> Result:
 
 
 def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
-    """The driver loads the saved values, and other entries of the file are kept."""
+    """The driver loads the values that a calibration saves. Other entries of the file stay."""
     path = tmp_path / "robot.yaml"
     path.write_text("name: number 7\ngyro_bias: [0.0, 0.0, 0.1]\nlinear_scale: 71.0\n")
     save(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path, PARAMETERS)
@@ -198,7 +201,8 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
-    """The check before a drive accepts paths in missing folders; saving creates the folders."""
+    """The folders of the files are missing. The tool accepts the paths and makes the folders later.
+    """
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
     assert output_file(str(path), "", PARAMETERS) == path
     assert picture_file(str(picture), "imu") == picture
@@ -209,15 +213,15 @@ def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
 
 
 def test_everything_that_may_be_written_is_a_parameter() -> None:
-    """Calibrations may write the parameters axis_signs, gyro_bias and linear_scale."""
+    """A calibration may write axis_signs, gyro_bias and linear_scale."""
     assert {"axis_signs", "gyro_bias", "linear_scale"} < set(PARAMETERS.calibrated)
 
 
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
-    """Before any motion the tool rejects unsuitable files for the calibration and the picture.
+    """The user names an unsuitable file for the calibration or the picture. The tool rejects it.
 
-    Examples are ROS parameter files, invalid values, files in place of folders, and unknown types
-    of images.
+    Examples are a file of ROS parameters, an invalid value, a file in place of a folder, and an
+    unknown type of picture.
     """
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")
@@ -238,16 +242,16 @@ def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -
     "words", [[], ["nonsense"], ["imu", "--minutes", "0"], ["scale", "--levels", "x"]]
 )
 def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """After wrong arguments the tool prints a message on stderr and returns exit code 2."""
+    """The user gives wrong arguments. The tool prints a message on stderr and exits with code 2."""
     assert main(words) == 2
     assert "calibrate" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("what", "thing"), [("imu", "an IMU"), ("step", "a wheel controller")])
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
-    """A calibration that a board does not support, by its parameters, is refused.
+    """The board lacks what a calibration needs. The calibration is refused in one sentence.
 
-    The OmniBot supports every calibration.
+    The OmniBot has what every calibration needs.
     """
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)
@@ -258,6 +262,6 @@ def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: s
 
 
 def test_step_is_refused_where_the_control_of_a_wheel_is_not_known() -> None:
-    """``calibrate step`` is refused for MART, which has no commands for single wheels."""
+    """``calibrate step`` is refused for a MART, which has no commands for single wheels."""
     with pytest.raises(ToolError, match=r"the board mart does not have$"):
         require_able("step", boards.check_all({"board": "mart"}))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every motion of a calibration ends at rest, and an interrupted one gives its reason."""
+"""Tests of a calibration's motions: each ends at rest, and an interrupted one gives its reason."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def stands(board: SimulatedBoard) -> bool:
 
 
 def once(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` once, ``AFTER_S`` after the motion began."""
+    """Return a callback that calls ``action`` once, ``AFTER_S`` seconds after the motion began."""
     left = [action]
 
     def show(seconds: float) -> None:
@@ -51,7 +51,10 @@ def repeated(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: Rig) -> None:
-    """A motion follows its commands and ends at rest; the log has commands and measurements."""
+    """A motion follows its commands and ends at rest.
+
+    The log has the commands and the measurements.
+    """
     before = rigged.port.board.truth
     log = robot.drive(steady((0.0, 0.15, 0.3), 1.0), BOUNDS)
     after = rigged.port.board.truth
@@ -80,7 +83,12 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
 def test_what_happens_on_the_way_ends_it_at_rest(
     robot: Robot, rigged: Rig, what: str, sentence: str
 ) -> None:
-    """An e-stop, a reboot, commands of another node or ctrl-C end the motion at rest."""
+    """The e-stop, a reboot, commands of another node or ctrl-C interrupt a motion.
+
+    The robot comes to rest.
+
+    The error gives the reason.
+    """
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
     other = node.create_publisher(Twist, "cmd_vel", 1)
@@ -114,14 +122,14 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 
 
 def test_a_value_of_the_diagnostics_is_found_by_its_name(robot: Robot, rigged: Rig) -> None:
-    """``diagnosed`` returns the value that the driver's diagnostics have under a given name."""
+    """``diagnosed`` returns the value with a given name from the driver's diagnostics."""
     assert robot.diagnosed("Port") == rigged.port.path
 
 
 def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None:
-    """A robot that goes too far by its odometry is stopped.
+    """The odometry shows that the robot goes too far. The tool stops the robot.
 
-    Commands above the speed limit are not sent.
+    A command above the speed limit is not sent.
     """
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
     with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from its start, 0\.05"):
@@ -133,9 +141,9 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
 
 
 def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
-    """The tool reports a robot that does not move.
+    """The robot is commanded, but does not move. The tool reports this.
 
-    With a ``linear_scale`` of one count per m/s the driver rounds every command to zero.
+    In the test, ``linear_scale`` is one count per m/s, so the driver rounds every command to zero.
     """
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):
@@ -144,9 +152,10 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
 
 
 def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """After an interruption the driver's motion monitor is on again.
+    """The tool has switched the driver's motion monitor off for a motion, and ctrl-C interrupts it.
 
-    The tool switches the monitor off only during a motion that the monitor would stop.
+    The tool switches the monitor on again. It switches the monitor off only for a motion that the
+    monitor would stop.
     """
     seen = []
 
@@ -162,7 +171,9 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 
 
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """After any exception the tool switches the driver's motion monitor on again.
+    """A defect in the tool interrupts a motion.
+
+    The tool switches the driver's motion monitor on again.
 
     Otherwise the monitor would stay off until the driver restarts.
     """
@@ -179,7 +190,10 @@ def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> Non
 def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
     robot: Robot, rigged: Rig
 ) -> None:
-    """After ctrl-Z and fg the tool sends only zeros, as the driver has stopped the robot."""
+    """The user suspends the tool during a motion, so the driver stops the robot.
+
+    When the tool resumes, it sends only zeros and ends with an error.
+    """
     clock = SimpleNamespace(monotonic=time.monotonic)
 
     def suspend() -> None:
@@ -198,7 +212,7 @@ def test_a_program_that_was_suspended_moves_nothing_when_it_wakes_up(
 def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the robot does not come to rest, the error says to cut its power.
+    """The robot does not come to rest after Stop. The error says to cut the robot's power.
 
     This advice is added to the original error, if there is one.
     """
@@ -216,7 +230,10 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 
 
 def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
-    """A NaN position ends the motion, and a NaN twist does not prove a standstill."""
+    """The odometry has NaN.
+
+    A NaN position ends the motion, and a NaN twist does not prove a standstill.
+    """
     nonsense = Odometry()
     nonsense.pose.pose.position.x = nonsense.twist.twist.linear.x = float("nan")
 
@@ -230,7 +247,8 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A topic counts as silent after 0.3 s without data; only the wanted topics are judged."""
+    """A topic is silent after 0.3 s without data. Only the topics that a motion needs are checked.
+    """
     monkeypatch.setattr(listener, "LOST_S", LOST_S)
     heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}
     assert listener.silent(heard_s, listener.TOPICS, 10.19) == []
@@ -240,7 +258,7 @@ def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.Mo
 
 
 def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixture[str]) -> None:
-    """If the user answers no or the input ends, the tool moves nothing and writes nothing."""
+    """The user answers no, or the input ends. The tool moves nothing and writes nothing."""
     commands = len(rigged.port.board.commands)
     assert rigged.calibrate("scale", answer=lambda _question: "n") == 1
     assert "you said no" in capsys.readouterr().err
@@ -257,7 +275,10 @@ def test_a_no_moves_and_writes_nothing(rigged: Rig, capsys: pytest.CaptureFixtur
 def test_ctrl_c_at_an_open_question_ends_it(
     rigged: Rig, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Ctrl-C at a question ends the tool with exit code 130, and the robot does not move."""
+    """The user presses ctrl-C at a question.
+
+    The tool exits with code 130, and the robot does not move.
+    """
 
     def interrupt(_question: str) -> str:
         os.kill(os.getpid(), signal.SIGINT)
@@ -270,9 +291,11 @@ def test_ctrl_c_at_an_open_question_ends_it(
 
 
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """If the driver is killed, its guard stops the robot, and the tool reports missing data.
+    """The driver is killed during a motion.
 
-    This is the last test of the module, as it ends the shared driver.
+    Its guard stops the robot, and the tool reports missing data.
+
+    This is the last test of the module, because it ends the driver that the tests share.
     """
 
     def kill() -> None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate scale`` finds the units of the board's commands: counts per m/s and per rad/s."""
+"""Tests of ``calibrate scale``, which finds the board's units: counts per m/s and per rad/s."""
 
 import math
 from pathlib import Path
@@ -23,9 +23,9 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """Return the log of a robot with ``true`` scales that gets commands computed with ``ASSUMED``.
+    """Return the log of a robot whose board has ``true`` scales. The tool assumes ``ASSUMED``.
 
-    ``gyro`` is a factor on the rate that the robot's gyro measures.
+    ``gyro``: a factor on the rate that the robot's gyro measures.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -56,7 +56,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """Odometry and gyro give the true scale within five sigmas, whatever scale was assumed."""
+    """The board has any scale. Odometry and gyro each give it within five claimed sigmas."""
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
     assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)
@@ -72,9 +72,9 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """Planned commands are whole counts, and at most ``top``.
+    """Planned commands are whole counts of the board, and are not above ``top``.
 
-    If ``top`` is less than one count, they are at most one count.
+    If ``top`` is less than one count, they may be one count.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -83,7 +83,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """The tool does not measure a speed whose commands paused.
+    """The commands pause during a speed, and the tool does not measure this speed.
 
     The driver may have stopped the robot during the pause.
     """
@@ -95,7 +95,7 @@ def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
 
 
 def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
-    """If gyro and odometry differ by 5 %, a note recommends ``calibrate geometry``.
+    """Gyro and odometry differ by 5 %. A note recommends ``calibrate geometry``.
 
     A difference of 2 % is within the gyro's tolerance.
     """
@@ -106,13 +106,14 @@ def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
 
 
 def test_axes_that_disagree_are_told() -> None:
-    """If the scales of x and y differ, a note says so, as both axes share one parameter."""
+    """The scales of x and y differ, but both axes share one parameter. A note says so."""
     found = speeds(drive((70.0, 72.0, 500.0)), ASSUMED, UP, NO_BIAS)
     assert "x and y differ by 2.8%" in result(found, NOW).notes[0]
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """A log without a steady speed, or a robot that drives against its commands, is an error."""
+    """A log without a steady speed is an error, and also a robot that drives against its commands.
+    """
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):
@@ -122,9 +123,9 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """``calibrate scale`` finds planted scales through a real driver; ``--apply`` sets them.
+    """A board has other scales than usual. ``calibrate scale`` finds them through a real driver.
 
-    The driver takes stamped commands.
+    ``--apply`` sets them in the driver, which takes stamped commands here.
     """
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:

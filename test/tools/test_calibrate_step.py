@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` with a real driver: a planted motor is found, reported, drawn and saved."""
+"""Tests of ``calibrate step`` with a real driver: it finds, reports, draws and saves a motor."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -23,7 +23,7 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``calibrate step`` finds the motor that is planted in wheel B, within 5 %.
+    """Wheel B has another motor than the other wheels. ``calibrate step`` finds it within 5 %.
 
     The tolerance allows for a busy test machine.
     """
@@ -55,7 +55,10 @@ def test_a_planted_motor_is_found(
 
 
 def still(answer: str, *words: str) -> None:
-    """Run ``calibrate step`` on a robot that cannot move, with a user who gives ``answer``."""
+    """Run ``calibrate step`` on a robot that cannot move.
+
+    The user gives ``answer`` to all questions.
+    """
     parameters = {parameter.name: parameter.default for parameter in PARAMETERS.rows}
     robot = SimpleNamespace(parameters=parameters)
     arguments = command_line().parse_args(["step", *words])
@@ -75,12 +78,12 @@ def still(answer: str, *words: str) -> None:
 def test_what_cannot_be_done_is_said_before_anything_moves(
     words: list[str], complaint: str
 ) -> None:
-    """An invalid option of ``calibrate step`` is refused before any motion, with a reason."""
+    """The user gives an invalid option. The tool refuses it with a reason before any motion."""
     with pytest.raises(ToolError, match=complaint):
         still("y", *words)
 
 
 def test_a_no_moves_nothing() -> None:
-    """If the user answers no, ``calibrate step`` ends with an error before any motion."""
+    """The user answers no. ``calibrate step`` ends with an error before any motion."""
     with pytest.raises(ToolError, match="you said no"):
         still("n")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Conclusions of ``calibrate commission`` from wheel patterns, IMU postures and drifts."""
+"""Tests of what ``calibrate commission`` concludes from wheel patterns, IMU postures and drifts."""
 
 import math
 from itertools import product
@@ -36,7 +36,7 @@ PATTERNS = list(product((1, 0, -1), repeat=3))
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """Return the rotation matrix of fixed-axis roll, pitch and yaw, in rad."""
+    """Return the rotation matrix of roll, pitch and yaw (in rad) about fixed axes."""
     about_x = [[1, 0, 0], [0, math.cos(roll), -math.sin(roll)], [0, math.sin(roll), math.cos(roll)]]
     about_y = [
         [math.cos(pitch), 0, math.sin(pitch)],
@@ -48,9 +48,9 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """Return the upward direction, in the sensor's axes, for three postures of the robot.
+    """Return the direction "up" for three postures of the robot, as the mounted sensor measures it.
 
-    The postures are level, nose up and left side up.
+    In the postures the robot is level, its nose is up, and its left side is up.
     """
     bodies = (
         (0.0, 0.0, 1.0),
@@ -64,7 +64,10 @@ def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.n
 
 
 def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
-    """The wanted signs are those in the table of the commissioning guide, copied by hand."""
+    """The expected signs of the wheels are those in the table of the commissioning guide.
+
+    They were copied by hand.
+    """
     assert [wanted(axis) for axis in range(3)] == [(-1, 1, 0), (-1, -1, 1), (-1, -1, -1)]
 
 
@@ -76,7 +79,7 @@ def test_three_signs_are_understood(answer: str) -> None:
 
 @pytest.mark.parametrize("answer", ["", "+", "++", "+0-+", "abc", "1 0 -1", "yes"])
 def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
-    """For an answer without exactly three signs ``understand`` returns None."""
+    """The answer does not have exactly three signs. ``understand`` returns None."""
     assert understand(answer) is None
 
 
@@ -85,7 +88,7 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """A commanded wheel has two possible patterns: it turns alone, forward or backward.
+    """One wheel is commanded. It may turn forward or backward, and the other wheels must rest.
 
     All other patterns of the 27 are contradictions.
     """
@@ -102,7 +105,7 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """A commanded axis has two possible patterns: the expected one and its reverse.
+    """One axis is commanded. The wheels may turn in the expected pattern or in its reverse.
 
     All other patterns of the 27 are contradictions.
     """
@@ -117,7 +120,10 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 
 
 def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
-    """Signs that reverse one axis mirror the robot; those that reverse x and y turn it by 180°."""
+    """If one axis is reversed, the signs mirror the robot.
+
+    If x and y are reversed, they turn it by 180°.
+    """
     assert not mirrored((1, 1, 1))
     assert not mirrored((-1, -1, 1))
     assert mirrored((-1, 1, 1))
@@ -130,7 +136,8 @@ def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
 ) -> None:
-    """Any mounting of the sensor is found exactly, whatever the angles of the two tilts are."""
+    """The sensor has any mounting. It is found exactly, whatever the angles of the two tilts are.
+    """
     planted = rotation(roll, pitch, yaw)
     found = mounting(*postures(planted, nose_rad, left_rad))
     assert found.rotation == pytest.approx(planted, abs=1e-6)
@@ -139,14 +146,15 @@ def test_any_mounting_is_found_from_three_postures(
 
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_angles_are_those_of_a_description(roll: float, pitch: float, yaw: float) -> None:
-    """Roll, pitch and yaw of a rotation give the same rotation again."""
+    """Roll, pitch and yaw are computed from a rotation. They give the same rotation again."""
     made = rotation(roll, pitch, yaw)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])
 def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
-    """At a pitch of 90° roll and yaw have the same axis, so one of many solutions is returned."""
+    """The pitch is 90°, so roll and yaw have the same axis. One of the many solutions is returned.
+    """
     made = rotation(0.3, pitch, 0.4)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
@@ -159,7 +167,10 @@ def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
 def test_a_clumsy_hand_still_finds_right_angles(
     mounted: tuple[float, float, int], slips: list[float]
 ) -> None:
-    """Tilts askew by 5° still give the right one of the 24 right-angled mountings."""
+    """The user tilts the robot askew by 5°.
+
+    The right one of the 24 right-angled mountings is found.
+    """
     planted = rotation(mounted[0], mounted[1], mounted[2] * math.pi / 2)
     level = postures(planted, 0.5, 0.6)[0]
     body_nose = rotation(slips[0], 0, slips[1]) @ np.array([math.sin(0.5), 0, math.cos(0.5)])
@@ -170,7 +181,7 @@ def test_a_clumsy_hand_still_finds_right_angles(
 
 
 def test_a_sensor_mounted_askew_stays_so() -> None:
-    """The yaw of a sensor that is mounted at 30° is not rounded to a right angle."""
+    """A sensor is mounted with a yaw of 30°. The tool does not round this to a right angle."""
     assert mounting(*postures(rotation(math.pi, 0, math.pi / 6), 0.5, 0.5)).snapped() is None
 
 
@@ -178,7 +189,10 @@ def test_a_sensor_mounted_askew_stays_so() -> None:
 def test_a_side_lowered_instead_of_raised_is_a_contradiction(
     nose_rad: float, left_rad: float
 ) -> None:
-    """A lowered nose or left side is a contradiction: the measured axes would be left-handed."""
+    """The user lowers the nose or the left side instead of raising it. This is a contradiction.
+
+    The measured axes would be left-handed.
+    """
     level, nose_up, left_up = postures(rotation(math.pi, 0, 0), nose_rad, left_rad)
     with pytest.raises(Contradiction, match="repeat both tilts"):
         mounting(level, nose_up, left_up)
@@ -186,7 +200,7 @@ def test_a_side_lowered_instead_of_raised_is_a_contradiction(
 
 @pytest.mark.parametrize("tilt_rad", [0.05, 1.5])
 def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
-    """A tilt of 3° is too small to be accepted, and a tilt of 86° is too large."""
+    """The user tilts the robot by 3°, which is too little, or by 86°, which is too much."""
     with pytest.raises(Contradiction, match="front raised"):
         mounting(*postures(np.eye(3), tilt_rad, 0.5))
 
@@ -194,15 +208,15 @@ def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
 def resting(
     force: tuple[float, float, float], rate: tuple[float, float, float], seconds: float
 ) -> Imu:
-    """Return IMU readings with a constant force and a constant rate for ``seconds``."""
+    """Return IMU readings with a constant force and a constant rate. They last ``seconds``."""
     stamps = np.arange(0.0, seconds, 0.01)
     return Imu(stamps, np.tile(force, (len(stamps), 1)), np.tile(rate, (len(stamps), 1)))
 
 
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
-    """The angle of a turn is measured about the vertical, after the gyro's bias is subtracted.
+    """The user turns the robot by hand. A turn to the right, or by too little, is a contradiction.
 
-    A turn to the right or by too little is a contradiction.
+    The angle is measured about the vertical, after the gyro's bias is subtracted.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
@@ -217,7 +231,7 @@ def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
 
 
 def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
-    """A trembling hand, a wrong gravity and an empty record are each rejected."""
+    """A trembling hand, a wrong gravity and a record without readings are each rejected."""
     shaking = resting((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
     shaking.rate_radps[::2] = 0.5
     with pytest.raises(Contradiction, match="not held still"):
@@ -232,13 +246,18 @@ def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
 
 
 def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
-    """Return a drift with the same speed from beginning to end."""
+    """Return a drift with a constant speed."""
     return Drift(vx, vy, yaw_rate, math.hypot(vx, vy), math.hypot(vx, vy))
 
 
 @given(st.floats(0.3, 3.0), angles)
 def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> None:
-    """Velocity control is recognised whatever the command's unit and direction are."""
+    """The robot drives twice as fast when the command is doubled.
+
+    The tool recognises velocity control.
+
+    The command's unit and direction do not matter.
+    """
     x, y = 0.06 * scale * math.cos(direction_rad), 0.06 * scale * math.sin(direction_rad)
     assert control_method(steady(x, y), steady(2 * x, 2 * y), 0.06) == "velocity"
 
@@ -253,9 +272,9 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
     ],
 )
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
-    """The tool recognises positional control by the motion of the robot.
+    """The robot stops at a goal, or drives equally fast with both commands.
 
-    The robot stops at its goal, or drives with both commands at the same speed.
+    The tool recognises positional control.
     """
     assert control_method(slow, fast, 0.06) == "position"
 
@@ -269,9 +288,9 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     ],
 )
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
-    """If the motion fits neither control method, the tool finds none.
+    """The motion fits neither control method, so the tool finds none.
 
-    For example, the robot becomes faster under one command, because this command came late.
+    For example, a command came late, so the robot becomes faster during it.
     """
     assert control_method(slow, fast, 0.06) is None
 
@@ -280,10 +299,10 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """With the right delta frame, the odometry shows the same direction before and after a turn.
+    """The robot drives in one direction of the room before and after a turn.
 
-    With the wrong frame, the direction changes by the angle of the turn. Any other change is an
-    error.
+    With the right delta frame, the odometry shows the same direction. With the wrong frame, the
+    direction changes by the angle of the turn. Any other change is an error.
     """
 
     def heading(rad: float) -> Drift:
@@ -298,9 +317,10 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """A turn on the spot shows whether the driver interprets the deltas correctly.
+    """The robot turns on the spot. This shows whether the driver interprets the deltas correctly.
 
-    Calculated by hand: 0.5 rad/s is 20 mrad, or 24 counts of each wheel, in 40 ms.
+    The expected numbers are calculated by hand: 0.5 rad/s is 20 mrad in 40 ms, or 24 counts of each
+    wheel.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
@@ -311,9 +331,9 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """``drift`` uses only data from the given interval of time.
+    """``drift`` uses only the data between two times. If this data is missing, that is an error.
 
-    Missing data and a robot at rest are errors.
+    A robot that does not move is an error, too.
     """
     stamps = np.arange(0.0, 4.0, 0.04)
     twist = np.zeros((100, 3))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Running drivers are found by their topics alone."""
+"""Tests that running drivers are found by their topics."""
 
 from types import SimpleNamespace
 
@@ -22,9 +22,9 @@ def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
 
 
 def test_one_that_is_only_listened_to_does_not_run() -> None:
-    """A driver runs only if its topics have publishers.
+    """A tool waits for a driver and subscribes to its topics, so the topics exist without a driver.
 
-    A tool that waits for a driver subscribes to the topics, and so creates them.
+    Only topics with publishers show that a driver runs.
     """
     counts = {"/a/state": 1, "/a/estop_active": 1, "/b/state": 0, "/b/estop_active": 0}
     node = SimpleNamespace(

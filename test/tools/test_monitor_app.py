@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor's dashboard at 80x24 characters, with a fake robot."""
+"""Tests of the monitor's dashboard at 80x24 characters, with a fake robot."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -36,7 +36,7 @@ def on_screen(robot: FakeRobot, steps: Callable[[Pilot[Any], Monitor], Awaitable
 
 
 def screen(app: Monitor) -> list[str]:
-    """Return the visible screen, row by row."""
+    """Return the text on the screen, row by row."""
     return [
         "".join(segment.text for segment in strip)
         for strip in app.screen._compositor.render_strips()
@@ -44,7 +44,7 @@ def screen(app: Monitor) -> list[str]:
 
 
 def press(*keys: str, teleop: bool = False) -> FakeRobot:
-    """Press these keys; return the robot with the requests that it got."""
+    """Press these keys, and return the robot with the requests that it got."""
     robot = FakeRobot(teleop=teleop)
 
     async def steps(pilot: Pilot[Any], _app: Monitor) -> None:
@@ -106,20 +106,24 @@ def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
 
 
 def test_the_estop_is_released_by_two_keys() -> None:
-    """The key R asks whether to release the e-stop; y confirms, and any other key cancels."""
+    """The key R asks whether to release the e-stop. The key y confirms, and any other key cancels.
+    """
     assert press("R", "y").asked == ["release"]
     answers = ("n", "enter", "escape", "R", "w")
     assert press(*(key for answer in answers for key in ("R", answer)), teleop=True).asked == []
 
 
 def test_space_stops_even_while_a_question_stands() -> None:
-    """Space requests the e-stop and answers the open question with no."""
+    """The monitor asks whether to release the e-stop.
+
+    The space bar means no, and requests the e-stop.
+    """
     assert press("R", "space", "y").asked == ["estop"]
 
 
 @pytest.mark.parametrize("keys", [["q"], ["ctrl+c"], ["ctrl+q"]])
 def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> None:
-    """ctrl-C and ctrl-Q end the dashboard, too, although its last line names only q."""
+    """The keys q, ctrl-C and ctrl-Q end the dashboard. Its last line names only q."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -140,14 +144,14 @@ def test_keys_steer_with_teleop_alone(key: str) -> None:
 
 
 def test_plus_and_minus_change_the_speed() -> None:
-    """Plus and minus change the speed by one of ten levels; the monitor begins at level 3."""
+    """Plus and minus change the speed by one of ten levels. The monitor begins at level 3."""
     robot = press("plus", "plus", "minus", teleop=True)
     assert robot.dead_man
     assert robot.dead_man.level == 4
 
 
 def test_who_looks_elsewhere_does_not_steer() -> None:
-    """When the terminal loses the focus, the motion of a held key ends."""
+    """The terminal loses the focus while a key is held. The motion ends."""
     robot = FakeRobot(teleop=True)
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:
@@ -162,7 +166,8 @@ def test_who_looks_elsewhere_does_not_steer() -> None:
 
 
 def test_nothing_in_a_message_is_markup() -> None:
-    """Brackets in a message are shown unchanged and do not format it."""
+    """A message has brackets. The dashboard shows them unchanged and does not format the message.
+    """
     robot = FakeRobot()
     robot.shown = view(said="[/bold] [red", driver="/[b]")
 
@@ -174,7 +179,7 @@ def test_nothing_in_a_message_is_markup() -> None:
 
 
 def test_a_key_for_what_the_board_cannot_do_is_not_there() -> None:
-    """A key for a function that the board lacks is hidden and sends no request."""
+    """The board lacks a function. The key for this function is hidden and sends no request."""
     robot = FakeRobot()
     robot.shown = view(lacks=frozenset({"pause"}))
 

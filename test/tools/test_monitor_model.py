@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor's model of the robot: rates, latest values, path."""
+"""Tests of the monitor's model of the robot: rates, latest values and path."""
 
 import math
 
@@ -22,7 +22,8 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 
 @given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
-    """The measured rate of a steady stream is right within one message per window."""
+    """Messages arrive at a constant rate. The measured rate is right within one message per window.
+    """
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
         rate.arrived(began_s + number / hz)
@@ -31,7 +32,10 @@ def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: fl
 
 @given(waits_s)
 def test_no_arrival_is_lost_or_made_up(waits: list[float]) -> None:
-    """The history counts every message of the last minute exactly once, second by second."""
+    """The history has the number of messages in each second of the last minute.
+
+    Each message is counted exactly once.
+    """
     rate, arrivals, now_s = Rate(0.0), [], 0.0
     for wait_s in waits:
         now_s += wait_s
@@ -47,7 +51,7 @@ def test_no_arrival_is_lost_or_made_up(waits: list[float]) -> None:
 
 @given(waits_s, st.floats(WINDOW_S + 0.01, 1e4))
 def test_what_has_ceased_has_no_rate(waits: list[float], silence_s: float) -> None:
-    """After a window without messages the rate is 0, and the history continues with zeros."""
+    """The messages end. After a window the rate is 0, and the history continues with zeros."""
     rate, now_s = Rate(0.0), 0.0
     for wait_s in waits:
         now_s += wait_s
@@ -60,7 +64,7 @@ def test_what_has_ceased_has_no_rate(waits: list[float], silence_s: float) -> No
 
 
 def test_the_way_is_kept_in_steps() -> None:
-    """A robot at rest adds nothing to the path; a moving one adds a point every 2 cm."""
+    """A moving robot adds a point to the path every 2 cm. A robot at rest adds nothing."""
     model = Model("/omnibot_driver", 0.0)
     for tick in range(1000):
         model.odom(Pose(min(tick, 500) * 0.001, 0.0), HALT, tick * 0.04)
@@ -78,7 +82,10 @@ def test_the_way_is_bounded() -> None:
 
 
 def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
-    """A jump that the robot cannot make, such as a reset of odometry, begins a new path."""
+    """The pose jumps farther than the robot can move, as after a reset of odometry.
+
+    A new path begins.
+    """
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(2.0, 0.0), HALT, 1.0)
     model.odom(Pose(0.0, 0.0), HALT, 1.04)
@@ -86,7 +93,7 @@ def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
 
 
 def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
-    """NaN and infinity in a pose are shown and named, but the path omits such a pose."""
+    """A pose has NaN or infinity. The view shows and names it, but the path omits it."""
     model = Model("/omnibot_driver", 0.0)
     for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):
         model.odom(Pose(x_m, 0.0), BodyTwist(x_m, 0.0, 0.0), 0.1 * number)
@@ -96,7 +103,7 @@ def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
 
 
 def test_a_command_that_nobody_repeats_is_none() -> None:
-    """A command older than 0.5 s no longer moves the robot, so it is not shown."""
+    """A command is older than 0.5 s, so it no longer moves the robot. The view does not show it."""
     model = Model("/omnibot_driver", 0.0)
     model.commanded(BodyTwist(0.1, 0.0, 0.0), 1.0)
     assert model.view(1.4).commanded == BodyTwist(0.1, 0.0, 0.0)
@@ -104,7 +111,10 @@ def test_a_command_that_nobody_repeats_is_none() -> None:
 
 
 def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
-    """Only messages from the driver end the driver's silence; commands of other nodes do not."""
+    """The driver is silent while another node sends commands.
+
+    The view still shows the driver as silent.
+    """
     model = Model("/omnibot_driver", 0.0)
     model.state("nominal", 1.0)
     model.commanded(HALT, 9.0)
@@ -112,7 +122,10 @@ def test_commands_do_not_make_a_silent_driver_look_alive() -> None:
 
 
 def test_what_was_measured_once_is_not_what_is_measured() -> None:
-    """The view omits outdated velocities, IMU data and diagnostics, but keeps the last pose."""
+    """The last messages are old. The view omits velocities, IMU data and diagnostics.
+
+    It keeps the last pose.
+    """
     model = Model("/omnibot_driver", 0.0)
     model.odom(Pose(1.0, 0.0), BodyTwist(0.2, 0.0, 0.0), 1.0)
     model.imu((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
@@ -135,12 +148,12 @@ def test_what_was_measured_once_is_not_what_is_measured() -> None:
     ],
 )
 def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: list[str]) -> None:
-    """A topic is missing only in a state in which the board should send its data."""
+    """The view reports a missing topic only in a state in which the board should send its data."""
     assert view(state=state, imu=NOTHING, odom=NOTHING).missing(diagnostics=True) == missing
 
 
 def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
-    """Missing diagnostics are reported only if diagnostics are expected.
+    """The view reports missing diagnostics only if diagnostics are expected.
 
     A driver that replays a recording publishes no diagnostics.
     """
@@ -149,7 +162,7 @@ def test_diagnostics_are_missing_where_somebody_publishes_them() -> None:
 
 
 def test_a_level_that_is_none_counts_as_an_error() -> None:
-    """An unknown level counts as an error; any node may publish one on /diagnostics."""
+    """A node publishes an unknown level on /diagnostics. The monitor shows it as an error."""
     assert [level(byte) for byte in (0, 1, 2, 3, 4, 255)] == [
         *(Level.OK, Level.WARN, Level.ERROR, Level.STALE),
         *(Level.ERROR, Level.ERROR),

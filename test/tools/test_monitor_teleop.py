@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steering by keys: the robot stops when the key is released."""
+"""Tests of steering by keys: the robot stops when the key is released."""
 
 import pytest
 from hypothesis import given
@@ -28,7 +28,8 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
 
 @given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
-    """A motion ends with ``ZEROS`` zero commands, at the latest ``FIRST_S`` after the last key."""
+    """The motion ends with ``ZEROS`` zero commands, at the latest ``FIRST_S`` after the last key.
+    """
     dead_man, now_s = DeadMan(), 0.0
     for key, wait_s in presses:
         now_s += wait_s
@@ -40,7 +41,10 @@ def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, f
 
 @given(keys, st.floats(0.02, FIRST_S - 0.01), st.floats(0.02, REPEAT_S - 0.01))
 def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: float) -> None:
-    """A held key moves the robot without a break, even before the keyboard begins to repeat."""
+    """The user holds a key.
+
+    The robot moves without a break, even before the keyboard repeats the key.
+    """
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     assert dead_man.command(delay_s - 0.001) not in (None, HALT)
@@ -51,7 +55,8 @@ def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: flo
 
 
 def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
-    """A motion ends 0.3 s after the last repetition of a key, or 0.6 s after a single press."""
+    """After a single press, the motion ends after 0.6 s. After a repetition, it ends after 0.3 s.
+    """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.59) != HALT
@@ -62,7 +67,9 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 
 @pytest.mark.parametrize("key_first", [True, False])
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
-    """Keys pressed while the program was suspended are discarded; later keys steer again.
+    """The user presses keys while the program is suspended.
+
+    They are discarded, and later keys steer.
 
     The order in which key presses and commands are processed does not matter.
     """
@@ -79,7 +86,7 @@ def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) ->
 
 
 def test_stop_is_at_once() -> None:
-    """After ``stop`` the next command is zero, although the last key would still be valid."""
+    """After ``stop`` the next command is zero, although the last key press is still recent."""
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
     assert dead_man.command(0.01) != HALT
@@ -88,7 +95,7 @@ def test_stop_is_at_once() -> None:
 
 
 def test_who_has_not_steered_commands_nothing() -> None:
-    """Before the first steering key the monitor publishes nothing, not even zero commands.
+    """Before the first steering key, the monitor publishes no commands, not even zeros.
 
     Another node may be driving the robot.
     """
@@ -110,7 +117,8 @@ def test_who_has_not_steered_commands_nothing() -> None:
     ],
 )
 def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> None:
-    """Keys command x forward, y to the left, and positive turns to the left, as in REP-103."""
+    """Each key commands its direction: x is forward, y is left, and a positive turn is to the left.
+    """
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
     command = dead_man.command(0.0)
@@ -119,7 +127,8 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """Speeds range from a tenth of the driver's limits to the full limits."""
+    """The user changes the speed. It stays between a tenth of the driver's limits and the limits.
+    """
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)
     for step in steps:

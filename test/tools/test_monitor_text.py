@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the monitor shows: text, numbers, the plot of the path, JSON."""
+"""Tests of what the monitor shows: text, numbers, the plot of the path, JSON."""
 
 import json
 import math
@@ -26,7 +26,10 @@ triples = st.tuples(anything, anything, anything)
 def test_no_value_breaks_the_screen(
     pose: tuple[float, ...], twist: tuple[float, ...], force: Any, rate: Any
 ) -> None:
-    """NaN, infinity and 1e300 are shown as such, and every line fits its column."""
+    """The values have NaN, infinity or 1e300.
+
+    The monitor shows them, and every line fits its column.
+    """
     shown = view(pose=Pose(*pose), measured=BodyTwist(*twist), force_mps2=force, rate_radps=rate)
     lines = text.figures(shown)
     assert max(map(len, lines)) <= 42
@@ -38,7 +41,7 @@ def test_no_value_breaks_the_screen(
 
 
 def test_json_holds_the_values() -> None:
-    """The JSON has all values in SI units; values that are not finite are null."""
+    """The JSON has all values in SI units. Values that are not finite are null."""
     told = json.loads(text.as_json(view(force_mps2=(math.nan, 1.0, math.inf)), ["trouble"]))
     assert told["driver"] == "/robot1/omnibot_driver"
     assert (told["state"], told["estop"]) == ("nominal", False)
@@ -51,7 +54,7 @@ def test_json_holds_the_values() -> None:
 
 
 def test_what_is_not_known_is_a_dash_and_null() -> None:
-    """Before the first message of its topic, a value is a dash on the screen and null in JSON."""
+    """A topic has no message yet. Its values are dashes on the screen and null in JSON."""
     shown = view(pose=None, measured=None, commanded=None, force_mps2=None, rate_radps=None)
     assert "–" in text.figures(shown)[3]
     told = json.loads(text.as_json(shown, []))
@@ -60,7 +63,7 @@ def test_what_is_not_known_is_a_dash_and_null() -> None:
 
 
 def test_what_needs_somebody_stands_first() -> None:
-    """Errors come before warnings, and all statuses that are OK share one line."""
+    """Errors are shown before warnings. All statuses that are OK share one line."""
     statuses = (
         *FINE,
         Status("Time", Level.STALE, "not known", {}),
@@ -76,16 +79,16 @@ def test_what_needs_somebody_stands_first() -> None:
 
 
 def test_what_has_happened_is_counted() -> None:
-    """The monitor shows only those counts of faults that are above zero."""
+    """The monitor shows the counts of faults, without those that are zero."""
     stream = Status("Stream", Level.OK, "complete", {"Framing faults": "3", "Sequence gaps": "0"})
     assert text.counts(view(statuses=(stream,))) == "since its start: framing faults 3"
     assert text.counts(view()) == "since its start: nothing lost, nothing refused"
 
 
 def test_a_message_cannot_move_the_cursor() -> None:
-    """The monitor replaces control characters in a text from /diagnostics by question marks.
+    """A text from /diagnostics has control characters. The monitor replaces them by question marks.
 
-    Otherwise a message could move the cursor.
+    Otherwise the text could move the cursor.
     """
     rude = Status("Link", Level.ERROR, "\x1b[2J\nbad\x07", {"Port": "\x1b]0;owned\x07"})
     shown = view(statuses=(rude,), state="\x1b[31m")
@@ -94,7 +97,7 @@ def test_a_message_cannot_move_the_cursor() -> None:
 
 
 def test_a_silent_driver_is_said_to_be_silent() -> None:
-    """The title says how long the driver has been silent, and omits the outdated link."""
+    """The driver is silent. The title says for how long, and omits the outdated link."""
     assert text.title(view(silent_s=7.2)).endswith("nothing heard for 7 s (was nominal)")
     assert text.title(view()) == "/robot1/omnibot_driver  nominal  connected, /dev/omnibot"
 
@@ -110,7 +113,7 @@ def test_an_estop_is_latched_asked_for_or_not() -> None:
 
 
 def test_the_picture_of_a_square_is_a_square() -> None:
-    """A square path is drawn as its outline, which is as wide as high."""
+    """The robot drives along a square. The plot shows its outline, which is as wide as high."""
     corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)]
     picture = draw_path(corners, 24, 12)
     assert {len(row) for row in picture.rows} == {24}
@@ -125,7 +128,8 @@ def test_the_picture_of_a_square_is_a_square() -> None:
     [(0.0, "→"), (math.pi / 2, "↑"), (math.pi, "←"), (-math.pi / 4, "↘"), (20 * math.pi, "→")],
 )
 def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
-    """An arrow shows the robot's heading in the plot, in which x is to the right and y up."""
+    """An arrow in the plot shows the robot's heading. In the plot, x is to the right and y is up.
+    """
     assert any(arrow in row for row in draw_path([], 10, 5, Pose(1.0, 1.0, yaw_rad)).rows)
 
 
@@ -145,7 +149,10 @@ def test_any_way_fits_any_picture(
 
 @given(st.lists(st.integers(0, 10**6), max_size=80), st.integers(0, 70))
 def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
-    """In a sparkline zero is a blank, the largest value a full bar, and all others are visible."""
+    """In a sparkline, zero is a blank and the largest value is a full bar.
+
+    All other values are visible.
+    """
     line = sparkline(values, columns)
     assert len(line) == columns
     shown = values[-columns:] if columns else []
@@ -154,7 +161,7 @@ def test_a_sparkline_has_its_width(values: list[int], columns: int) -> None:
 
 
 def test_a_board_without_an_imu_has_no_rows_of_it() -> None:
-    """For a board without an IMU, text and JSON omit the IMU and do not report it as missing."""
+    """The board has no IMU. Text and JSON omit the IMU, and do not report it as missing."""
     shown = view(lacks=frozenset({"imu"}), imu=Flow(0.0, None, ()), force_mps2=None)
     words = "\n".join(text.figures(shown))
     assert "odom" in words

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Behaviour of the tools when a Python library is missing."""
+"""Tests of the tools when a Python library is missing."""
 
 import json
 import subprocess
@@ -21,7 +21,7 @@ def test_a_library_that_is_there_is_imported() -> None:
 
 
 def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
-    """The message names the missing library, not the submodule, and how to install the library."""
+    """The message names the missing library, without its submodule, and says how to install it."""
     with pytest.raises(ToolError) as refusal:
         need("no_such_library.part")
     assert str(refusal.value) == (
@@ -36,7 +36,8 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
 )
 def test_help_needs_no_library(words: str) -> None:
-    """The help of each tool works in a Python without site-packages, and so without ROS."""
+    """The help of each tool works in a Python without any other library, and therefore without ROS.
+    """
     module, *subcommand = words.split()
     done = subprocess.run(
         [sys.executable, "-ES", "-m", f"omnibot_driver.{module}", *subcommand, "--help"],

@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bags of every storage format are read without ROS; unreadable bags give a clear message."""
+"""Tests that the report reads bags of all storage formats without ROS, and rejects unreadable ones.
+"""
 
 import os
 import subprocess
@@ -69,7 +70,8 @@ def test_a_bag_of_any_kind_tells_the_same(
 def test_a_single_file_of_a_bag_is_enough(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """A file of a bag is read without metadata.yaml, which a killed recorder does not write."""
+    """A killed recorder has not written metadata.yaml. The report reads the bag's file without it.
+    """
     (file,) = (
         file
         for file in write(tmp_path / "bag", [drive], plugin).iterdir()
@@ -87,7 +89,7 @@ def test_stamped_commands_are_commands(drive: Drive, tmp_path: Path) -> None:
 
 
 def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) -> None:
-    """If a bag has several robots, ``--namespace`` selects the robot whose topics are read."""
+    """A bag has several robots. ``--namespace`` selects the robot whose topics are read."""
     one, other = Drive(SECONDS, "/robot1"), Drive(SECONDS, "/fleet/robot2", seed=2)
     bag = write(tmp_path / "bag", [one, other])
     with pytest.raises(ToolError, match=r"--namespace: /fleet/robot2, /robot1"):
@@ -101,13 +103,13 @@ def test_several_robots_in_a_bag_are_named_and_one_is_asked_for(tmp_path: Path) 
 
 
 def test_the_only_robot_needs_no_name(tmp_path: Path) -> None:
-    """The only robot in a bag is found in any namespace."""
+    """A bag has one robot, in any namespace. The report finds it."""
     log = log_of(write(tmp_path / "bag", [Drive(SECONDS, "/robot1")]))
     assert log.robot == "/robot1"
 
 
 def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """Run a report that must end with exit code 1; return its one line on stderr."""
+    """Run a report that must end with exit code 1, and return its only line on stderr."""
     assert main([str(path), "--output", str(path.parent / "out")]) == 1
     printed = capsys.readouterr()
     assert not printed.out
@@ -117,7 +119,7 @@ def refused(path: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def test_no_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """If the path of the bag does not exist, the message asks for the folder of a bag."""
+    """The path of the bag does not exist. The message asks for the folder of a bag."""
     assert "give the folder of a bag" in refused(tmp_path / "nothing", capsys)
 
 
@@ -131,7 +133,7 @@ def test_what_is_not_a_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A bag with a topic, but without a single message, is reported as empty."""
+    """A bag has a topic, but no messages. The report says that the bag is empty."""
     with Writer(tmp_path / "bag", version=9) as writer:
         writer.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=TYPES)
     assert "is empty" in refused(tmp_path / "bag", capsys)
@@ -140,7 +142,7 @@ def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_a_bag_of_something_else_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A bag without a driver's topics is rejected, even if it has a topic /odom of another type."""
+    """A bag has no topics of a driver, except /odom with a wrong type. It is rejected."""
     with Writer(tmp_path / "bag", version=9) as writer:
         kind = "std_msgs/msg/String"
         data = TYPES.serialize_cdr(TYPES.types[kind]("hello"), kind)
@@ -152,7 +154,7 @@ def test_a_bag_of_something_else_is_told(
 def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """For a robot without odometry the report names the missing topic; the exit code is 3."""
+    """A robot has no odometry. The report names the missing topic, and the exit code is 3."""
     drive.odom.drop(0.0, SECONDS)
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
     assert "No message of odom" in capsys.readouterr().out
@@ -161,7 +163,7 @@ def test_a_robot_without_odometry_is_reported_on_and_is_not_healthy(
 def test_nothing_but_nan_is_reported_on(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If all values are NaN, the report counts the messages with NaN; the exit code is 3."""
+    """All values are NaN. The report counts the messages with NaN, and the exit code is 3."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert main([str(write(tmp_path / "bag", [drive])), "--output", str(tmp_path / "out")]) == 3
@@ -171,14 +173,15 @@ def test_nothing_but_nan_is_reported_on(
 def test_a_place_that_cannot_be_written_is_told(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """If the output folder cannot be created, as a file has its name, the report says so."""
+    """A file has the name of the output folder, so the folder cannot be made. The report says so.
+    """
     (tmp_path / "out").write_text("taken")
     assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)
 
 
 @pytest.mark.parametrize("wrong", [[], ["bag", "--live", "5"], ["--live", "0"], ["--live", "nan"]])
 def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    """Either a bag or a positive time with ``--live`` must be given, but not both."""
+    """The user gives both a bag and ``--live``, or neither, or a wrong time. The exit code is 2."""
     with pytest.raises(SystemExit) as ended:
         main(wrong)
     assert ended.value.code == 2
@@ -186,7 +189,7 @@ def test_wrong_usage_is_told(wrong: list[str], capsys: pytest.CaptureFixture[str
 
 
 def test_a_bag_is_reported_on_where_there_is_no_ros(drive: Drive, tmp_path: Path) -> None:
-    """A report on a bag needs no ROS modules, and a closed stdout does not disturb it."""
+    """ROS is not installed, and stdout is closed. The report on a bag is still made."""
     bag = write(tmp_path / "bag", [drive])
     program = (
         "import sys\n"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Unfinished or damaged bags: the intact part is reported on, and the damage is named."""
+"""Tests of unfinished or damaged bags: the report uses the intact part, and names the damage."""
 
 import shutil
 import sqlite3
@@ -48,7 +48,10 @@ def test_an_unfinished_bag_is_read_and_called_so(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The report on an unfinished bag names the command that repairs it; the exit code is 3."""
+    """A bag is unfinished. The report reads it, and names the command that repairs it.
+
+    The exit code is 3.
+    """
     monkeypatch.setattr(page, "PICTURES", ())
     bag = write(tmp_path / "bag", [drive], plugin)
     (bag / "metadata.yaml").unlink()
@@ -59,7 +62,10 @@ def test_an_unfinished_bag_is_read_and_called_so(
 
 
 def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Path) -> None:
-    """Files of an unfinished bag are sorted by time; by name bag_10 would precede bag_2."""
+    """An unfinished bag has several files. They are sorted by time, not by name.
+
+    By name, bag_10 would be before bag_2.
+    """
     bag = tmp_path / "bag"
     bag.mkdir()
     for name, first in (("bag_2", 0), ("bag_10", 10)):
@@ -81,7 +87,7 @@ def test_files_of_an_unfinished_bag_are_put_in_order_by_their_times(tmp_path: Pa
 def test_metadata_that_make_no_sense_are_not_needed(
     drive: Drive, tmp_path: Path, text: str
 ) -> None:
-    """A bag with invalid metadata is read from its other files, and the damage is named."""
+    """The metadata of a bag are invalid. The report reads the other files, and names the damage."""
     bag = write(tmp_path / "bag", [drive])
     (bag / "metadata.yaml").write_text(text)
     log = log_of(bag)
@@ -95,7 +101,7 @@ def test_metadata_that_make_no_sense_are_not_needed(
 def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
     tmp_path: Path, mode: CompressionMode
 ) -> None:
-    """If an MCAP file breaks off, the report reads all complete chunks."""
+    """An MCAP file breaks off. The report reads all its complete chunks."""
     drive = Drive(40.0)  # long enough for several chunks
     bag = write(tmp_path / "bag", [drive], compression=mode)
     size = (bag / "bag.mcap").stat().st_size
@@ -109,7 +115,7 @@ def test_an_mcap_that_breaks_off_is_read_as_far_as_it_is_whole(
 
 
 def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> None:
-    """An MCAP file that ends in zeros, as after a power failure, is read up to the zeros."""
+    """An MCAP file ends in zeros, as after a power failure. The report reads it up to the zeros."""
     bag = write(tmp_path / "bag", [Drive(40.0)])
     size = (bag / "bag.mcap").stat().st_size
     file = cut(bag, size * 9 // 10)
@@ -120,7 +126,7 @@ def test_an_mcap_with_its_end_overwritten_by_zeros_is_read(tmp_path: Path) -> No
 
 
 def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
-    """An MCAP file without chunks is read up to its first incomplete record.
+    """An MCAP file has no chunks. The report reads it up to its first incomplete record.
 
     The messages are sorted by arrival.
     """
@@ -152,7 +158,7 @@ def test_an_mcap_without_chunks_and_order_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("size", [0, 8, 20])
 def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path, size: int) -> None:
-    """For an MCAP file without any complete part, the error names ``ros2 bag reindex``."""
+    """An MCAP file has no complete part. The error names ``ros2 bag reindex``."""
     bag = write(tmp_path / "bag", [drive])
     file = cut(bag, size)
     with pytest.raises(ToolError, match=f"{file.name} cannot be read: .*ros2 bag reindex {bag}"):
@@ -160,7 +166,7 @@ def test_an_mcap_in_which_nothing_is_whole_is_told(drive: Drive, tmp_path: Path,
 
 
 def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_path: Path) -> None:
-    """The write-ahead log, which a killed recorder leaves beside the database, is read, too."""
+    """A killed recorder leaves a write-ahead log beside the database. The report reads it, too."""
     bag = write(tmp_path / "bag", [drive], StoragePlugin.SQLITE3)
     killed = tmp_path / "killed"
     killed.mkdir()
@@ -177,7 +183,7 @@ def test_what_sqlite_has_not_moved_into_the_database_is_read(drive: Drive, tmp_p
 
 
 def test_damaged_messages_are_counted_and_passed_over(drive: Drive, tmp_path: Path) -> None:
-    """A damaged message is counted and skipped; all other messages are read."""
+    """One message is damaged. The report counts and skips it, and reads all others."""
     with Writer(tmp_path / "bag", version=9) as writer:
         connections = {}
         for number, (topic, kind, at_ns, told) in enumerate(drive.messages()):

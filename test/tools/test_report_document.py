@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""docs/tools/report.md lists the subjects of the report, and the limits of its judgements."""
+"""Tests that docs/tools/report.md lists the subjects and the limits of the report."""
 
 import ast
 import re
@@ -51,5 +51,5 @@ def test_every_subject_has_a_row() -> None:
     ],
 )
 def test_the_limits_are_those_of_the_code(subject: str, limit: str) -> None:
-    """The table in docs/tools/report.md gives each limit of the code in the row of its subject."""
+    """Each limit in the code is in the row of its subject in docs/tools/report.md."""
     assert limit in ROWS[subject]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Findings of a report on a drive's streams, healthy or with a planted fault."""
+"""Tests of a report's findings on the messages of a drive: a healthy one, and ones with a fault."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def drive() -> Drive:
 
 
 def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
-    """For a healthy drive the findings give figures, but no advice."""
+    """The drive is healthy. The findings have numbers, but no advice."""
     findings = judge(drive.log())
     assert not troubles(drive)
     assert headline(findings) == "Healthy."
@@ -30,7 +30,7 @@ def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
 
 
 def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
-    """A gap is reported with its time and the number of messages missing."""
+    """Messages are missing for a while. The report gives the time of this gap and their number."""
     drive.imu.drop(6.0, 6.15)
     (gap,) = troubles(drive)
     assert gap.level is Level.WARN
@@ -40,9 +40,9 @@ def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
 
 
 def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None:
-    """The report names the serial line as the cause of a gap in which frames were lost on it.
+    """The driver's diagnostics count the frames that were lost on the serial line during a gap.
 
-    The driver's diagnostics count these frames.
+    The report names the serial line as the cause of the gap.
     """
     drive.imu.drop(6.0, 6.1)
     for at_s, *_, values in drive.statuses:
@@ -51,13 +51,14 @@ def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None
 
 
 def test_a_long_gap_is_worse(drive: Drive) -> None:
-    """A gap of more than 0.5 s, here 1 s of odometry, is BAD instead of WARN."""
+    """The odometry has a gap of 1 s. Because it is longer than 0.5 s, its level is BAD, not WARN.
+    """
     drive.odom.drop(8.0, 9.0)
     assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
 
 
 def test_a_pause_is_not_a_gap(drive: Drive) -> None:
-    """Messages that are missing while the driver is paused are not reported as a gap."""
+    """Messages are missing while the driver is paused. The report does not call this a gap."""
     drive.states += [(16.9, "paused"), (18.0, "nominal")]
     drive.imu.drop(17.0, 18.0)
     drive.odom.drop(17.0, 18.0)
@@ -66,7 +67,7 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """The report names the loss of a board once, by the driver's state.
+    """The board is lost for a while. The report names this once, by the driver's state.
 
     It does not report the gaps in the board's data as well.
     """
@@ -77,14 +78,17 @@ def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) 
 
 
 def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
-    """A final state ``disconnected`` is reported as the end of the driver, not as a lost board."""
+    """The last state is ``disconnected``.
+
+    The report says that the driver ended, not that it lost the board.
+    """
     drive.states.append((19.5, "disconnected"))
     assert not troubles(drive)
     assert "ended at 19.5 s" in said(drive, "State", "driver").text
 
 
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
-    """Timestamps that jump ahead by 20 ms and slowly return are reported as a jump, not a gap.
+    """Timestamps jump ahead by 20 ms and slowly return. The report calls this a jump, not a gap.
 
     A driver that could not read for some time gives such timestamps.
     """
@@ -104,7 +108,10 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
 
 
 def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
-    """``disconnected`` and ``connecting`` in a row are reported as one loss of the board."""
+    """The states ``disconnected`` and ``connecting`` follow each other.
+
+    This is one loss of the board.
+    """
     drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
     for topic in (drive.imu, drive.odom, drive.joints):
         topic.drop(8.0, 9.0)
@@ -112,9 +119,9 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """If a stream ends early, the report shows a gap from there to the end of the log.
+    """The messages of a topic end early. The report shows a gap from there to the end of the log.
 
-    If the driver's state explains the end of the stream, the report shows no gap.
+    If the driver's state explains the end, the report shows no gap.
     """
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")
@@ -127,9 +134,9 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """If every second reading of a log is missing, the report says that the rate is wrong.
+    """Every second reading of a log is missing. The report says that the rate is wrong.
 
-    The report then shows no gaps.
+    It does not report gaps.
     """
     for name in ("stamp_s", "values", "late_s"):
         setattr(drive.imu, name, getattr(drive.imu, name)[::2])
@@ -148,7 +155,10 @@ def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None
 def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
     values: dict[str, str], wanted: str
 ) -> None:
-    """The expected rate of a stream comes from the driver's diagnostics, as boards differ."""
+    """Boards send at different rates.
+
+    The report takes the expected rate from the driver's diagnostics.
+    """
     drive = Drive()
     drive.statuses.append((1.5, "omnibot_driver: Stream", 0, "complete", values))
     (found,) = [one for one in judge(drive.log()) if one.text.startswith("odom comes at")]
@@ -157,14 +167,14 @@ def test_the_rate_that_a_stream_should_have_is_the_one_that_its_driver_says(
 
 
 def test_stamps_that_go_back_are_wrong(drive: Drive) -> None:
-    """A timestamp that is not later than the one before is BAD."""
+    """A timestamp is not later than the one before it. The level of this finding is BAD."""
     drive.odom.stamp_s[100:] -= 0.2
     drive.odom.late_s[100:] += 0.2
     assert said(drive, "Timing", "1 stamp of odom").level is Level.BAD
 
 
 def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
-    """For delays like those of a USB latency timer of 16 ms, the advice names the timer."""
+    """The delays are like those of a USB latency timer of 16 ms. The advice names this timer."""
     drive.imu.late_s = drive.imu.late_s + np.remainder(-drive.imu.stamp_s, 0.016)
     late = said(drive, "Timing", "The delay of imu/data_raw")
     assert late.level is Level.WARN
@@ -172,14 +182,15 @@ def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
 
 
 def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
-    """If all IMU messages arrive 30 s after their timestamps, one finding says so."""
+    """All IMU messages arrive 30 s after their timestamps. A single finding says so."""
     drive.imu.late_s = drive.imu.late_s + 30.0
     (clock,) = troubles(drive)
     assert "30 s after its stamp" in clock.text
 
 
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
-    """Messages with NaN or infinity are counted and left out; all others are judged as usual."""
+    """Some messages have NaN or infinity. The report counts and omits them, and judges all others.
+    """
     drive.imu.values[100:103, 4] = np.nan
     drive.odom.values[50, 0] = np.inf
     found = troubles(drive)
@@ -189,16 +200,16 @@ def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
 
 
 def test_nothing_but_nan_is_told(drive: Drive) -> None:
-    """If every message has NaN, IMU, odometry and commands are each reported."""
+    """All messages have NaN. The report names IMU, odometry and commands."""
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
     assert {finding.subject for finding in troubles(drive)} == {"IMU", "Odometry", "Commands"}
 
 
 def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
-    """The report omits warnings of commands that the driver refused because of the e-stop.
+    """The driver refuses commands because of the e-stop. The report omits its warnings of these.
 
-    The report has warnings of other refusals.
+    It shows the warnings of other refusals.
     """
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
@@ -208,7 +219,8 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
-    """The report gives the worst level of each status, its message, and its number of reports."""
+    """The report gives the worst level of each status, its message, and how often it was reported.
+    """
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.6, "omnibot_driver: IMU", 2, "the gyro is stuck", {}))
@@ -222,9 +234,9 @@ def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
 
 
 def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
-    """With several robots in a bag, counts in /diagnostics are not assigned to one robot.
+    """A bag has several robots, and /diagnostics does not show to which robot a count belongs.
 
-    A count in /diagnostics does not show to which robot it belongs.
+    The report does not assign the counts to one robot.
     """
     drive.imu.drop(6.0, 6.1)
     findings = judge(replace(drive.log(), alone=False))
@@ -234,7 +246,10 @@ def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
 
 
 def test_topics_that_are_missing_are_named(drive: Drive) -> None:
-    """Missing odometry is BAD; missing commands are only a NOTE."""
+    """Odometry and commands are missing.
+
+    Missing odometry is BAD, and missing commands are only a NOTE.
+    """
     drive.odom.drop(0.0, 99.0)
     drive.cmd_vel.drop(0.0, 99.0)
     assert said(drive, "Recording", "No message of odom").level is Level.BAD
@@ -242,7 +257,10 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 
 
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
-    """Messages without a timestamp are reported, as the driver stamps all its messages."""
+    """Some messages have no timestamp.
+
+    The report says so, because the driver stamps all its messages.
+    """
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan
     assert any("3 messages of imu/data_raw without a stamp" in item.text for item in judge(log))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Findings of a report on a robot with a planted fault in its motion or its IMU."""
+"""Tests of a report's findings on a robot with a planted fault in its motion or its IMU."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -27,7 +27,10 @@ def drive() -> Drive:
 def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
     drive: Drive, factor: float, advice: str
 ) -> None:
-    """For half or a quarter of gravity the report recommends another accelerometer range."""
+    """The measured gravity is only half or a quarter.
+
+    The report recommends another accelerometer range.
+    """
     drive.imu.values[:, 3:] *= factor
     gravity = said(drive, "IMU", "Gravity")
     assert gravity.level is Level.BAD
@@ -35,7 +38,7 @@ def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
 
 
 def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
-    """A sensor that is tilted by 10° about y at rest is reported."""
+    """At rest, the sensor is tilted by 10° about y. The report says so."""
     tilt = np.radians(10.0)
     force = drive.imu.values[:, 3:].copy()
     drive.imu.values[:, 3] = force[:, 0] * np.cos(tilt) + force[:, 2] * np.sin(tilt)
@@ -44,7 +47,7 @@ def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
 
 
 def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> None:
-    """For a gyro bias of 0.05 rad/s the report recommends the service ``~/calibrate_gyro``."""
+    """The gyro has a bias of 0.05 rad/s. The report recommends the service ``~/calibrate_gyro``."""
     drive.imu.values[:, 1] += 0.05
     (bias,) = troubles(drive)
     assert "+0.05" in bias.text
@@ -53,7 +56,10 @@ def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> N
 
 
 def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
-    """200 identical gyro readings are BAD; the accelerometer varies, so it is not named."""
+    """200 gyro readings are identical, and the level is BAD.
+
+    The accelerometer varies and is not named.
+    """
     drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
     stuck = said(drive, "IMU", "identical readings")
     assert stuck.level is Level.BAD
@@ -62,7 +68,7 @@ def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
 
 
 def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
-    """If gyro and wheels differ by 20 %, the advice mentions ``base_radius``."""
+    """Gyro and wheels differ by 20 %. The advice names ``base_radius``."""
     drive.imu.values[:, 2] *= 1.2
     assert "base_radius" in said(drive, "IMU", "gyro measured 1.2").advice
 
@@ -71,9 +77,10 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """The report does not compare gyro and wheels during lost messages.
+    """Messages of the IMU or of odometry are lost during a turn of 2 s.
 
-    The first pose after the loss contains the turn of two seconds in a single step.
+    The report does not compare gyro and wheels there, because the next pose contains the whole turn
+    in one step.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
@@ -81,25 +88,31 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """A gap in the odometry is not regarded as rest, because the robot may turn in the gap."""
+    """The odometry has a gap.
+
+    The report does not take it for rest, because the robot may turn meanwhile.
+    """
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
 def test_without_odometry_an_even_turn_is_not_taken_for_rest(drive: Drive) -> None:
-    """Without odometry a steady turn is not taken for the bias of a gyro at rest."""
+    """The odometry is missing, and the robot turns steadily.
+
+    The report does not take this for a bias.
+    """
     drive.odom.drop(0.0, 99.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
 
 
 def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
-    """If the gyro's sign shows that the sensor stands upright, the advice names ``imu_rpy``."""
+    """The gyro's sign shows that the sensor stands upright. The advice names ``imu_rpy``."""
     drive.imu.values[:, 2] *= -1.0
     assert "imu_rpy" in said(drive, "IMU", "upright").advice
 
 
 def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
-    """The report gives the frequency of a vibration of 20 Hz while the robot drives."""
+    """The robot vibrates at 20 Hz while it drives. The report gives this frequency."""
     times_s = drive.imu.stamp_s
     on = (times_s > 5.0) & (times_s < 15.0)
     drive.imu.values[:, 3] += 6.0 * np.sin(2 * np.pi * 20.0 * times_s) * on
@@ -109,7 +122,7 @@ def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
 
 
 def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
-    """The report finds the lag of the robot.
+    """The robot follows its commands with a lag. The report finds the lag.
 
     The tolerance is one step of the search plus half a step of the odometry.
     """
@@ -119,7 +132,7 @@ def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
 
 
 def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) -> None:
-    """If the robot reaches only 70 % of a linear command, the advice names ``linear_scale``."""
+    """The robot reaches only 70 % of its commanded speed. The advice names ``linear_scale``."""
     drive.odom.values[:, :2] *= 0.7
     drive.odom.values[:, 3:5] *= 0.7
     (slow,) = troubles(drive)
@@ -128,14 +141,14 @@ def test_a_robot_that_is_too_slow_is_told_with_the_scale_to_set(drive: Drive) ->
 
 
 def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) -> None:
-    """If the robot turns in the wrong direction, the advice names ``axis_signs``."""
+    """The robot turns in the wrong direction. The advice names ``axis_signs``."""
     drive.odom.values[:, 2] *= -1.0
     drive.odom.values[:, 5] *= -1.0
     assert "axis_signs" in said(drive, "Commands", "followed").advice
 
 
 def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
-    """A robot that stands still during four seconds of commands is BAD."""
+    """The robot stands still during four seconds of commands. The level of this finding is BAD."""
     rows = drive.odom.stamp_s > 12.0
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
     drive.odom.values[rows, 3:] = 0.0
@@ -145,19 +158,22 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 
 
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
-    """A pause in the commands is noted, since it explains why the robot stood still."""
+    """The commands pause. The report notes this, because it explains why the robot stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
     assert "1 time for more" in said(drive, "Commands", "paused").text
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
-    """A robot that keeps moving for four seconds without commands is reported."""
+    """The robot moves for four seconds without commands. The report says so."""
     drive.cmd_vel.drop(10.0, 14.0)
     assert said(drive, "Commands", "without a command").level is Level.WARN
 
 
 def test_an_estop_is_noted_and_what_it_stops_is_not_trouble(drive: Drive) -> None:
-    """If the e-stop keeps the robot at rest, unfollowed commands are not reported."""
+    """The e-stop keeps the robot at rest while commands arrive.
+
+    The report does not blame the robot.
+    """
     drive.estops += [(10.0, True), (19.0, False)]
     rows = drive.odom.stamp_s > 10.1
     drive.odom.values[rows, :3] = drive.odom.values[rows][0, :3]
@@ -176,7 +192,8 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
 
 
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
-    """A jump of the pose by 0.5 m that the twist does not explain is BAD."""
+    """The pose jumps by 0.5 m, which the twist does not explain. The level of this finding is BAD.
+    """
     drive.odom.values[300:, 0] += 0.5
     (leap,) = troubles(drive)
     assert leap.level is Level.BAD
@@ -185,7 +202,8 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
 
 
 def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None:
-    """A pose that begins again at zero is noted, and the jump does not count as distance."""
+    """The pose begins again at zero. The report notes this, and the jump is not a driven distance.
+    """
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0
     assert not troubles(drive)
@@ -194,7 +212,7 @@ def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None
 
 
 def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
-    """The report finds that wheel B turns at half of its commanded rate."""
+    """Wheel B turns at half of its commanded rate. The report finds this."""
     drive.odom.values[:, :] = 0.0
     drive.imu.values[:, 2] = 0.001
     told = 5.0 * drive.told(drive.joints.stamp_s)[:, [2, 2, 2]]
@@ -212,7 +230,7 @@ JOINTS = ("left_wheel_joint", "right_wheel_joint", "front_steering_joint")
 
 
 def two_wheels() -> Recorder:
-    """Return a recorder of two wheels, the left of which turns at half its commanded rate."""
+    """Return a recorder of two wheels. The left wheel turns at half of its commanded rate."""
     recorder = Recorder("/")
     for number in range(200):
         rate, stamp = float(number % 50 > 10), SimpleNamespace(sec=number, nanosec=1)
@@ -226,7 +244,8 @@ def two_wheels() -> Recorder:
 
 
 def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
-    """A steering joint is not a wheel; a wheel command of a wrong length is read as NaN."""
+    """A steering joint is not a wheel. A wheel command with a wrong number of values becomes NaN.
+    """
     log = two_wheels().log()
     assert log.wheels == JOINTS[:2]
     assert log.joint_states.values[20].tolist() == [0.5, 1.0]
@@ -238,7 +257,7 @@ def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
 
 
 def test_an_imu_that_the_board_has_not_is_not_missed(drive: Drive) -> None:
-    """An absent IMU is not reported if the diagnostics show that the board has none."""
+    """The diagnostics show that the board has no IMU. The report does not call the IMU missing."""
     drive.imu.drop(0.0, 99.0)
     said_of_it = [finding.text for finding in judge(drive.log())]
     assert "No message of imu/data_raw: the IMU cannot be judged." in said_of_it

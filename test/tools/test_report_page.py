@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The report's page is self-contained, and its pictures show the available data."""
+"""Tests of the report's page: it is self-contained, and its pictures show the available data."""
 
 import re
 from pathlib import Path
@@ -30,7 +30,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_page_has_everything_inside(folder: Path) -> None:
-    """Every picture is embedded as data, so the page can be mailed and opened anywhere."""
+    """The page contains every picture as data, so it can be mailed and opened anywhere."""
     text = (folder / "report.html").read_text()
     addresses = re.findall(r"""(?:src|href|url)\s*[=(]\s*["']?([^"'>)]{0,30})""", text)
     assert len(addresses) == len(PICTURES)
@@ -48,7 +48,7 @@ def test_every_picture_lies_beside_the_page(folder: Path) -> None:
 
 
 def test_a_name_cannot_become_markup(folder: Path) -> None:
-    """The page escapes the name of the bag, which may contain markup."""
+    """The name of the bag has markup. The page shows it as plain text."""
     text = (folder / "report.html").read_text()
     assert "&lt;a &amp; b&gt;" in text
     assert "<a & b>" not in text
@@ -67,7 +67,10 @@ def test_every_finding_is_on_the_page_and_in_the_terminal(folder: Path) -> None:
 
 
 def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
-    """Values that are all NaN give no picture, and the picture of an earlier report is removed."""
+    """All values are NaN, so some pictures cannot be drawn.
+
+    A picture of an earlier report is removed.
+    """
     drive = Drive(10.0)
     for topic in (drive.imu, drive.odom, drive.cmd_vel, drive.joints):
         topic.values[:] = np.nan
@@ -81,7 +84,7 @@ def test_what_cannot_be_drawn_is_not_there(tmp_path: Path) -> None:
 
 @given(st.integers(0, 40_000), st.integers(0, 2**32 - 1))
 def test_an_envelope_keeps_the_extremes_and_the_order(length: int, seed: int) -> None:
-    """``envelope`` reduces a long series to ``POINTS`` points at most, and keeps its extremes."""
+    """``envelope`` reduces a long series to at most ``POINTS`` points, and keeps its extremes."""
     values = np.random.default_rng(seed).normal(size=length)
     times_s = np.arange(length, dtype=float)
     shown_s, shown = envelope(times_s, values)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Splitting a command line into ROS arguments and those of the tool."""
+"""Test that a command line is split into ROS arguments and the tool's own arguments."""
 
 from omnibot_driver.tools.ros_arguments import split_ros_arguments
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` finds planted constants of a wheel in its encoder deltas."""
+"""Tests of ``calibrate step``: it finds the planted constants of a wheel in its encoder deltas."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 NOISE_RADPS = 0.05
-"""Noise of a wheel rate, in rad/s, caused by the resolution of encoder and protocol."""
+"""Noise of a wheel rate, in rad/s. The resolution of the encoder and of the protocol causes it."""
 TOLERANCE = 0.01
-"""Relative tolerance of a motor's constants, except its delay, whose tolerance is 1 ms."""
+"""Relative tolerance of a motor's constants. Only the delay has another tolerance, 1 ms."""
 
 
 def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
-    """Return eight steps of a wheel that follows the model exactly, with measuring noise."""
+    """Return eight steps of a wheel that follows the model exactly, with measurement noise."""
     random = np.random.default_rng(seed)
     steps = []
     for number in range(8):
@@ -43,7 +43,7 @@ def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
 @settings(max_examples=20)
 @given(st.floats(0.8, 1.2), st.floats(0.03, 0.2), st.floats(0.0, 0.06), st.integers(0, 2**32 - 1))
 def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed: int) -> None:
-    """The parameters of a first-order wheel are found within five claimed sigmas."""
+    """A wheel is a system of first order. Its parameters are found within five claimed sigmas."""
     planted = (gain, lag_s, delay_s)
     found = fit(FIRST_ORDER, made_up(FIRST_ORDER, planted, seed))
     assert (np.abs(found.values - planted) < 5 * found.sigmas + 1e-6).all()
@@ -57,7 +57,9 @@ def test_a_first_order_is_found(gain: float, lag_s: float, delay_s: float, seed:
 def test_a_motor_is_found_in_the_manuals_loop(
     pwm_per_count: float, lag_s: float, delay_s: float, seed: int
 ) -> None:
-    """The parameters of a motor in the manual's control loop are found within five claimed sigmas.
+    """A motor runs in the manual's control loop.
+
+    Its parameters are found within five claimed sigmas.
 
     A model of first order does not fit better.
     """
@@ -69,9 +71,9 @@ def test_a_motor_is_found_in_the_manuals_loop(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """Errors divided by claimed uncertainties have a standard deviation near 1.
+    """40 recordings are fitted. The claimed uncertainties agree with the true errors.
 
-    The test fits 40 recordings.
+    An error divided by its claimed uncertainty has a standard deviation near 1.
     """
     planted = (1.0, 46.0, 0.06, 0.013)
     fits = [fit(motor_model(MANUAL), made_up(motor_model(MANUAL), planted, n)) for n in range(40)]
@@ -80,7 +82,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 
 def test_a_command_seen_a_tick_off_is_put_right() -> None:
-    """The fit corrects steps whose beginning is one tick too late or too early."""
+    """Some steps begin one tick too late or too early. The fit corrects this."""
     planted = (1.0, 0.05, 0.02)
     steps = made_up(FIRST_ORDER, planted, 1)
     steps[2], steps[5] = steps[2].sooner(1), steps[5].sooner(-1)
@@ -89,7 +91,10 @@ def test_a_command_seen_a_tick_off_is_put_right() -> None:
 
 
 def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
-    """Commands up to 0.15 s late are corrected; a step with a blocked wheel is left out."""
+    """Some commands are up to 0.15 s late, and the fit corrects this.
+
+    It omits a step in which the wheel was blocked.
+    """
     planted = (1.0, 46.0, 0.06, 0.01)
     steps = made_up(motor_model(MANUAL), planted, 2) + made_up(motor_model(MANUAL), planted, 3)
     for number, ticks in ((1, 3), (4, 15), (9, 7)):
@@ -102,7 +107,7 @@ def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
 
 
 def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
-    """If a wheel responds differently from step to step, a note says so."""
+    """A wheel responds differently from step to step. A note says so."""
     random = np.random.default_rng(5)
     steps = made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 1) + made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 2)
     for step in steps:
@@ -122,9 +127,9 @@ def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
     ],
 )
 def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
-    """The constants of the simulated motor are found within 1 %, its delay within 1 ms.
+    """The motor's constants are found within 1 %, and its delay within 1 ms.
 
-    The simulation includes encoder, friction and the control loop of the firmware.
+    The simulation includes the encoder, friction and the control loop of the firmware.
     """
     steps = steps_of(*steps_to_and_fro(planted), 0, LEVELS)
     motor = fit_wheel("A", steps, MANUAL).motor
@@ -134,7 +139,8 @@ def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
 
 
 def test_other_gains_must_be_told() -> None:
-    """If the firmware's gains differ from the manual's, only a fit with the true gains is good."""
+    """The firmware has other gains than the manual's. Only a fit with the firmware's gains is good.
+    """
     gains = WheelGains(feed_forward=15.0, proportional=40.0, integral=5.0)
     steps = steps_of(*steps_to_and_fro(MotorConstants(), gains), 0, LEVELS)
     told = fit_wheel("A", steps, Gains(15.0, 40.0, 5.0))
@@ -145,7 +151,7 @@ def test_other_gains_must_be_told() -> None:
 
 
 def test_rise_and_overshoot_are_those_of_the_answer() -> None:
-    """A first-order response rises in 2.2 time constants and does not overshoot."""
+    """A response of first order rises in 2.2 time constants and does not overshoot."""
     traits = fit(FIRST_ORDER, made_up(FIRST_ORDER, (1.0, 0.1, 0.0), 3)).traits()
     rise_s, sigma_s = traits["rise time"]
     assert rise_s == pytest.approx(0.22, abs=5 * sigma_s + 2e-3)
@@ -153,14 +159,14 @@ def test_rise_and_overshoot_are_those_of_the_answer() -> None:
 
 
 def test_a_damped_swing_overshoots_as_the_books_say() -> None:
-    """The overshoot of a second order without a zero is exp(-pi zeta / sqrt(1 - zeta^2))."""
+    """The overshoot of a second-order system without a zero is exp(-pi zeta / sqrt(1 - zeta^2))."""
     swinging = made_up(SECOND_ORDER, (1.0, 12.0, 0.5, 0.0, 0.01), 4)
     overshoot, sigma = fit(SECOND_ORDER, swinging).traits()["overshoot"]
     assert overshoot == pytest.approx(0.163, abs=5 * sigma + 0.003)
 
 
 def test_lost_deltas_are_left_out() -> None:
-    """The motor is still found if a fifth of the deltas is lost."""
+    """A fifth of the deltas is lost. The motor is still found."""
     commands, wheels = steps_to_and_fro(MotorConstants())
     kept = np.random.default_rng(1).random(len(wheels.stamp_s)) > 0.2
     thinned = replace(
@@ -174,7 +180,7 @@ def test_lost_deltas_are_left_out() -> None:
 
 
 def test_odometry_that_was_lost_is_said() -> None:
-    """Odometry that ends after five deltas has no complete step, which is an error."""
+    """The odometry ends after five deltas, so no step is complete. This is an error."""
     commands, wheels = steps_to_and_fro(MotorConstants(), steps=2)
     silent = replace(
         wheels,

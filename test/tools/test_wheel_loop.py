@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calculated control loop of a wheel, its models, and the gains chosen for it."""
+"""Tests of the calculated control loop of a wheel, of its models, and of the gains chosen for it.
+"""
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ wheel_motors = st.builds(Motor, st.floats(15, 120), st.floats(2, 15), st.floats(
 
 
 def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
-    """Return the simulated board's step response without friction and quantisation."""
+    """Return the step response of the simulated board, without friction and quantisation."""
     wheel = simulated.Motor(
         simulated.MotorConstants(
             pwm_per_count=motor.pwm_per_count,
@@ -63,7 +64,7 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 
 
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
-    """During the rise, a delay of 1.4 ticks gives a response between those of 1 and 2 ticks."""
+    """A delay of 1.4 ticks gives a rise between those with delays of 1 and 2 ticks."""
     sooner, between, later = (
         answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
     )
@@ -74,7 +75,7 @@ def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
 @settings(max_examples=25)
 @given(wheel_motors, st.floats(0.02, 3.0))
 def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: float) -> None:
-    """The sensitivity at any frequency is at most Ms.
+    """The sensitivity of the control loop is at most Ms, at any frequency.
 
     The test computes the sensitivity from the impulse response of the motor.
     """
@@ -90,7 +91,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
 @settings(max_examples=15)
 @given(st.floats(0.01, 0.3), st.floats(0.0, 0.08))
 def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: float) -> None:
-    """Deltas of a first-order wheel agree with the numerical integral of scipy's response."""
+    """The deltas of a first-order wheel agree with scipy's response, integrated numerically."""
     times_s = np.linspace(0.0, 0.6, 6001)
     _, response = signal.step(([1.0], [time_constant_s, 1.0]), T=times_s)
     _check(first_order, np.array([time_constant_s, delay_s]), times_s, response, delay_s)
@@ -106,7 +107,7 @@ def test_first_order_deltas_are_mean_values(time_constant_s: float, delay_s: flo
 def test_second_order_deltas_are_mean_values(
     omega: float, damping: float, zero_s: float, delay_s: float
 ) -> None:
-    """Deltas of a second-order wheel agree with scipy's response.
+    """The deltas of a second-order wheel agree with scipy's response, integrated numerically.
 
     The damping is arbitrary, and the zero is in either half-plane.
     """
@@ -128,7 +129,7 @@ def _check(turned, parameters, times_s, response, delay_s) -> None:  # type: ign
 
 
 def test_two_equal_poles_are_no_exception() -> None:
-    """The response at a damping of 1 is between those at 0.99 and 1.01."""
+    """The damping is 1, so both poles are equal. The response is between those at 0.99 and 1.01."""
     low, mid, high = (
         second_order(np.array([10.0, damping, 0.0, 0.0]), np.array([0.2]))
         for damping in (0.99, 1.0, 1.01)
@@ -147,7 +148,8 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """Better gains keep the limits of Ms and overshoot, and reduce the control errors."""
+    """The proposed gains keep the limits of Ms and overshoot, and make the control errors smaller.
+    """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)
     assert after.ms <= LARGEST_MS
@@ -161,7 +163,7 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 
 
 def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
-    """Gains for three motors keep within the limits with each of the motors."""
+    """The tool proposes one set of gains for three motors. It keeps the limits with each motor."""
     motors = [Motor(46.0, 6.0, 0.0), Motor(35.0, 10.0, 1.0), Motor(60.0, 4.0, 3.0)]
     gains = better_gains(motors)
     for motor in motors:
@@ -171,7 +173,10 @@ def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
 
 
 def test_what_is_predicted_comes_about() -> None:
-    """With the proposed gains the simulated board has the predicted overshoot and error."""
+    """The simulated board runs with the proposed gains.
+
+    Its overshoot and error are the predicted ones.
+    """
     motor = Motor(46.0, 6.0, 2.0)
     gains = better_gains([motor])
     speeds = np.array(simulated_answer(motor, gains, 200))

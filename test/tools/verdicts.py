@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Look up the findings of a report on a synthetic drive."""
+"""Helpers that look up the findings of a report on a synthetic drive."""
 
 from drives import Drive
 

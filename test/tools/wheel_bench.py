@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Steps of one simulated wheel, faster than real time, as a calibration would record them."""
+"""Recorded steps of one simulated wheel, made faster than real time."""
 
 import math
 import random
@@ -22,7 +22,9 @@ SENT_BEFORE_S = 0.0015
 def steps_to_and_fro(
     motor: MotorConstants, gains: WheelGains | None = None, *, hold_s: float = 1.5, steps: int = 8
 ) -> tuple[Commands, Wheels]:
-    """Return the commands to wheel A, which alternates between two speeds, and its measured rates.
+    """Return the commands to wheel A and its measured rates.
+
+    The wheel alternates between two speeds.
 
     The commands arrive at random moments of the control tick.
     """

@@ -67,9 +67,7 @@ class Mart:
         assert not self.do(lambda board: board.server.hung)
 
     def answer(self, probe: Probe, service: str) -> Any:
-        """Call the service each second until the driver does not refuse it.
-
-        Return the last answer.
+        """Call the service each second until the driver does not refuse it. Return the last answer.
         """
         for _ in range(round(PATIENCE_S)):
             done = probe.call(Trigger, service)

@@ -14,8 +14,8 @@ prints the bound for three kinds of noise in the times between marks:
 - "same marks": the marks have the same places in each turn, so a fit can find the places. Only the
   rounding of the times to 0.1 ms remains.
 
-In all three cases the load, and with it the rate of the wheel, also changes by 0.5 % from record to
-record.
+In all three cases, the load changes by 0.5 % from record to record. The rate of the wheel changes
+with the load.
 """
 
 from random import Random
@@ -34,10 +34,10 @@ Column = NDArray[np.float64]
 
 
 def times_s(values: Column) -> Column:
-    """Return the times in s at which the marks of a starting wheel are passed.
+    """Return the times in s at which a starting wheel passes its marks.
 
-    ``values`` are the rate in marks per s, the slow and the fast time constant in s, then the
-    places of the marks.
+    ``values`` are the final rate in marks per s, the slow and the fast time constant in s, and then
+    the places of the marks.
     """
     rate, slow_s, fast_s = values[:3]
     grid_s = np.linspace(0.0, 1.0, 20_000) ** 2 * (SAMPLES + 3) / rate * 1.5
@@ -45,7 +45,10 @@ def times_s(values: Column) -> Column:
 
 
 def bound(rate: float, slow_s: float, fast_s: float, kind: str) -> float:
-    """Return the lower bound of the relative standard deviation of the fast time constant."""
+    """Return the lower bound of the relative standard deviation of the fast time constant.
+
+    ``kind`` is the kind of noise, as in the module's list.
+    """
     information = np.zeros((3, 3))
     for record in range(RECORDS):
         places = (record + 0.5) / RECORDS + np.arange(SAMPLES + 1)

@@ -6,8 +6,8 @@ Run this by hand, with the number of robots and optionally the seed of the first
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_fit.py 20
 
-Unlike ``judge_step.py``, this program needs no driver; it takes ten seconds for each wheel. The
-records come from the simulated motors and encoders alone. The steps come from the complete
+The program needs ten seconds for each wheel. Unlike ``judge_step.py``, it needs no driver. Its
+records come from the simulated motors and encoders alone. Its steps come from the complete
 simulated board with the public firmware.
 """
 
@@ -36,7 +36,7 @@ FREQUENCY_HZ = 11.0
 
 
 def starts(motor: MotorSettings, wheel: int, random: Random) -> list[Column]:
-    """Return records of starts at full duty, each from a random position of the wheel."""
+    """Return records of starts at full duty. Each start is from a random position of the wheel."""
     short, long = CORRECTIONS[wheel]
     encoder = Encoder(TICKS, long / (short + long), noise=MARK_NOISE, random=random)
     found = []
@@ -80,14 +80,17 @@ def stepped(motor: MotorSettings, gains: PiGains, target_rpm: float) -> Column:
 
 
 def recorded(rpm: Column) -> Column:
-    """Return the times between ticks, in s, of a wheel with evenly spaced marks at these speeds."""
+    """Return the times between ticks, in s, of a wheel that turns at these speeds.
+
+    The marks of the wheel are evenly spaced.
+    """
     ticks = np.cumsum(rpm) * 0.01 * TICKS / 60
     at_s = np.interp(np.arange(0.4, ticks[-1]), ticks, 0.01 * np.arange(1, len(ticks) + 1))
     return np.diff(at_s, prepend=0.0)[:SAMPLES]
 
 
 def judge(motor: MotorSettings, wheel: int, random: Random) -> str:
-    """Return a row of text: errors of the time constants, overshoot, and error of a step."""
+    """Return a row of text: the errors of the time constants, and overshoot and error of a step."""
     found = fit(starts(motor, wheel, random), TICKS)
     half_rpm = motor.rpm_per_percent * (50.0 - motor.dead_zone_percent)
     slope = (found.final_rpm - half_rpm) / 50.0

@@ -6,8 +6,8 @@ Run this by hand, with the number of robots and optionally the seed of the first
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-The program takes about two minutes for each robot. The overshoot that it prints is that of the
-true wheel speed, on a robot with the gains found and with evenly spaced marks.
+The program needs about two minutes for each robot. It prints the overshoot of the true wheel speed.
+For this, the robot has the gains that were found, and evenly spaced marks.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ Motors = tuple[MotorSettings, MotorSettings]
 
 
 def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
-    """Run ``calibrate step`` on a simulated robot; return what it finds for both wheels."""
+    """Run ``calibrate step`` on a simulated robot, and return what it finds for both wheels."""
     robot = SimulatedRobot(folder, motors, seed=seed)
     arguments = command_line().parse_args(["step", "--yes"])
     with (
@@ -48,7 +48,7 @@ def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
 
 
 def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) -> list[float]:
-    """Return the true overshoot of each wheel in a step with the gains found.
+    """Return the overshoot of each wheel's true speed in a step with the gains that were found.
 
     The overshoot is relative to the final speed or to the target, whichever is higher.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated robot with a LOIS ECU, in simulated time, that replaces a running driver."""
+"""A robot with a LOIS ECU in simulated time. It replaces a running driver."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -38,7 +38,7 @@ SETTINGS = SessionSettings(
 def random_motors(seed: int, *, unequal: float = 0.05) -> tuple[MotorSettings, MotorSettings]:
     """Return two random motors of second order, with dead time and backlash.
 
-    The constants of the two motors vary by ``unequal`` (relative standard deviation).
+    ``unequal``: how much the constants of the two motors vary, as a relative standard deviation.
     """
     random = Random(f"plant {seed}")
     slow_s = random.uniform(0.15, 0.5)
@@ -59,7 +59,7 @@ def random_motors(seed: int, *, unequal: float = 0.05) -> tuple[MotorSettings, M
 
 
 class SimulatedRobot:
-    """Replacement for the ``Robot`` of a calibration, with a simulated LOIS ECU."""
+    """A replacement for the ``Robot`` of a calibration, with a simulated LOIS ECU."""
 
     def __init__(
         self,

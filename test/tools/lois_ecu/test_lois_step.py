@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step`` of a LOIS ECU finds unknown encoders, plants and gains."""
+"""Tests of ``calibrate step`` for a LOIS ECU: it finds unknown encoders, plants and gains.
+
+A plant is what the controller controls: the motor with its wheel.
+"""
 
 import math
 from dataclasses import replace
@@ -45,7 +48,7 @@ PLANT = Plant(0.66, 0.3, 0.1, 6.0)
 
 
 def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Column]:
-    """Return simulated records of starts at full duty: times in s between misplaced marks."""
+    """Return simulated records of starts at full duty: the times in s between misplaced marks."""
     random = np.random.default_rng(seed)
     times_s = np.arange(0.0, 6.0, 1e-4)
     way = plant.final_rpm(100.0) * TICKS / 60 * turned(times_s, plant.slow_s, plant.fast_s)
@@ -63,7 +66,7 @@ def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Co
 def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
     """The function ``speed`` is the time derivative of the function ``turned``.
 
-    A first order (``fast_s`` of 0) and two equal time constants are tested, too.
+    This includes a plant of first order (``fast_s`` of 0) and two equal time constants.
     """
     times_s = np.linspace(0.0, 3.0, 3001)
     slope = np.gradient(turned(times_s, 0.3, fast_s), times_s)
@@ -73,7 +76,10 @@ def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
 
 @pytest.mark.parametrize("slow_s", [0.2, 0.45])
 def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
-    """The fit finds a second-order plant although misplaced marks change the times by 10 %."""
+    """Misplaced marks change the times between ticks by 10 %.
+
+    The fit still finds a second-order plant.
+    """
     planted = Plant(0.62, slow_s, 0.4 * slow_s, 5.0)
     found = fit(starts(planted, 8), TICKS)
     assert found.order == 2
@@ -84,9 +90,11 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """The fit finds the places of the marks, which change the times between ticks by 10 %.
+    """Misplaced marks change the times between ticks by 10 %.
 
-    With these places the remaining error is less than 1 %; it comes from the rounding of the clock.
+    The fit finds the places of the marks.
+
+    With these places the remaining error is less than 1 %. It comes from the rounding of the clock.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -96,16 +104,19 @@ def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant(
 
 
 def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
-    """A chance pattern in random noise is not accepted as the places of encoder marks."""
+    """The times have only random noise.
+
+    The tool does not take a chance pattern for misplaced marks.
+    """
     random = np.random.default_rng(4)
     assert marks_in([0.1 * random.standard_normal(120) for _ in range(24)], TICKS) is None
     assert marks_in([np.zeros(120)] * 24, TICKS) is None
 
 
 def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
-    """Missed and late ticks hardly change the fit.
+    """Some ticks are missed or late. This hardly changes the fit.
 
-    The public firmware misses ticks or times them late while it sends.
+    The public firmware misses ticks, or times them late, while it sends.
     """
     records = starts(PLANT, 8)
     for number, record in enumerate(records):
@@ -123,16 +134,16 @@ def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
 
 
 def test_records_that_are_too_short_are_refused() -> None:
-    """For short records the error names ``record_samples``, which sets the length of records."""
+    """The records are too short. The error names ``record_samples``, which sets their length."""
     with pytest.raises(ToolError, match="record_samples"):
         fit([one[:20] for one in starts(PLANT, 3)], TICKS)
 
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """The corrections of short and long ticks are found even if edges are missed.
+    """An encoder has short and long ticks in turn. The tool finds the correction of each.
 
-    The first tick may be a short or a long one.
+    The first tick may be short or long, and some edges are missed.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -146,9 +157,9 @@ def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -
 @pytest.mark.parametrize("margin", [None, 60.0])
 @pytest.mark.parametrize("overshoot", [0.02, 0.1])
 def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> None:
-    """Tuned gains meet the goals for overshoot and phase margin.
+    """The tuned gains meet the goals for overshoot and phase margin.
 
-    Tn compensates the slow pole, and Td is 0 without a goal for the phase margin.
+    Tn compensates the slow pole. Td is 0 if there is not any goal for the phase margin.
     """
     goals = Goals(overshoot=overshoot, phase_margin_deg=margin)
     found = tune(PLANT, LOOP, goals)
@@ -163,7 +174,12 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 
 @pytest.mark.parametrize("plant", [PLANT, Plant(0.7, 0.2, 0.06, 7.0), Plant(0.6, 0.45, 0.2, 3.0)])
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
-    """With a goal of 5 %, 95 % of overshoots are below 8 % if the board sends during the step."""
+    """The board sends data during a step, which delays its controller.
+
+    The goal for overshoot is 5 %.
+
+    95 % of the overshoots are below 8 %.
+    """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
     begun, sent_s = np.meshgrid(np.arange(0.0, 1.0, 0.1), np.arange(0.0, 0.2, 0.02))
@@ -174,7 +190,7 @@ def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plan
 
 
 def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
-    """If the board sends its ticks after the end of a step, the response does not change.
+    """The board sends its ticks after the end of a step. This does not change the step's response.
 
     If the board sends them during the step, the response changes.
     """
@@ -187,16 +203,17 @@ def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
 
 
 def test_goals_that_nothing_meets_are_told() -> None:
-    """An error says that no gains meet the goals, here for a plant faster than its controller."""
+    """The plant is faster than its controller, so no gains meet the goals. An error says so."""
     slow = Loop(1.0, TICKS, 0.5)
     with pytest.raises(ToolError, match="allow more"):
         tune(Plant(0.66, 0.02, 0.0), slow, Goals(overshoot=0.0, band=0.001, phase_margin_deg=89.9))
 
 
 def test_a_phase_margin_is_that_of_the_open_loop() -> None:
-    """The phase margin is compared with that of a simple open loop, calculated by hand.
+    """The phase margin is compared with that of a simple open loop, which is calculated by hand.
 
-    With small lags the open loop is Kp K / (s Tn), and its gain is 1 at Kp K / Tn.
+    With small lags the open loop is Kp K / (s Tn). Its gain is 1 at the angular frequency Kp K /
+    Tn.
     """
     loop = Loop(1e-6, 10**9, nominal_s=1e-6)
     plant = Plant(1.0, 0.5, 0.0)
@@ -224,7 +241,9 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
 def test_a_step_is_predicted_as_the_simulated_board_makes_it(
     firmware: Firmware, gains: PiGains
 ) -> None:
-    """The predicted step agrees with that of the simulated board, which is a separate program.
+    """The tool predicts a step.
+
+    The simulated board, which is a separate program, makes the same step.
 
     The controller runs 11 or 5 times a second, depending on the firmware.
     """
