@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board on a line that can be broken, with a record of what was really sent.
+"""A simulated board on a line that can be broken, and a record of what the board really sent.
 
-The module knows nothing of frames. A ``Damage`` changes the bytes of one tick, or of one write.
+A ``Damage`` changes the bytes of one tick, or of one write. This module knows bytes and ticks; it
+does not know frames.
 """
 
 from collections.abc import Callable
@@ -16,7 +17,7 @@ from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 
 TICK_S: Final = 0.01
 BYTES_PER_TICK: Final = 115
-"""Bytes of one tick at 115200 baud."""
+"""Number of bytes that the line carries in one tick, at 115200 baud."""
 
 Damage = Callable[[bytes], bytes]
 
@@ -30,17 +31,21 @@ def cut(_data: bytes) -> bytes:
 
 
 def losing(rate: float, random: Random) -> Damage:
-    """Return damage that loses single bytes, each with the probability ``rate``."""
+    """Return a damage that loses single bytes, each with the probability ``rate``."""
     return FaultyLine(LineFaults(lose=rate), random.getrandbits(32)).carry
 
 
 def losing_bursts(rate: float, random: Random) -> Damage:
-    """Return damage that loses 1 to 200 bytes in a row, over any number of ticks."""
+    """Return a damage that loses 1 to 200 bytes in a row. The row may last several ticks.
+
+    ``rate``: the probability that such a loss begins at a byte.
+    """
     return FaultyLine(LineFaults(burst=rate), random.getrandbits(32)).carry
 
 
 def gaining(rate: float, random: Random) -> Damage:
-    """Return damage that inserts bytes of any value, at each place with probability ``rate``."""
+    """Return a damage that inserts bytes of any value, at each place with the probability ``rate``.
+    """
 
     def damage(data: bytes) -> bytes:
         out = bytearray()
@@ -54,17 +59,17 @@ def gaining(rate: float, random: Random) -> Damage:
 
 
 def noise(random: Random) -> Damage:
-    """Return damage that replaces all bytes, as a wrong baud rate or a broken wire does.
+    """Return a damage that replaces all bytes, as a wrong baud rate or a broken wire does.
 
-    In each tick there are as many random bytes as the line can carry.
+    Each tick has as many random bytes as the line can carry.
     """
     return lambda _data: random.randbytes(BYTES_PER_TICK)
 
 
 def late(ticks: int) -> Damage:
-    """Return damage that holds all data back for this number of ticks, as some adapters do.
+    """Return a damage that keeps all bytes for this number of ticks, as some adapters do.
 
-    After these ticks, all held data are delivered at once.
+    Then it delivers all of them at once.
     """
     held: list[bytes] = []
 
@@ -80,10 +85,13 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board behind a line: ``receive`` and ``advance`` pass through the line and its damage.
+    """A board behind a line.
 
-    ``sent``: every frame and text that the board sent, before damage. ``driven_at``: the last tick
-    in which its motors had a command to turn.
+    ``receive`` and ``advance`` pass all bytes through the line and its damage.
+
+    ``sent``: every frame and text that the board sent, before damage.
+
+    ``driven_at``: the last tick in which the board's motors had a command to turn.
     """
 
     tick_s = TICK_S

@@ -2,8 +2,8 @@
 
 """A busy computer: busy loops on every core, and an adapter that delivers four bytes at a time.
 
-The line is undamaged, so exactly what the board sent must be published, and no message may name the
-cable as a cause.
+The line is undamaged. So the driver must publish exactly what the board sent, and no message may
+name the cable as a cause.
 """
 
 import math
@@ -23,17 +23,18 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""If the simulated board paused for at least this time in s, the driver may report silence."""
+"""If the simulated board paused for this time or longer, in s, the driver may report silence."""
 TRANSIT: Final = 200
-"""Number of frames that may be on their way when the comparison of messages begins."""
+"""Number of frames that may still be on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""A message is wrong if none of the next sent frames, up to this number, equals it."""
+"""A message is compared with this number of the next sent frames. If none equals it, it is wrong.
+"""
 
 
 class PiecesTerminal(Terminal):
-    """A terminal that delivers a few bytes at a time, at the line's pace.
+    """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    ``silent_s``: its longest pause so far.
+    ``silent_s``: its longest pause so far, in s.
     """
 
     silent_s = 0.0
@@ -63,7 +64,7 @@ def _known(keys: Iterable[Key | None]) -> list[Key]:
 
 @contextmanager
 def busy_loops() -> Iterator[None]:
-    """Run busy loops as processes, so the kernel divides the cores among them and the driver."""
+    """Run busy loops as processes, so that the driver gets only a share of the computing time."""
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOOPS)]
     try:
         yield
@@ -77,8 +78,8 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages were never sent, and how many sent frames have no message.
 
-    At constant speed many frames are equal, so the comparison begins at each frame that equals the
-    first message, and the best result counts.
+    At constant speed many frames are equal. So the comparison is tried from each frame that equals
+    the first message, and the best result is returned.
     """
     starts = [n for n, key in enumerate(sent) if same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))
@@ -97,7 +98,8 @@ def _compared(published: list[Key], sent: list[Key]) -> tuple[int, int]:
 
 
 def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
-    """Drive the robot on a busy computer, and compare all messages with the frames sent."""
+    """Drive the robot on a busy computer, and compare all messages with the frames that were sent.
+    """
     rig.drive()
     before = max(0, len(rig.line.sent) - TRANSIT)
     imu, odom, line = len(rig.imu), len(rig.odom), len(rig.driver.lines)

@@ -2,10 +2,10 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-The campaign has every scripted fault, random input, and random walks with several seeds; with
+The campaign has all scripted faults, random input, and random walks through the faults. With
 ``--minutes`` it is only a long random walk. Drivers wait for real time, so the pieces of the
-campaign run in parallel, each with its own drivers, boards and ROS domain. The exit code is 1 when
-anything was wrong.
+campaign run in parallel. Each piece has its own drivers, boards and ROS domain. The exit code is 1
+when anything was wrong.
 """
 
 import argparse
@@ -42,7 +42,7 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Number of runs of each kind of stop on a line that loses bytes towards the board."""
+"""Number of drivers for each group of stops on a line that loses bytes towards the board."""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -64,10 +64,15 @@ class Row:
 
 @dataclass(slots=True)
 class Outcome:
-    """Result of some pieces: rows of the table, and all complaints.
+    """Result of some pieces of the campaign.
 
-    ``published``: number of messages that were compared with what the board sent. ``wrong``: how
-    many of these were wrong.
+    ``rows``: the rows of the table.
+
+    ``complaints``: all complaints.
+
+    ``published``: number of messages that were compared with what the board sent.
+
+    ``wrong``: how many of these messages were wrong.
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -76,7 +81,7 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Add another result; rows of the same name become one."""
+        """Add another result. Rows with the same name become one row."""
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:
@@ -102,7 +107,7 @@ class Outcome:
 
 
 class Campaign(Outcome):
-    """Runs one piece of the campaign in this process, and collects its result."""
+    """Runs one piece of the campaign in this process and collects its result."""
 
     def __init__(self, kind: RigBoard) -> None:
         super().__init__()
@@ -111,7 +116,7 @@ class Campaign(Outcome):
 
     @property
     def outcome(self) -> Outcome:
-        """The result alone, which can be sent to another process."""
+        """The result without the rest of this object, so that it can be sent to another process."""
         return Outcome(self.rows, self.complaints, self.published, self.wrong)
 
     def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
@@ -120,7 +125,7 @@ class Campaign(Outcome):
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
         """Run a case once and collect its complaints.
 
-        ``again``: whether to check afterwards that the robot obeys a fresh command.
+        ``again``: whether the robot must obey a fresh command afterwards.
         """
         try:
             case(rig)
@@ -140,7 +145,7 @@ class Campaign(Outcome):
             print("the log ends:", *rig.driver.lines[-20:], sep="\n    ", flush=True)
 
     def judge(self, rig: Rig, *, damaged_bytes: bool = True) -> None:
-        """Compare the messages that one rig's driver published with those that its board sent."""
+        """Compare the messages from a rig's driver with the frames that the rig's board sent."""
         rig.judge_stream(damaged_bytes)
         self.published += rig.findings.published
         self.wrong += rig.findings.wrong
@@ -151,7 +156,7 @@ class Campaign(Outcome):
         return self.rows[-1]
 
     def faults_of_the_line(self) -> None:
-        """Run all faults of the line once per round, all with the same driver."""
+        """Run all faults of the line, once in each round. One driver goes through all of them."""
         self._one_life(Rig, self._kind.cases or survivable, damaged_bytes=True)
 
     def faults_of_the_network(self) -> None:
@@ -161,7 +166,7 @@ class Campaign(Outcome):
         self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
 
     def ending(self, name: str) -> None:
-        """Run the ending of this name in every round, each with a new driver."""
+        """Run the ending with this name in every round. Each round has a new driver."""
         ending = ENDINGS[name]
         self._ends(f"the driver ends: {name}", ending, before=ending.before)
 
@@ -201,10 +206,12 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """For each of ``numbers``, test stops of a new driver on a line that loses bytes.
+        """Test stops on a line that loses bytes to the board.
 
-        ``number_of_life``: index in LIVES of the stops to test. The line to the board loses bytes
-        until the last stop has been judged.
+        Each of ``numbers`` gets a new driver.
+
+        ``number_of_life``: index of the group of stops in LIVES. The line loses bytes until the
+        last stop has been judged.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
@@ -216,7 +223,7 @@ class Campaign(Outcome):
                     self.run(rows[name], case, rig, again=False)
 
     def busy_computer(self) -> None:
-        """Run on a busy computer with an undamaged line, in every round."""
+        """Run on a busy computer with an undamaged line, once in each round."""
         row = self.row(
             f"{LOOPS} busy loops for {TICKS // 100} s, the line in pieces of {PIECE} bytes"
         )
@@ -244,7 +251,7 @@ class Campaign(Outcome):
             self.judge(rig)
 
     def soak(self, minutes: float) -> None:
-        """Run random walks with one driver for this number of minutes."""
+        """Run random walks with one driver for ``minutes``."""
         row = self.row(f"soak: random walks of {SOAK_STEPS} faults")
         end, seed = time.monotonic() + 60 * minutes, 0
         with self.rig() as rig:
@@ -266,11 +273,11 @@ class Campaign(Outcome):
 
 
 Piece = tuple[str, tuple[Any, ...]]
-"""Name of a method of ``Campaign``, and its arguments."""
+"""The name of a method of ``Campaign``, and its arguments."""
 
 
 def losses() -> list[Piece]:
-    """Return the pieces in which bytes to the board are lost; each piece has ten drivers."""
+    """Return the pieces in which the line loses bytes to the board. Each piece has ten drivers."""
     starts = range(0, LOSSES, LOSSES_AT_ONCE)
     return [
         ("losses", (life, range(start, start + LOSSES_AT_ONCE)))
@@ -280,7 +287,10 @@ def losses() -> list[Piece]:
 
 
 def pieces() -> list[Piece]:
-    """Return the pieces in the order of the table, without the busy computer, which runs alone."""
+    """Return the pieces in the order of the table.
+
+    The busy computer is not among them: it runs alone.
+    """
     return [
         ("faults_of_the_line", ()),
         ("faults_of_the_network", ()),
@@ -309,7 +319,10 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 
 
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
-    """Run the pieces that apply to the board in parallel, the longest first; return their sum."""
+    """Run the pieces that apply to the board in parallel, in this order.
+
+    Return the sum of their results.
+    """
     total, without = Outcome(), load(board).without
     wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]
     with get_context("spawn").Pool(processes, maxtasksperchild=1) as pool:
@@ -324,7 +337,7 @@ def _walk(seed: int, steps: int, rig: Rig) -> None:
 
 
 def main() -> int:
-    """Run the campaign, and print and write its table; return the exit code."""
+    """Run the campaign, print its table and write it. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=BOARDS, default="omnibot", help="that this is measured on"

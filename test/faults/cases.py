@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Scripted faults: events while a commander drives, and what must follow.
+"""Scripted faults: each occurs while a commander drives the robot, and the robot must then stop.
 
-A case is a function of a rig. The rig's robot is at rest before and after each case; ``findings``
-collects complaints.
+A case is a function that gets a rig. Before and after each case, the rig's robot is at rest. The
+rig's ``findings`` collect complaints.
 """
 
 import signal
@@ -26,15 +26,18 @@ Case = Callable[[R], object]
 
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
-"""Time without a heartbeat after which the guard acts, in s."""
+"""Time in s within which the robot must stop if the driver hangs. The guard stops it."""
 DAMAGED_S: Final = 1.1
-"""Time in s, plus grace, after the last command, in which a robot on a damaged line must stop."""
+"""Time in s within which a robot on a damaged line must stop after the last command.
+
+A grace time is added.
+"""
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
-"""Pattern of the log lines that a driver should print if its board receives nothing."""
+"""Pattern of the log lines that a driver should print if the board does not receive its stops."""
 NEXT_ATTEMPT_S: Final = 2.0
-"""Longest time until the driver tries again to open a lost port, in s."""
+"""Longest time in s until the driver tries again to open a lost port."""
 SILENCE_S: Final = 1.5
-"""Time without data after which the driver regards a board as silent, in s."""
+"""Time in s without data after which the driver regards a board as silent."""
 
 
 def ticks(seconds: float) -> int:
@@ -95,7 +98,7 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """Damage bytes while the robot drives for ``seconds``, and until it must be at rest."""
+    """Damage bytes while the robot drives for ``seconds``, and then until it must be at rest."""
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board
@@ -107,9 +110,9 @@ def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, 
 
 
 def cut_to_the_board(rig: Rig) -> None:
-    """Cut the line to the board: the driver must report it, since Stop cannot arrive.
+    """Cut the line to the board. Stop cannot arrive, and the driver must report this.
 
-    The robot must stop when the line is repaired.
+    When the line is repaired, the robot must stop.
     """
     rig.drive()
     mark = len(rig.driver.lines)
@@ -147,7 +150,8 @@ def board_reboots(rig: Rig) -> None:
 
 
 def board_reboots_while_somebody_drives_on(rig: Rig) -> None:
-    """Reboot the board while commands continue: no command may reach the booting board."""
+    """Reboot the board while commands continue. They must move the robot again only after the boot.
+    """
     rig.drive()
     rig.reboot_board()
     rig.probe.wait_for_state("nominal")
@@ -187,9 +191,9 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 
 
 def estop(rig: Rig) -> None:
-    """Keep the e-stop latched while the board reboots, the cable is pulled, and commands continue.
+    """Latch the e-stop. Then the board reboots and the cable is pulled, while commands continue.
 
-    After the release of the e-stop, the old command must have no effect.
+    After the release of the e-stop, the old command must not move the robot.
     """
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)
@@ -224,7 +228,10 @@ def estop_by_topic(rig: Rig) -> None:
 
 
 def service_discards_the_command(service: str, rig: Rig) -> None:
-    """Pause and resume, or reset, while driving: the robot must then wait for a fresh command."""
+    """Call pause and resume, or another service, while the robot drives.
+
+    The robot must then rest until a fresh command.
+    """
     rig.drive()
     rig.hand.leave()
     since = rig.line.tick
@@ -238,7 +245,10 @@ def service_discards_the_command(service: str, rig: Rig) -> None:
 
 
 def random_lines(seed: int) -> dict[str, Case[Rig]]:
-    """Return cases that damage bytes at random, by name; ``seed`` determines the damage."""
+    """Return the cases that damage bytes at random.
+
+    The keys are their names, and ``seed`` selects the damage.
+    """
     random = Random(f"lines {seed}")
     return {
         "1 byte in 100 lost, both ways": partial(
@@ -279,7 +289,10 @@ SERVICES: Final[dict[str, Case[Rig]]] = {
 
 
 def driver_hangs(rig: Rig) -> None:
-    """Stop the driver's process, as swapping may do, while commands continue and queue up."""
+    """Suspend the driver's process while commands continue and wait in queues.
+
+    The guard must stop the robot. When the driver runs again, the old commands must not move it.
+    """
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(signal.SIGSTOP)
@@ -291,7 +304,7 @@ def driver_hangs(rig: Rig) -> None:
 
 
 def second_driver(rig: Rig) -> None:
-    """Start a second driver on the same port: it is refused, and the first is not disturbed."""
+    """Start a second driver on the same port. It must be refused, and the first must drive on."""
     rig.drive()
     with Driver(**rig.ports, **rig.kind.parameters) as other:
         said = other.wait_for_line("is in use")
@@ -311,5 +324,5 @@ HOST: Final[dict[str, Case[Rig]]] = {
 
 
 def survivable(seed: int) -> dict[str, Case[Rig]]:
-    """Return all cases that a driver must survive, by name."""
+    """Return all cases that a driver must survive. The keys are their names."""
     return {**COMMANDS, **LINE, **TERMINAL, **random_lines(seed), **SERVICES, **HOST, **UNKIND}

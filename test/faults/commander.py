@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commanders: they send commands to the robot until they leave."""
+"""Commanders: programs that send motion commands to the robot until they leave."""
 
 import math
 import threading
@@ -13,14 +13,14 @@ from std_srvs.srv import SetBool
 
 DRIVE_HZ: Final = 20.0
 FAR_M: Final = 10.0
-"""Distance of a goal for each m/s commanded, in m; no test reaches it."""
+"""Distance of a goal for each commanded m/s, in m. It is so far that no test reaches it."""
 
 
 class Hand(Protocol):
     """The interface of a commander: a program that sends motion commands."""
 
     def hold(self, vx: float, vy: float, yaw_rate: float) -> None:
-        """Command this motion until ``leave`` or another ``hold``; m/s and rad/s."""
+        """Command this motion, in m/s and rad/s, until ``leave`` or another ``hold``."""
 
     def leave(self) -> None:
         """Stop commanding, so that the motion ends."""
@@ -45,7 +45,7 @@ class Stick:
             self._thread.start()
 
     def leave(self) -> None:
-        """Stop publishing; the last command has been published when this returns."""
+        """Stop publishing. When this returns, the last command has been published."""
         if self._thread is not None:
             self._left.set()
             self._thread.join()
@@ -59,7 +59,7 @@ class Stick:
 class Navigator:
     """A commander that sends a distant goal for each motion.
 
-    ``odom``: received odometry; its last message is the newest.
+    ``odom``: the list of received odometry, to which new messages are appended.
     """
 
     def __init__(self, probe: Probe, odom: list[Odometry]) -> None:
@@ -79,6 +79,6 @@ class Navigator:
         self._goals.publish(goal)
 
     def leave(self) -> None:
-        """Latch and release the e-stop, which discards the goal; a goal has no timeout."""
+        """Latch and release the e-stop, which discards the goal. A goal has no timeout."""
         for data in (True, False):
             self._probe.call(SetBool, "estop", data=data)

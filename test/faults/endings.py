@@ -53,12 +53,21 @@ os.close(terminal)
 
 @dataclass(frozen=True)
 class Ending:
-    """A way to end the driver, and what must follow; the board must receive Stop last.
+    """A way to end the driver, and what must follow. The board must always receive Stop last.
 
-    ``before``: Python code that runs in the driver's process before the driver. ``allowed_s``: how
-    long the robot may still drive after the ending. ``late_s``: additional time in s that the
-    process may take to end. ``full``: whether the port is full of old commands when the driver
-    ends. ``read``: whether the driver ends only when it next reads data.
+    ``end``: ends the driver of a rig.
+
+    ``exit_codes``: the exit codes that the driver may have.
+
+    ``before``: Python code that runs in the driver's process before the driver.
+
+    ``allowed_s``: how long the robot may still drive after the ending, in s.
+
+    ``late_s``: additional time that the process may take to end, in s.
+
+    ``full``: whether the port is full of old commands when the driver ends.
+
+    ``read``: whether the driver ends only when it next reads data.
     """
 
     end: Callable[[Rig], object]
@@ -70,7 +79,8 @@ class Ending:
     read: bool = False
 
     def __call__(self, rig: Rig) -> None:
-        """End the driver while the robot drives; check robot, exit code and last bytes."""
+        """End the driver while the robot drives. Check the robot, the exit code and the last bytes.
+        """
         rig.drive()
         self.end(rig)
         since = rig.line.tick
@@ -106,7 +116,7 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Publish on ``estop``; the callback has been replaced by code that ends the driver."""
+    """Publish on ``estop``. Code that ends the driver has replaced the callback of this topic."""
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
 
@@ -119,7 +129,7 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """Send SIGINT after the cable is back, but before the driver has opened the port.
+    """Unplug the cable and plug it in again. Send SIGINT before the driver has opened the port.
 
     The robot still follows its last command.
     """
@@ -186,7 +196,7 @@ ENDINGS: Final[dict[str, Ending]] = {
 def terminal_is_closed(
     make_rig: Callable[[str], Rig], run: Callable[[Rig, Ending], object]
 ) -> None:
-    """Close the driver's terminal, as when an ssh session drops.
+    """Close the driver's terminal, as when an ssh session ends.
 
     The driver gets SIGHUP, and its output is no longer read.
     """

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of the fault campaign: two ports, lines of text with checksums, one robot.
+"""The Fejemis in the fault campaign: two ports, lines of text with checksums, one robot.
 
-Both boards send at rates of their own, so messages are not compared with what was sent. The driver
+The two boards send at different rates, so messages are not compared with what was sent. The driver
 of this robot has no wheel command and no reset.
 """
 
@@ -18,16 +18,17 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.fejemis import CHANNELS, FejemisSettings, SimulatedFejemis
 
 TICKS: Final = 5
-"""Number of ticks of the simulated boards in one tick of the rig."""
+"""Ticks of the simulated boards in one tick of the rig."""
 SILENCE_S: Final = 1.6
 ANGLE_S: Final = 0.2
 MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.MULTILINE)
 
 
 class Pair:
-    """Both Teensys with the interface of a single board; its ticks are those of the rig.
+    """Both Teensys, with the interface of a single board. Its ticks are those of the rig.
 
-    ``received``: motion commands at the drive board, without checksums and padding.
+    ``received``: the motion commands that the drive board has received, without checksums and
+    padding.
     """
 
     channels = CHANNELS
@@ -84,9 +85,10 @@ def half_restarts(half: str) -> Any:
 
 
 def half_is(half: str, what: str, allowed_s: float) -> Any:
-    """Make a case with the fault ``what`` of one Teensy.
+    """Make a case in which one Teensy has the fault ``what``.
 
-    Commands must have no effect until the Teensy works again.
+    Until the Teensy works again, commands must have no effect. ``allowed_s``: how long the robot
+    may still drive, in s. If it is 0, the robot may drive on until the Teensy works again.
     """
 
     def case(rig: Rig) -> None:
@@ -124,7 +126,7 @@ CASES: Final = {
 
 
 def cases(seed: int) -> dict[str, Case[Rig]]:
-    """Return the cases of a serial line, and those of each Teensy, by name."""
+    """Return the cases of a serial line and the cases of each Teensy. The keys are their names."""
     return {**survivable(seed), **CASES}
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random input from ROS: messages of any content and size, invalid bytes, service calls."""
+"""Random input from ROS: messages of any content and size, invalid bytes, and service calls."""
 
 import struct
 from collections.abc import Callable
@@ -17,16 +17,17 @@ from std_srvs.srv import SetBool, Trigger
 
 CALLS_ONE_IN: Final = 20
 BURST: Final = 10
-"""Number of messages per tick of 10 ms, which makes 1000 a second."""
+"""Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""Least share of the board's readings that the driver must publish while the input lasts, and in
-the 2 s after it.
+"""The least share of the board's readings that the driver must publish during the random input.
+
+The 2 s after the input belong to this time.
 """
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
 def odd_float(random: Random) -> float:
-    """Draw any 64-bit float, or one of several common or special values such as 0 or NaN."""
+    """Draw any 64-bit float, or one of several usual or special values, such as 0 or NaN."""
     anything = struct.unpack("d", random.randbytes(8))[0]
     usual = (0.0, -0.0, 0.3, -0.3, 1e-300, 1e300, float("nan"), float("inf"), -float("inf"))
     return random.choice((*usual, anything))
@@ -55,12 +56,15 @@ def pose(random: Random) -> PoseStamped:
 
 
 def no_message(random: Random) -> bytes:
-    """Draw random bytes in place of a serialized message; by chance they may be valid."""
+    """Draw random bytes in place of a serialized message. By chance they may be a valid message."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
 
 
 def parameters(random: Random) -> SetParameters.Request:
-    """Draw a request to set a parameter, which may be read-only, unknown, or have a wrong value."""
+    """Draw a request that sets a parameter to some value.
+
+    The parameter may be read-only or unknown, and the value may be wrong.
+    """
     value = random.choice(
         (
             ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=odd_float(random)),
@@ -74,7 +78,7 @@ def parameters(random: Random) -> SetParameters.Request:
 
 
 def fuzz(rig: Rig, count: int, random: Random) -> None:
-    """Send messages and calls; check that calls are answered and that the node still publishes."""
+    """Send random messages and calls. Calls must be answered, and the node must still publish."""
     probe = rig.probe
     publishers = [
         (probe.publisher(Twist, "cmd_vel"), twist),

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Events that discard a goal of position control: the robot then rests until another command.
+"""Events that discard a goal of position control. The robot must rest until another command.
 
 Each event returns the board's tick from which the robot must be at rest.
 """
@@ -19,7 +19,7 @@ from stuck import TAKES_NOTHING
 OLD_GOAL: Final = bytes.fromhex("FF FE 01 7F FF 7F FF 00 00")
 """The farthest goal that a frame can hold."""
 UNHEARD_S: Final = 0.3
-"""Time without data from the board after which the driver no longer drives the robot, in s."""
+"""Time in s without data from the board after which the driver no longer drives the robot."""
 HANGS_S: Final = 1.0
 
 
@@ -87,7 +87,8 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """Check that the event discards the goal, so that the robot rests also after the event."""
+    """Check that the event discards the goal, so that the robot rests during and after the event.
+    """
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)
@@ -98,7 +99,7 @@ def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) ->
 
 
 def ended(number: signal.Signals, rig: GoalRig) -> None:
-    """Check that the robot stops when this signal ends the driver."""
+    """Check that the robot stops when a signal ends the driver."""
     rig.drive()
     since = rig.line.tick
     rig.driver.process.send_signal(number)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Misuse by people and programs while a commander drives."""
+"""Misuse of the driver by people and programs while a commander drives."""
 
 import os
 import signal
@@ -21,7 +21,10 @@ NONSENSE: Final = (float("nan"), float("inf"), -1.0, 1e12)
 
 
 def two_commanders(rig: Rig) -> None:
-    """Let one commander send velocities and another send wheel rates; then end both."""
+    """Let one commander send velocities and another one wheel rates.
+
+    When both end, the robot must stop.
+    """
     publisher = rig.probe.publisher(Float32MultiArray, "wheel_cmd")
     rig.drive()
     for _ in range(40):
@@ -33,7 +36,10 @@ def two_commanders(rig: Rig) -> None:
 
 
 def other_type(rig: Rig) -> None:
-    """Publish TwistStamped on the topic of Twist: it has no effect, and the driver reports it."""
+    """Publish TwistStamped on a topic of Twist.
+
+    This must have no effect, and the driver must report it.
+    """
     context = rclpy.Context()
     context.init()
     node = Node("other", namespace=rig.driver.namespace, context=context)
@@ -53,7 +59,8 @@ def other_type(rig: Rig) -> None:
 
 
 def flood_of_releases(rig: Rig) -> None:
-    """Publish ``false`` for the e-stop 1000 times a second: only the service may release it."""
+    """Publish ``false`` on ``estop`` 1000 times a second. Only the service may release the e-stop.
+    """
     publisher = rig.probe.publisher(Bool, "estop")
     rig.drive()
     rig.probe.call(SetBool, "estop", data=True)
@@ -70,7 +77,7 @@ def flood_of_releases(rig: Rig) -> None:
 
 
 def everybody_calls_at_once(rig: Rig) -> None:
-    """Call every service from five clients during a reconnection.
+    """Call every service five times while the driver reconnects to the board.
 
     Each call must be answered, and none may move the robot.
     """
@@ -102,7 +109,7 @@ def everybody_calls_at_once(rig: Rig) -> None:
 
 
 def nonsense_for_parameters(rig: Rig) -> None:
-    """Set every limit and timeout to invalid values: all must be refused."""
+    """Set every limit and timeout to invalid values. The driver must refuse all of them."""
     rig.drive()
     parameters = [
         Parameter(
@@ -124,10 +131,9 @@ def nonsense_for_parameters(rig: Rig) -> None:
 
 
 def limit_lowered(rig: Rig) -> None:
-    """Lower the speed limit to zero while commands continue: the robot must stop at once.
+    """Lower the speed limit to zero while commands continue. The robot must stop at once.
 
-    The robot must be at rest when the service answers. The time of the call itself does not count,
-    because the call first has to find the service.
+    The time starts when the service answers, because the call first has to find the service.
     """
 
     def limit(mps: float) -> None:
@@ -144,9 +150,9 @@ def limit_lowered(rig: Rig) -> None:
 
 
 def flood_into_a_full_port(rig: Rig) -> None:
-    """Send 1000 commands a second into a full port.
+    """Send 1000 commands a second while the port is full.
 
-    When the port accepts data again, no command may follow.
+    When the port accepts data again, the old commands must not drive the robot.
     """
     publisher = rig.probe.publisher(Twist, "cmd_vel")
     fast = Twist()
@@ -164,7 +170,7 @@ def flood_into_a_full_port(rig: Rig) -> None:
 
 
 def guard_killed(rig: Rig) -> None:
-    """Kill the guard process: the driver must start another one and continue."""
+    """Kill the guard process. The driver must start another guard and continue to drive."""
     rig.drive()
     (first,) = rig.driver.guards()
     os.kill(first, signal.SIGKILL)

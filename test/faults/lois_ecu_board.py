@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The LOIS ECU's part of the fault campaign: lines of text, no IMU, two wheels.
+"""The LOIS ECU in the fault campaign: lines of text, two wheels, no IMU.
 
-The motors obey a command at the board's next control interrupt; the interrupts are 91 ms apart. The
-driver predicts odometry from the board's groups of reports, so messages are not compared with what
-was sent.
+The motors obey a command at the board's next control interrupt. These interrupts are 91 ms apart.
+The driver predicts odometry from groups of reports, so messages are not compared with what was
+sent.
 """
 
 from typing import Final

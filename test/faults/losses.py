@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes to the board from before a stop until the stop is judged.
+"""Stops on a line that loses bytes to the board, from before a stop until the stop is judged.
 
-Processes and pseudo-terminal are real. Rates of failure cannot be measured here; they are measured
-in simulated time (test/integrity/outbound.py). The board of each driver has a different receiver.
+Process and pseudo-terminal are real. The rate of failures cannot be measured here. It is measured
+in simulated time, in test/integrity/outbound.py. The board of each driver has a different receiver.
 """
 
 import signal
@@ -24,28 +24,28 @@ ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""Additional time in s for a stop by the guard, which has to repeat Stop after the driver's end."""
+"""Additional time in s for a stop by the guard, which repeats Stop after the driver's end."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
-    """Return a rig with a new driver and board number ``number``, on an undamaged line."""
+    """Return a rig with a new driver and the board of this number. Its line is still undamaged."""
     return Rig(folder, kind, settings=kind.lossy(number), **more)
 
 
 def lose(rig: Rig, number: int) -> None:
-    """Begin to lose bytes towards the board; ``number`` selects the loss."""
+    """Begin to lose bytes to the board. ``number`` selects the rate and the lost bytes."""
     rig.line.to_board = losing(RATES[number % len(RATES)], Random(number))
 
 
 def times_out(rig: Rig) -> None:
-    """Stop publishing commands: the robot must be at rest after the timeout."""
+    """Stop publishing commands. After the timeout, the robot must be at rest."""
     rig.drive()
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "timeout", TIMED_OUT_S)
 
 
 def is_estopped(rig: Rig) -> None:
-    """Latch the e-stop while commands continue: the robot must stop."""
+    """Latch the e-stop while commands continue. The robot must stop."""
     rig.drive()
     since = rig.line.tick
     answer = rig.probe.call(SetBool, "estop", data=True)
@@ -67,12 +67,12 @@ def _ends(by: signal.Signals, exit_code: int, rig: Rig) -> None:
 
 
 def is_interrupted(rig: Rig) -> None:
-    """Interrupt the driver, as ctrl-C does: the robot must stop."""
+    """Interrupt the driver, as ctrl-C does. The robot must stop."""
     _ends(signal.SIGINT, 0, rig)
 
 
 def is_killed(rig: Rig) -> None:
-    """Kill the driver: its guard must stop the robot."""
+    """Kill the driver. Its guard must stop the robot."""
     _ends(signal.SIGKILL, -signal.SIGKILL, rig)
 
 
@@ -80,6 +80,4 @@ LIVES: Final[tuple[dict[str, Callable[[Rig], None]], ...]] = (
     {"timeout": times_out, "ctrl-C": is_interrupted},
     {"e-stop": is_estopped, "SIGKILL": is_killed},
 )
-"""One dictionary per driver: the stops that the driver must perform, by name. The last stop ends
-the driver.
-"""
+"""Groups of stops. One driver performs all stops of a group, and the last stop ends the driver."""

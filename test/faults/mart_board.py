@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller's part of the fault campaign: datagrams, no stream, and blocking motions.
+"""The MART controller in the fault campaign: datagrams on request, and blocking motions.
 
-The faults are those of a network, which loses, doubles and delays complete datagrams. The names of
-cases say where a fault exceeds what the driver assumes of a network.
+The faults are those of a network, which loses, doubles and delays complete datagrams. The driver
+assumes a network with certain limits. The names of some cases say that their fault exceeds these
+limits.
 """
 
 import socket
@@ -24,21 +25,20 @@ from omnibot_driver.simulator.common.serving import ServedBoard
 from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 
 TICKS: Final = 5
-"""Number of ticks of the simulated controller in one tick of the campaign."""
+"""Ticks of the simulated controller in one tick of the campaign."""
 LATE_S: Final = 0.3
-"""Longest delay of a datagram in each direction, in s, equal to ``network_delay``."""
+"""Longest delay of a datagram in each direction, in s. It equals ``network_delay``."""
 LOST_STOP_S: Final = 1.2
-"""Delay of a stop, in s, if its first two datagrams are lost and the third is as late as possible.
-"""
+"""Longest delay of a stop, in s, if its first two datagrams are lost."""
 BLIND_S: Final = 2.0
-"""Longest allowed time, in s, until a robot stops if its driver gets no replies.
+"""Longest time in s until a robot must stop if its driver gets no replies.
 
-The time also suffices if exchanges are slow.
+This includes slow exchanges.
 """
 NETWORK_S: Final = 90.0
-"""Longest wait for a start on a bad network, in s; the driver must first see that the IMU works."""
+"""Longest wait for a start on a bad network, in s. The driver must first see that the IMU works."""
 STRAY_S: Final = 2.5
-"""Longest allowed time, in s, until the driver stops a robot that another program drives."""
+"""Longest time in s until the driver must stop a robot that another program drives."""
 
 
 class Board(SimulatedMart):
@@ -56,7 +56,7 @@ class Board(SimulatedMart):
     def received(self) -> bytes:
         """Always empty, because the driver still polls after its last stop.
 
-        The last bytes therefore cannot be compared with a stop.
+        So the last bytes cannot be compared with a stop.
         """
         return b""
 
@@ -118,7 +118,7 @@ def line_of(rig: Rig) -> Any:
 
 
 def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
-    """Stop publishing while the robot drives: a bad network may delay the stop by ``allowed_s``."""
+    """Stop publishing while the robot drives. A bad network may delay the stop by ``allowed_s``."""
     line_of(rig).network(faults)
     for twist in ((0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)):
         rig.hand.hold(twist[0], 0.0, twist[1])
@@ -130,7 +130,7 @@ def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
 
 
 def replies_are_cut(rig: Rig) -> None:
-    """Cut the controller's replies; the controller still receives the stop."""
+    """Cut the controller's replies. The controller still receives the stop."""
     rig.drive()
     rig.line.from_board = cut
     rig.expect_still(rig.line.tick, "no replies come", BLIND_S)
@@ -140,7 +140,7 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Cut the network both ways; the robot drives on until a stop reaches the controller again."""
+    """Cut the network both ways. The robot drives on until a stop reaches the controller again."""
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
     rig.wait_ticks(round(seconds / TICK_S))
@@ -180,7 +180,7 @@ def estop_through_a_restart(rig: Rig) -> None:
 
 
 def another_client(said: bytes, rig: Rig) -> None:
-    """Let another client start a motion with this datagram while the robot is at rest."""
+    """Let another client start a motion with the datagram ``said`` while the robot is at rest."""
     rig.wait_ticks(350)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         port = int(rig.port.rpartition(":")[2])
@@ -190,7 +190,10 @@ def another_client(said: bytes, rig: Rig) -> None:
 
 
 def imu_dies(rig: Rig) -> None:
-    """Let the IMU die during an RM motion: the stop then hangs the server, which is restarted."""
+    """Let the IMU die while the robot drives by RM.
+
+    The stop then hangs the server, which is restarted.
+    """
     rig.drive()
     rig.wait_ticks(100)
     since = rig.line.tick
@@ -218,7 +221,7 @@ ASSUMED: Final = {
 
 
 def cases(_seed: int) -> dict[str, Case[Rig]]:
-    """Return all cases that one driver goes through, by name."""
+    """Return all cases that one driver goes through. The keys are their names."""
     mine = {name: case for name, case in COMMANDS.items() if not name.startswith("wheel_cmd")}
     return {
         **mine,
@@ -241,12 +244,12 @@ def cases(_seed: int) -> dict[str, Case[Rig]]:
 
 
 def serve(line: Any, url: str) -> ServedBoard[Any]:
-    """Return a server that offers the controller at the port of this address."""
+    """Return a server that offers the controller at the UDP port of this address."""
     return ServedBoard(line, udp_port=int(url.rpartition(":")[2]))
 
 
 def url(_folder: Path) -> str:
-    """Return the address of the first of two consecutive free ports."""
+    """Return the address of the first of two free ports with consecutive numbers."""
     for _ in range(100):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as first:
             first.bind(("127.0.0.1", 0))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The OmniBot's part of the fault campaign."""
+"""The OmniBot in the fault campaign."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -46,7 +46,10 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Return settings for a line that loses bytes; each number selects another receiver."""
+    """Return settings for a line that loses bytes.
+
+    Each number selects another receiver of the board.
+    """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)
 

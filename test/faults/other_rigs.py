@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Rigs with a board behind a network, and with a board on position control."""
+"""Rigs for two other boards: one behind a network, and one under position control."""
 
 import socket
 from pathlib import Path
@@ -34,7 +34,8 @@ class NetworkRig(Rig):
 
 
 class GoalRig(Rig):
-    """A rig whose board is on position control: goals, not velocities."""
+    """A rig whose board is under position control. It drives to goals and does not obey velocities.
+    """
 
     def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:
         settings = BoardSettings(control="position")

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Boards whose port can be stuck, full, half-open or gone without notice.
+"""Boards whose port can be stuck, full or half-open, or can disappear without notice.
 
-The module uses descriptors and sockets, and knows nothing of frames.
+This module knows descriptors and sockets; it does not know frames.
 """
 
 import contextlib
@@ -32,9 +32,9 @@ DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 
 
 class Terminal(PtyBoard):
-    """A pseudo-terminal.
+    """A pseudo-terminal with a board.
 
-    ``deaf``: whether the adapter, which still sends, does not read the kernel's buffer.
+    ``deaf``: whether the adapter does not read the kernel's buffer. It still sends.
     """
 
     deaf = False
@@ -54,7 +54,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Fill the kernel's buffer with these commands, about 20 kB, which the board does not read.
+        """Fill the kernel's buffer with ``old`` commands, about 20 kB.
+
+        The board does not read them.
 
         At the end of the context, wait until the board has received all of them.
         """
@@ -71,9 +73,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Keep the kernel's buffer full even after the driver has discarded the buffer's content.
+        """Keep the kernel's buffer full, even when the driver discards its content.
 
-        The terminal's output is suspended in the context.
+        In the context, the terminal's output is suspended.
         """
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
@@ -90,8 +92,11 @@ class Terminal(PtyBoard):
 class Server(RunningBoard):
     """A board behind a serial-port server on the network.
 
-    ``deaf``: whether the server holds back data to the board; ``mute``: whether it holds back data
-    from the board. ``accepted_at``: the board's tick at each connection.
+    ``deaf``: whether the server keeps back data to the board.
+
+    ``mute``: whether the server keeps back data from the board.
+
+    ``accepted_at``: the board's tick at each connection.
     """
 
     deaf = mute = False
@@ -117,12 +122,15 @@ class Server(RunningBoard):
             each.close()
 
     def close_from_here(self) -> None:
-        """Close only the direction to the driver; the server still accepts data."""
+        """Close only the direction to the driver. The server still accepts data."""
         with self.lock:
             self._peers[-1].shutdown(socket.SHUT_WR)
 
     def vanish(self) -> None:
-        """Cut the network: all packets are dropped, and neither side sees the connection close."""
+        """Cut the network.
+
+        All packets are dropped, and neither side sees that the connection closes.
+        """
         program = ctypes.create_string_buffer(DROP_ALL)
         rule = struct.pack("HP", 1, ctypes.addressof(program))
         self.deaf = self.mute = True

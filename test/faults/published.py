@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keys: the values of published messages in the units of the board's frames."""
+"""Keys: the values of published messages in the units of the board's frames, for comparison."""
 
 import math
 import struct
@@ -33,10 +33,10 @@ def sent_imu_key(frame: bytes) -> Key | None:
 
 
 def odom_key(message: Odometry) -> Key | None:
-    """Return the message's speed and yaw rate in 0.1 mm and 0.1 mrad per 40 ms, or None.
+    """Return the speed and the yaw rate of a message, in 0.1 mm and 0.1 mrad per 40 ms.
 
-    None means that the message marks the speed as unmeasured. Both numbers are independent of the
-    robot's heading.
+    Both numbers are independent of the robot's heading. Return None if the message marks the speed
+    as unmeasured.
     """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE
@@ -51,7 +51,7 @@ def sent_odom_key(frame: bytes) -> Key | None:
 
 
 def not_sent(published: Iterable[Key | None], sent: Iterable[Key | None]) -> int:
-    """Return how many published keys the board did not send, or sent in another order."""
+    """Return how many published keys the board has not sent, or has sent in another order."""
     truth = [key for key in sent if key is not None]
     at = missing = 0
     for key in published:

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A real driver process on a breakable line, a commander, and checks of both.
+"""A rig: a real driver process on a breakable line, a commander, and checks of robot and driver.
 
-The checks: the robot is at rest in time, every published message was sent by the board, odometry
-does not jump, and the process does not grow.
+The checks are: the robot rests in time, the board has sent every published message, odometry does
+not jump, and the process does not grow.
 """
 
 import math
@@ -30,15 +30,17 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Bool, String
 
 TIMEOUT_S: Final = 0.5
-"""The driver's ``cmd_vel_timeout`` in s."""
+"""The driver's ``cmd_vel_timeout``, in s."""
 GRACE_S: Final = 0.1
 REST_TICKS: Final = round(1.0 / TICK_S)
-"""Number of ticks at rest after which a robot counts as at rest for good."""
+"""A robot whose motors are off for this number of ticks is at rest for good."""
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
-"""NEW_VARIANCE: variance of x just after an odometry reset, in m². GAP_MPS2: assumed acceleration
-in a gap of data, in m/s²."""
+"""``NEW_VARIANCE``: largest variance of x just after a reset of odometry, in m².
+
+``GAP_MPS2``: assumed acceleration of the robot in a gap of data, in m/s².
+"""
 WRONG_ONE_IN: Final = 500
 """If one byte in 100 is lost, at most one published message in this number may be wrong."""
 ENDS_WITHIN_S: Final = 2.0
@@ -46,11 +48,14 @@ ENDS_WITHIN_S: Final = 2.0
 
 @dataclass(slots=True)
 class Findings:
-    """Complaints about a driver or robot (none if all is well), and measured figures."""
+    """Complaints about a driver or its robot, and measured numbers.
+
+    If all is well, the list of complaints is empty.
+    """
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
-    """Time until the robot was at rest after each stop, in s of the board's clock."""
+    """Time in s of the board's clock from each stop until the robot was at rest."""
     published: int = 0
     wrong: int = 0
 
@@ -65,11 +70,19 @@ class Findings:
 
 
 class Rig:
-    """Context manager of a driver whose port is a symbolic link, as udev makes them.
+    """Context manager of a driver and its board.
 
-    ``kind``: the board, which gets these ``settings``. ``before``: Python code that runs in the
-    driver's process before the driver. ``grace_s``: additional time in which the robot may come to
-    rest. ``ends_within_s``: how long a driver may take to end.
+    The driver's port is a symbolic link, as udev makes it.
+
+    ``kind``: the kind of board, which is made with ``settings``.
+
+    ``before``: Python code that runs in the driver's process before the driver.
+
+    ``grace_s``: additional time that the robot may take to come to rest, in s.
+
+    ``ends_within_s``: how long a driver may take to end, in s.
+
+    ``parameters``: further parameters of the driver.
     """
 
     def __init__(
@@ -135,7 +148,7 @@ class Rig:
 
     @property
     def terminal(self) -> Terminal:
-        """The terminal that is plugged in; the board must have one."""
+        """The terminal that is plugged in. Use this only for a board that has a terminal."""
         assert isinstance(self._terminal, Terminal)
         return self._terminal
 
@@ -146,13 +159,13 @@ class Rig:
         self._terminal.deaf = False
 
     def unplug(self) -> None:
-        """Remove the terminal; the robot continues with its last command."""
+        """Remove the terminal. The robot continues with its last command."""
         if self._terminal is not None:
             self._terminal.__exit__(None, None, None)
             self._terminal, self._unplugged_at_s = None, time.monotonic()
 
     def plug(self) -> None:
-        """Make a new terminal, with a new name, behind the old link."""
+        """Make a new terminal, with another name, behind the same link."""
         if self._unplugged_at_s is not None:
             for _ in range(round((time.monotonic() - self._unplugged_at_s) / TICK_S)):
                 self.line.advance()
@@ -175,7 +188,7 @@ class Rig:
             self.line.board.reboot()
 
     def wait_for_board(self, predicate: Any, patience_s: float = PATIENCE_S) -> bool:
-        """Wait for a condition that is checked after each of the board's ticks."""
+        """Wait for a condition, which is checked after each of the board's ticks."""
         assert self._terminal is not None
         return self._terminal.wait_for(predicate, patience_s)
 
@@ -186,14 +199,15 @@ class Rig:
     # What can be seen
 
     def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
-        """Let the commander send this motion; return when the motors turn."""
+        """Let the commander send this motion, and wait until the motors turn."""
         self.hand.hold(vx, vy, yaw_rate)
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect the motors to be off for good ``allowed_s`` (plus grace) after ``since_tick``.
+        """Expect the motors to be off for good soon after ``since_tick``.
 
-        They are off for good once they have been off for ``REST_TICKS``.
+        They may still be on for ``allowed_s`` plus the grace time. They are off for good once they
+        have been off for ``REST_TICKS``.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)
@@ -211,7 +225,7 @@ class Rig:
         )
 
     def wait_for_diagnosis(self, pattern: str) -> None:
-        """Wait for new ``/diagnostics`` of this port with a message that matches ``pattern``."""
+        """Wait until new ``/diagnostics`` of this port have a message that matches ``pattern``."""
         mark = len(self._diagnostics)
         self.probe.wait_for(
             lambda: any(
@@ -222,12 +236,15 @@ class Rig:
         )
 
     def expect_said_once(self, pattern: str, mark: int) -> None:
-        """Expect exactly one match of ``pattern`` in the log from line number ``mark`` on."""
+        """Expect exactly one match of ``pattern`` in the log, from the line number ``mark`` on."""
         times = sum(bool(re.search(pattern, line)) for line in self.driver.lines[mark:])
         self.findings.expect(times == 1, f"the log says {times} times: {pattern}")
 
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
-        """Expect the driver to end at most ``late_s`` too late, with one of these exit codes."""
+        """Expect the driver to end in time with one of these exit codes.
+
+        It may end ``late_s`` later.
+        """
         begin_s = time.monotonic()
         try:
             code = self.driver.process.wait(PATIENCE_S)
@@ -241,16 +258,18 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """Expect a fresh command to move the robot, and the end of commands to stop it."""
+        """Expect a fresh command to move the robot, and expect the robot to stop when commands end.
+        """
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()
         self.expect_still(self.line.tick, "afterwards")
 
     def judge_stream(self, damaged_bytes: bool = False) -> None:
-        """Expect every published message to have been sent, and odometry to be free of jumps.
+        """Expect that the board has sent every published message, and that odometry does not jump.
 
-        ``damaged_bytes``: whether bytes were lost or added; then a few wrong frames are allowed.
+        ``damaged_bytes``: whether bytes were lost or added. If so, a few wrong messages are
+        allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

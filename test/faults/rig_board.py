@@ -1,6 +1,7 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the fault campaign must know of each kind of board; ``<board>_board.py`` has the values."""
+"""What the fault campaign must know of each kind of board. The values are in ``<board>_board.py``.
+"""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -15,32 +16,58 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``make``: makes a simulated board from settings, or with the usual settings. ``parameters``: the
-    driver's parameters for this board. ``ports``: takes the path of the link to the terminal, and
-    returns the parameters that name the board's ports.
+    ``make``: makes a simulated board from settings, or from None.
 
-    ``old_command``: bytes of a motion command. ``stop``: the last bytes received when a driver
-    ends. ``opening``: the first bytes on a new line. ``wheels``: number of values in wheel_cmd.
-    ``services``: the common services that the board's driver has. ``tuning``: parameters that
-    refuse invalid values.
+    ``parameters``: the driver's parameters for this board.
 
-    ``off_within_s``: longest allowed time from a stop until the motors are off. ``old_bytes_s``:
-    time that the board needs to receive all old commands from a full port. ``ends_later_s``:
-    additional time that the driver may take to end. ``deaf_s``: longest time for which the board
-    may ignore its input; the driver then has to repeat commands. ``silent_s``: longest usual pause
-    between two transmissions of the board.
+    ``ports``: takes the path of the link to the terminal, and returns the parameters that name the
+    board's ports.
 
-    ``imu``: whether the board has an IMU. ``jump_stddevs``: largest correction of predicted
-    odometry, in standard deviations of the prediction.
+    ``old_command``: the bytes of a motion command.
 
-    ``sent``: returns the frames of the board's last tick. ``not_sent``: returns by kind how many
-    published messages were never sent, and their total. ``lossy``: returns settings of board number
-    n for a line that loses bytes. ``without``: names of faults and parts of the campaign that do
-    not apply to the board.
+    ``stop``: the last bytes that the board must receive when a driver ends.
 
-    ``line``, ``serve``, ``port``: replacements for a breakable line of bytes, for the line's
-    server, and for the driver's ``port``. ``cases``: takes the number of a round, and returns the
-    round's faults. None means the usual faults of a serial line.
+    ``opening``: the first bytes that the board must receive on a new line.
+
+    ``wheels``: the number of values in wheel_cmd.
+
+    ``services``: the common services that the board's driver has.
+
+    ``tuning``: parameters that must refuse invalid values.
+
+    ``off_within_s``: longest allowed time from a stop until the motors are off.
+
+    ``old_bytes_s``: how long the board takes to receive all old commands from a full port.
+
+    ``ends_later_s``: additional time that the driver may take to end.
+
+    ``deaf_s``: longest time for which the board may ignore its input. The driver then has to repeat
+    commands.
+
+    ``silent_s``: longest usual pause between two transmissions of the board.
+
+    ``imu``: whether the board has an IMU.
+
+    ``jump_stddevs``: how much predicted odometry may be corrected, in standard deviations of the
+    prediction.
+
+    ``sent``: returns the frames of the board's last tick.
+
+    ``not_sent``: returns for each kind of message how many published ones were never sent, and how
+    many were published.
+
+    ``lossy``: returns the settings of the board with a number, for a line that loses bytes.
+
+    ``line``: makes the line. None means a breakable line of bytes.
+
+    ``serve``: makes the server of the line. None means a terminal.
+
+    ``port``: returns the driver's ``port`` in a folder.
+
+    ``cases``: takes the number of a round, and returns the faults of the round. None means the
+    usual faults of a serial line.
+
+    ``without``: names of the faults and parts of the campaign that do not apply to the board.
     """
 
     name: str

@@ -16,9 +16,11 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive while the adapter is stuck for ``seconds``; then it delivers everything it has held.
+    """Drive while the adapter is stuck for ``seconds``.
 
-    ``mute``: whether data from the board are held too.
+    Then it delivers everything that it has kept.
+
+    ``mute``: whether it also keeps the data from the board.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -32,7 +34,10 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 
 
 def full(rig: Rig, *, mute: bool = False) -> None:
-    """Fill the port with old commands; the robot must stop when the port accepts data again."""
+    """Fill the port with old commands. When the port accepts data again, the robot must stop.
+
+    ``mute``: whether the board's data is cut meanwhile.
+    """
     rig.drive()
     mark = len(rig.driver.lines)
     with rig.terminal.full(rig.kind.old_command):
@@ -46,7 +51,10 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full: the driver reopens it repeatedly, reports this once, then recovers."""
+    """Keep the port full for long. The driver opens it again and again, and reports this once.
+
+    When the port accepts data, the robot must stop.
+    """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
     with rig.terminal.kept_full(rig.kind.old_command):
@@ -59,9 +67,9 @@ def full_for_long(rig: Rig) -> None:
 
 
 def estop_into_a_full_port(rig: Rig) -> None:
-    """Latch the e-stop while the port is full: the reply must contain a warning.
+    """Latch the e-stop while the port is full. The reply must contain a warning.
 
-    When the port accepts data again, no new motion command may precede the e-stop.
+    When the port accepts data again, no new motion command may come before the e-stop.
     """
     rig.drive()
     rig.hand.leave()
@@ -96,9 +104,9 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 
 
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
-    """Let the server hold data back, and later deliver everything at once.
+    """Let the server keep data back and later deliver everything at once.
 
-    ``mute``: whether data from the board are held too.
+    ``mute``: whether it also keeps the data from the board.
     """
     rig.drive()
     rig.server.deaf, rig.server.mute = True, mute
@@ -110,7 +118,10 @@ def server_holds(rig: NetworkRig, *, mute: bool) -> None:
 
 
 def server_closes_one_direction(rig: NetworkRig) -> None:
-    """Close one direction: the driver notices it, and sends Stop in the other direction."""
+    """Close one direction of the connection.
+
+    The driver must notice this and send Stop in the other one.
+    """
     rig.drive()
     since, mark = rig.line.tick, len(rig.driver.lines)
     rig.server.close_from_here()
@@ -121,7 +132,7 @@ def server_closes_one_direction(rig: NetworkRig) -> None:
 
 
 def server_dies(rig: NetworkRig) -> None:
-    """Close the server for a while, so that connections are refused."""
+    """Close the server for a while, so that it refuses connections."""
     rig.drive()
     mark = len(rig.driver.lines)
     rig.unplug()
@@ -133,7 +144,10 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """Cut the network without closing the connection; a restarted server then has no connection."""
+    """Cut the network without closing the connection.
+
+    The server then comes back without connections.
+    """
     rig.drive()
     before = len(rig.server.accepted_at)
     rig.server.vanish()

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer on a good line; ``make faults`` runs it for half a minute."""
+"""Test of a busy computer on a good line. ``make faults`` runs it for half a minute."""
 
 from pathlib import Path
 
@@ -9,7 +9,10 @@ from omnibot_board import BOARD
 
 
 def test_a_busy_computer_loses_no_message(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """With four busy loops and pieces of four bytes, everything sent is published in order."""
+    """Four busy loops run, and the line delivers four bytes at a time.
+
+    Everything that the board sends is published, in order.
+    """
     with PiecesRig(tmp_path, BOARD, **lenience) as rig:
         is_busy(rig, ticks=500)
         assert not rig.findings.take(), rig.driver.output

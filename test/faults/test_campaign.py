@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of nearly every fault: the robot is at rest in time, and nothing false is published."""
+"""Tests of nearly every fault: the robot rests in time, and the driver publishes nothing false."""
 
 from collections.abc import Iterator
 from random import Random
@@ -17,7 +17,7 @@ LEFT_OUT = {
     "the kernel's buffer is full, and the board silent",
     "TwistStamped where Twist is expected",
 }
-"""Cases left out here because they are similar to others; ``make faults`` runs all cases."""
+"""Cases that are similar to others and are not tested here. ``make faults`` runs all cases."""
 CASES = {name: case for name, case in survivable(seed=0).items() if name not in LEFT_OUT}
 
 
@@ -31,27 +31,37 @@ def rig(
 
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_the_robot_stands_still_and_obeys_again(case: Case[Rig], rig: Rig) -> None:
-    """During the fault the robot comes to rest; after it, the robot obeys a fresh command."""
+    """A fault occurs during a drive, and the robot comes to rest.
+
+    Afterwards it obeys a fresh command.
+    """
     case(rig)
     rig.expect_obeys_again()
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
-    """During 1000 random messages and calls, all calls are answered and readings are published."""
+    """The driver gets 1000 random messages and calls.
+
+    It answers all calls, and still publishes readings.
+    """
     fuzz(rig, 1000, Random(0))
     rig.expect_obeys_again()
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
-    """A short random walk of faults; ``make faults`` and ``make soak`` run long ones."""
+    """Some faults occur in random order and at once. The robot rests in time and then obeys.
+
+    ``make faults`` and ``make soak`` run long random walks.
+    """
     walk(rig, Random(0), steps=6)
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """No case of this module makes the driver publish a false message or a jump of odometry."""
+    """In all cases of this module, the driver published no false message and no jump of odometry.
+    """
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()
     assert rig.findings.published > 1000

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Ways in which the driver ends: after each of them, the robot is at rest."""
+"""Tests of the ways in which the driver ends. After each of them, the robot is at rest."""
 
 from pathlib import Path
 
@@ -22,16 +22,16 @@ SOME = (
     "SIGKILL, the port full",
     "a segmentation fault",
 )
-"""The endings tested here; test_driver_endings and test_driver_guard have others."""
+"""The endings that are tested here. test_driver_endings and test_driver_guard test others."""
 
 
 @pytest.mark.parametrize("ending", [ENDINGS[name] for name in SOME], ids=SOME)
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The board receives Stop before the driver closes the port, and the exit code is right.
+    """The driver ends during a drive. The board receives Stop last, and the exit code is right.
 
-    Where the driver cannot send Stop, its guard stops the robot.
+    If the driver cannot send Stop, its guard does.
     """
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
@@ -41,7 +41,10 @@ def test_the_robot_stands_still_however_the_driver_ends(
 def test_a_terminal_that_is_closed_ends_the_driver_in_order(
     tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The driver gets SIGHUP and can no longer print, yet it stops the robot and exits in order."""
+    """The driver's terminal is closed, so the driver gets SIGHUP and cannot print.
+
+    It still stops the robot and exits in order.
+    """
 
     def run(rig: Rig, end: Ending) -> None:
         end(rig)
@@ -51,7 +54,10 @@ def test_a_terminal_that_is_closed_ends_the_driver_in_order(
 
 
 def test_a_goal_ends_with_the_driver(tmp_path: Path, lenience: dict[str, float]) -> None:
-    """A driver that ends must cancel its goal, as the board would otherwise drive on to it."""
+    """The driver is killed while the board drives to a goal. The robot stops.
+
+    Otherwise the board would drive on to the goal.
+    """
     with GoalRig(tmp_path, BOARD, **lenience) as rig:
         GOAL_ENDINGS["a goal, and SIGKILL"](rig)
         assert not rig.findings.take(), rig.driver.output

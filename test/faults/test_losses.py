@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of each kind of stop on a line that loses bytes to the board; ``make faults`` has more."""
+"""Tests of each kind of stop on a line that loses bytes to the board. ``make faults`` has more."""
 
 from pathlib import Path
 
@@ -13,7 +13,10 @@ from omnibot_board import BOARD
 def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
     number: int, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """Each stop works on a line that loses bytes from before the stop until it is judged."""
+    """The line loses bytes to the board, from before a stop until the stop is judged.
+
+    Each kind of stop still works.
+    """
     with losing_rig(tmp_path, BOARD, number, **lenience) as rig:
         lose(rig, number)
         for case in LIVES[number].values():

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board behind a network, and one with its switch on position control."""
+"""Tests of faults with a board behind a network, and with a board under position control."""
 
 from collections.abc import Callable, Iterator
 from random import Random
@@ -19,7 +19,10 @@ SOME_GOALS = (
     "a goal, and e-stop and release",
     "a goal, and the driver hangs and goes on",
 )
-"""Cases run here; others are in test_position_control without a port, and in ``make faults``."""
+"""The cases that run here. test_position_control tests others without a port.
+
+``make faults`` runs all cases.
+"""
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +38,10 @@ def network(
 def test_a_server_that_fails_leaves_a_robot_that_stands_and_obeys_again(
     case: Callable[[NetworkRig], None], network: NetworkRig
 ) -> None:
-    """The robot is at rest while the server fails, and obeys as soon as bytes arrive again."""
+    """The server of the board fails during a drive, and the robot comes to rest.
+
+    The robot obeys when the server works again.
+    """
     case(network)
     network.expect_obeys_again()
     network.judge_stream()
@@ -55,7 +61,10 @@ def goals(
 def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
     case: Callable[[GoalRig], None], goals: GoalRig
 ) -> None:
-    """After the event the old goal is never sent again, and a new goal moves the robot."""
+    """An event discards the goal during a drive. The driver never sends this goal again.
+
+    A new goal moves the robot.
+    """
     case(goals)
     goals.expect_obeys_again()
     goals.judge_stream()
@@ -63,7 +72,12 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_and_faults_in_random_order(goals: GoalRig) -> None:
-    """A short random walk on position control; ``make faults`` and ``make soak`` run long ones."""
+    """Some faults occur in random order under position control.
+
+    The robot rests in time and then obeys.
+
+    ``make faults`` and ``make soak`` run long random walks.
+    """
     walk(goals, Random(1), steps=3)
     goals.judge_stream(damaged_bytes=True)
     assert not goals.findings.take(), goals.driver.output

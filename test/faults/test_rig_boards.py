@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The campaign's settings of each board name only faults that exist."""
+"""Test that the campaign's settings of each board name only faults that exist."""
 
 import pytest
 from campaign import BOARDS, pieces
@@ -11,7 +11,10 @@ from rig_board import load
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """A misspelt name in a board's list of left-out cases would leave out no case."""
+    """Every board has faults. The faults that it leaves out exist.
+
+    A misspelt name would leave out no fault.
+    """
     kind = load(board)
     own = (kind.cases or survivable)(0)
     assert own.keys() - kind.without

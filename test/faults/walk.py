@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Faults in random order, on top of each other, under random commands.
+"""Faults in random order, several of them at once, under random commands.
 
-Every few steps the commander leaves. Then the robot must come to rest in time, the driver must
-return to its usual state, and the robot must obey a fresh command. Losses of bytes to the board
-last until the robot is at rest. All other faults of the line end when the commander leaves.
+Every few steps the commander leaves. Then the robot must come to rest in time, the driver must be
+in its usual state, and the robot must obey a fresh command. All faults of the line end when the
+commander leaves. Only a loss of bytes to the board lasts until the robot is at rest.
 """
 
 from collections.abc import Callable
@@ -18,14 +18,14 @@ from std_srvs.srv import SetBool, Trigger
 STEPS_TO_A_REST: Final = 3
 TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
-"""Longest time in s from the end of commands until the robot rests.
+"""Longest time in s from the end of the commands until the robot must be at rest.
 
 A driver that has received no data for a while must first see that the robot moves.
 """
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
-    """Inject this number of random faults; return their names in order."""
+    """Cause this number of random faults, and return their names in order."""
     names = []
     for step in range(1, steps + 1):
         if random.random() < 0.8:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The limits of the integrity report, and the runs of streams to compare with the limits."""
+"""The limits of the integrity report, and the streams whose results are compared with them."""
 
 from dataclasses import dataclass
 from random import Random
@@ -17,12 +17,17 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Limits of a parser's errors under one fault of the line.
+    """The limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``: at most one decoded frame in this many is wrong (None: none is), if
-    the chunking keeps the line's idle gaps. ``one_wrong_in_hidden``: this limit if the chunking
-    hides the gaps. ``delivered``: least share of the intact frames to decode; 1.0 means all after
-    the first two of a stream. ``chunkers``: the chunkings to which the limits apply.
+    ``one_wrong_in_visible``: at most one decoded frame in this number may be wrong, if the chunking
+    keeps the line's idle gaps. None means that no frame may be wrong.
+
+    ``one_wrong_in_hidden``: the same limit, if the chunking hides the idle gaps.
+
+    ``delivered``: the least share of the intact frames that must be decoded. 1.0 means all frames
+    after the first two of a stream.
+
+    ``chunkers``: the chunkings to which the limits apply.
     """
 
     one_wrong_in_visible: int | None
@@ -31,7 +36,7 @@ class Bound:
     chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
-        """Return N of the limit "at most one wrong frame in N"; None: none may be wrong.
+        """Return N of the limit "at most one wrong frame in N", or None if no frame may be wrong.
 
         N depends on whether the chunking keeps the line's idle gaps.
         """
@@ -39,14 +44,14 @@ class Bound:
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
-        """Return the least share of intact frames to decode.
+        """Return the least share of the intact frames that must be decoded.
 
-        The share is smaller where adapter and reader are both late.
+        The share is smaller for a chunking in which both adapter and reader are late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:
-        """Return whether a score is within the limits; true for a chunking without limits."""
+        """Return whether a score is within the limits. A chunking without limits always is."""
         if chunker not in self.chunkers:
             return True
         one_in = self.one_wrong_in(chunker)
@@ -69,26 +74,30 @@ BOUNDS: dict[str, Bound] = dict(
         strict=True,
     )
 )
-"""Limits by fault. The limits for added bytes apply only to chunkings that deliver several frames
-at once.
+"""The limits for each fault.
+
+The limits for added bytes apply only to chunkings that deliver several frames at once.
 """
 
 Scores = dict[tuple[str, str, str], Score]
-"""Scores by the names of fault, chunking and scenario."""
+"""The scores. A key is the names of fault, chunking and scenario."""
 
 PLAIN_CHUNKING = "whole bursts"
-"""Chunking for the plain parser, whose result does not depend on the chunking."""
+"""The chunking for the plain parser, whose result is the same with every chunking."""
 
 
 def chunkings(fault: str) -> dict[str, Chunker]:
-    """Return the chunkings to test with a fault; late readers are tested with some faults only."""
+    """Return the chunkings that are tested with a fault.
+
+    Late readers are tested with a few faults only.
+    """
     return CHUNKINGS if fault in BUSY_FAULTS else CHUNKERS
 
 
 def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
     """Return a parser's scores on one stream with every fault.
 
-    The driver's parser gets every chunking, the plain parser ``PLAIN_CHUNKING`` only.
+    The driver's parser gets every chunking. The plain parser gets only ``PLAIN_CHUNKING``.
     """
     truth = generate(SCENARIOS[scenario], seed, seconds)
     scores: Scores = {}
@@ -104,7 +113,7 @@ def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
 
 
 def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
-    """Return the sum over all scenarios of the scores of one fault and one chunking."""
+    """Return the score of one fault and one chunking, added over all scenarios."""
     total = Score()
     for scenario in SCENARIOS:
         total += scores[fault, chunker, scenario]
@@ -112,7 +121,7 @@ def over_scenarios(scores: Scores, fault: str, chunker: str) -> Score:
 
 
 def over_chunkers(scores: Scores, fault: str, scenario: str) -> Score:
-    """Return the sum over all chunkings of the scores of one fault and one scenario."""
+    """Return the score of one fault and one scenario, added over all chunkings."""
     total = Score()
     for chunker in chunkings(fault):
         total += scores[fault, chunker, scenario]

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer: the line is undamaged, but the process that reads is scheduled late.
+"""A busy computer: the line is undamaged, but the reading process runs late.
 
-A read returns all data that has arrived when the process is scheduled. Each chunker of this module
-takes the pieces that an adapter delivers, and returns the end and the time of each read. Times are
-in s.
+When the process runs, a read returns all data that has arrived. A chunker of this module takes the
+pieces that an adapter delivers. It returns the end and the time of each read. All times are in s.
 """
 
 from bisect import bisect_right
@@ -15,18 +14,24 @@ from carriage import CHUNKERS, Chunker, Chunks, Received
 from truth import BYTE_S
 
 LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
-"""Share of late reads, and range of their delay in s, while a navigation stack runs as well."""
+"""Share of late reads, and the range of their delay in s.
+
+A navigation stack runs beside the driver.
+"""
 STALL_SHARE, STALL_S = 0.002, (0.001, 0.300)
 JITTER_S = 60e-6
-"""Mean delay of any wake-up in s, exponentially distributed."""
+"""Mean delay of any wake-up, in s. The delay is exponentially distributed."""
 READ_S = 20e-6
 """Duration of a read that does not wait for data, in s."""
 TURN_SHARE, TURN_S = 0.05, (0.0, 0.0095)
-"""Share of wake-ups that busy loops delay, and the range of the delay in s."""
+"""Share of the wake-ups that busy loops delay, and the range of the delay in s."""
 BEHIND_SHARE, BEHIND_FOR_S = 1e-3, (0.02, 0.1)
-"""Share of wake-ups after which busy loops slow the process down, and for how long, in s."""
+"""Share of the wake-ups after which busy loops slow the process down, and for how long, in s."""
 SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
-"""Ranges of the delay of a slowed wake-up, in s: SHARE_S of a reader, SLOW_S of an adapter."""
+"""Ranges of the delay of a wake-up in a slowed process, in s.
+
+``SHARE_S`` is for a reader, and ``SLOW_S`` for an adapter.
+"""
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
 """Range of the number of bytes after which another kind of pieces is drawn."""
@@ -44,9 +49,9 @@ def delay_s(random: Random, now: float = 0.0) -> float:
 
 
 class Turns:
-    """Delays of the wake-ups of a process while busy loops run.
+    """The delays of a process's wake-ups while busy loops run.
 
-    ``late_s``: range of their delay in s while the process is slowed.
+    ``late_s``: the range of the delay in s while the process is slowed down.
     """
 
     def __init__(self, late_s: tuple[float, float]) -> None:
@@ -70,7 +75,8 @@ def read(
     most: Callable[[], int],
     delay_s: Callable[[Random, float], float] = delay_s,
 ) -> Chunks:
-    """Return the chunks of a late reader, which reads up to ``most`` bytes of what has arrived."""
+    """Return the chunks of a late reader. One read takes at most ``most()`` of the waiting bytes.
+    """
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
     start, now = 0, 0.0
@@ -86,7 +92,8 @@ def read(
 
 
 def few_bytes_straddling(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes, each when its last byte arrives, even across a pause."""
+    """Deliver pieces of 1 to 8 bytes, each when its last byte arrives. A piece may contain a pause.
+    """
     chunks, at = [], 0
     while at < len(received.times_s):
         at = min(len(received.times_s), at + random.randint(1, 8))
@@ -95,18 +102,19 @@ def few_bytes_straddling(received: Received, random: Random) -> Chunks:
 
 
 def all_at_once(pieces: Chunker) -> Chunker:
-    """Return a chunker with these pieces and a late reader, which reads all that has arrived."""
+    """Return a chunker in which a late reader reads everything that has arrived in ``pieces``."""
     return lambda received, random: read(pieces(received, random), random, lambda: 1 << 30)
 
 
 def in_parts(received: Received, random: Random) -> Chunks:
-    """Deliver single bytes; a late reader reads 1 to 8 of those that have arrived."""
+    """Deliver single bytes. A late reader reads 1 to 8 of those that have arrived."""
     pieces = CHUNKERS["single bytes"](received, random)
     return read(pieces, random, lambda: random.randint(1, 8))
 
 
 def each_by_itself(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes; the delay of each is independent of the other delays."""
+    """Deliver pieces of 1 to 8 bytes. The delay of each piece is independent of the other delays.
+    """
     chunks: Chunks = []
     now = 0.0
     for end, time in few_bytes_straddling(received, random):
@@ -116,7 +124,10 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of changing kinds; a late reader reads all arrived bytes or a part of them."""
+    """Deliver pieces of changing kinds.
+
+    A late reader reads all bytes that have arrived, or some of them.
+    """
     kinds = [*list(CHUNKERS.values())[:4], few_bytes_straddling]
     pieces: Chunks = []
     at, size = 0, len(received.data)
@@ -138,7 +149,7 @@ def mixed(received: Received, random: Random) -> Chunks:
 
 
 def hogged(received: Received, random: Random) -> Chunks:
-    """Deliver 4 bytes at a time; busy loops delay both the adapter and the reader."""
+    """Deliver 4 bytes at a time, while busy loops delay both the adapter and the reader."""
     times, pieces, at = received.times_s, [], 0
     adapter, free_s = Turns(SLOW_S), 0.0
     while at < len(times):
@@ -159,4 +170,4 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""Chunkings in which adapter and reader are both late, so that times are nearly meaningless."""
+"""Chunkings in which both adapter and reader are late. Their times say nearly nothing."""

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The line's effect on a byte stream: bytes are lost or added, and delivered in chunks.
+"""What a line does to a byte stream: bytes are lost or added, and they arrive in chunks.
 
-The module does not use the format of frames.
+This module knows bytes and times; it does not know the format of frames.
 """
 
 from collections.abc import Callable
@@ -17,7 +17,7 @@ Fault = Callable[[int, Random], Origins]
 
 
 def none(length: int, random: Random) -> Origins:
-    """Damage nothing, but let the stream start at a random byte of its first second."""
+    """Damage nothing. The stream starts at a random byte of its first second."""
     return list(range(random.randrange(1700), length))
 
 
@@ -47,7 +47,7 @@ def added(rate: float) -> Fault:
 def bursts(rate: float) -> Fault:
     """Return a fault that loses 1 to 200 bytes in a row.
 
-    Such a burst begins at each byte with the probability ``rate``.
+    ``rate``: the probability that such a loss begins at a byte.
     """
 
     def fault(length: int, random: Random) -> Origins:
@@ -75,18 +75,18 @@ FAULTS: dict[str, Fault] = {
 
 @dataclass(slots=True)
 class Received:
-    """The received bytes, their arrival times in s, and the true stream that was sent."""
+    """The bytes that have arrived, their times of arrival in s, and the true stream."""
 
     data: bytes
     times_s: list[float]
     origins: Origins
     intact: list[bool]
-    """For each true frame, whether all its bytes arrived without foreign bytes among them."""
+    """For each true frame, whether all its bytes arrived without other bytes between them."""
     truth: Truth
 
 
 def receive(truth: Truth, fault: Fault, random: Random) -> Received:
-    """Send the true stream through a faulty line; return it as the host receives it."""
+    """Send the true stream through a faulty line, and return it as the host receives it."""
     origins = fault(len(truth.data), random)
     data = bytes(truth.data[at] if at >= 0 else random.randrange(256) for at in origins)
     times, last = [], 0.0
@@ -107,7 +107,7 @@ def receive(truth: Truth, fault: Fault, random: Random) -> Received:
 
 
 Chunks = list[tuple[int, float]]
-"""The end of each chunk, and the time of its delivery to the host in s."""
+"""The end of each chunk, and the time in s at which the host gets the chunk."""
 Chunker = Callable[[Received, Random], Chunks]
 
 
@@ -119,7 +119,7 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 def few_bytes(received: Received, random: Random) -> Chunks:
     """Deliver pieces of one to eight bytes, each when its last byte arrives.
 
-    A piece may span a pause of the line, but no byte waits for more than 16 ms, as with any
+    A piece may contain a pause of the line. But no byte waits for more than 16 ms, as with any
     adapter.
     """
     times, chunks, at = received.times_s, [], 0
@@ -132,7 +132,7 @@ def few_bytes(received: Received, random: Random) -> Chunks:
 
 
 def whole_bursts(received: Received, random: Random) -> Chunks:
-    """Deliver all bytes up to a pause, like an adapter that waits for pauses."""
+    """Deliver all bytes up to a pause of the line, like an adapter that waits for pauses."""
     times = received.times_s
     ends = [n for n in range(1, len(times)) if times[n] - times[n - 1] > 3e-3] + [len(times)]
     return [(end, times[end - 1]) for end in ends]

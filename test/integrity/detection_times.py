@@ -4,9 +4,10 @@
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-A reaction time begins with the first tick in which the robot is 0.05 m/s or 0.15 rad/s outside the
-range between rest and its command, and ends when Stop is sent. The table has the shortest and the
-longest time over all phases of the displacements.
+A correct robot moves between rest and its command. A reaction time begins with the first tick in
+which the robot is 0.05 m/s or 0.15 rad/s outside this range. It ends when the driver sends Stop.
+The displacements have a phase relative to this beginning. The table has the shortest and the
+longest time over all phases.
 """
 
 from collections.abc import Callable
@@ -32,7 +33,7 @@ PERIODS_S = 0.04, 0.1
 def robot(**settings: object) -> Callable[[float], Bench]:
     """Return a function that makes a bench with a resting robot of these settings.
 
-    Its argument is the period of the displacements, in s.
+    The function's argument is the period of the displacements, in s.
     """
     return lambda period_s: started(
         BoardSettings(running=True, delta_period_s=period_s, **settings)  # type: ignore[arg-type]
@@ -40,9 +41,9 @@ def robot(**settings: object) -> Callable[[float], Bench]:
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Force another motion on an obeying robot.
+    """Let a robot obey ``command``, then force ``motion`` on it.
 
-    Return the time in s from the robot's first deviation until the driver sends Stop.
+    Return the time in s from the beginning of this motion until the driver sends Stop.
     """
     if any(command):
         for _ in range(15):
@@ -65,7 +66,10 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Measure the time for each phase of the displacements; print the shortest and the longest."""
+    """Measure the reaction time for each phase of the displacements, and print a row of the table.
+
+    The row has the shortest and the longest time.
+    """
     shown = []
     for period_s in PERIODS_S:
         times = []

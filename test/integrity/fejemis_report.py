@@ -2,10 +2,10 @@
 
 """Integrity of the Fejemis's published values on lines with faults (``make integrity``).
 
-A simulated pair of boards, which shares no code with the driver, is driven in curves by one
-session. The bytes of both boards are then played to other sessions, undamaged and damaged. A value
-is wrong if the session with undamaged lines did not publish it. Odometry after a lost value differs
-from the truth. It is therefore judged by its distance from the odometry with undamaged lines.
+A session drives a simulated pair of boards in curves. The boards share no code with the driver.
+Other sessions then get the bytes of both boards, undamaged and damaged. A value is wrong if the
+session with undamaged lines did not publish it. Odometry after a lost value always differs a
+little. So odometry is judged by its distance from the odometry with undamaged lines.
 """
 
 from bisect import bisect_left
@@ -30,28 +30,33 @@ from omnibot_driver.parameters import session_settings
 from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
 
 TICKS: Final = 5
-"""Number of ticks of the simulated boards that pass for each read."""
+"""Ticks of the simulated boards for each read."""
 READ_S: Final = 0.01
 SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""By fault, for lines with checksums: the least share of values to deliver, and N.
+"""Limits for lines with checksums: the least share of values to deliver, and N, for each fault.
 
-At most one value in N is wrong; N = 0 means that none may be wrong.
+At most one value in N may be wrong. N = 0 means that none may be wrong.
 """
 ASTRAY_M: Final = 0.02
 
 Stream = list[dict[int, bytes]]
-"""The bytes of each read, by channel."""
+"""The bytes of each read. The keys are the channels."""
 
 
 @dataclass(slots=True)
 class Score:
-    """Counts of published values, which can be added.
+    """Counts of published values. Scores can be added.
 
-    ``sent``: number of values with undamaged lines; ``astray_m``: greatest error of the odometry,
-    in m.
+    ``sent``: number of values with undamaged lines.
+
+    ``out``, ``wrong``: number of published values, and of wrong ones among them.
+
+    ``odometry``: number of published odometry messages that were compared.
+
+    ``astray_m``: greatest error of the odometry, in m.
     """
 
     sent: int = 0
@@ -69,7 +74,10 @@ class Score:
 
 
 def session() -> Session:
-    """Make a session with the defaults, without the motion monitor, which could stop the robot."""
+    """Make a session with the default values.
+
+    Its motion monitor is off, because it could stop the robot.
+    """
     values = check_all({"board": "fejemis", "motion_monitor": False})
     profile = load("fejemis")
     settings = session_settings(values, profile.kinematics(values))
@@ -77,7 +85,7 @@ def session() -> Session:
 
 
 def drive(sums: bool, seed: int, seconds: float) -> Stream:
-    """Drive a pair of boards, with a new twist each second; return what the boards send."""
+    """Drive a pair of boards with a new twist each second, and return what the boards send."""
     random = Random(f"{sums} {seed}")
     firmware = Firmware(sums=sums)
     pair = SimulatedFejemis(FejemisSettings(firmware=firmware, seed=seed, front_m=4.0))
@@ -128,7 +136,10 @@ def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
 
 
 def value_of(event: Event) -> str | None:
-    """Return the value as text without its timestamp; None for events that are judged otherwise."""
+    """Return the value of an event as text, without its timestamp.
+
+    Return None for events that are not judged in this way.
+    """
     if isinstance(event, ImuEstimate):
         return f"imu {event.specific_force} {event.angular_velocity}"
     if isinstance(event, Extra) and isinstance(event.value, OrientedImuReading):
@@ -141,7 +152,7 @@ def value_of(event: Event) -> str | None:
 def score(truth: list[Event], found: list[Event]) -> Score:
     """Compare published values with the true ones.
 
-    If a value is published more often than in the truth, the additional ones count as wrong.
+    If a value is published more often than in the truth, the additional ones are wrong.
     """
     left = Counter(filter(None, map(value_of, truth)))
     result = Score(sent=sum(left.values()))
@@ -163,7 +174,10 @@ def score(truth: list[Event], found: list[Event]) -> Score:
 
 
 def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
-    """Play one stream with each fault; return the scores by fault and by use of checksums."""
+    """Play one stream with each fault.
+
+    Return the scores by fault and by whether checksums are used.
+    """
     sums, seed = job
     stream = drive(sums, seed, seconds)
     truth = list(play(stream))

@@ -13,11 +13,11 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""A match that skips more than this number of intact frames needs a confirmation.
+"""A match that skips more intact frames than this needs a confirmation.
 
-The judge searches for a decoded frame among the frames sent next. A match that skips more frames
-counts only if the next decoded frame has a match shortly behind it: a false frame may equal a true
-frame that is sent later.
+The judge searches for a decoded frame among the frames that were sent next. A false frame may equal
+a true frame that is sent much later. So a match that skips many frames needs a second match: the
+next decoded frame must match shortly behind it.
 """
 REACH_BYTES = 600
 """The judge searches for a decoded frame from this number of bytes before the current read on."""
@@ -25,7 +25,7 @@ REACH_BYTES = 600
 
 @dataclass(slots=True)
 class Score:
-    """Counts of decoded, wrong and intact frames, which can be added."""
+    """Counts of decoded, wrong and intact frames. Scores can be added."""
 
     out: int = 0
     wrong: int = 0
@@ -59,7 +59,10 @@ class Score:
 
 
 def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
-    """Deliver the stream to a parser, and compare its frames, in order, with those sent."""
+    """Deliver the stream to a parser.
+
+    Compare the parser's frames, in order, with those that were sent.
+    """
     frames, intact = received.truth.frames, received.intact
     origins, data = received.origins, received.data
     ends = [end for _, _, end in frames]

@@ -2,9 +2,9 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board, which shares no code with the driver, drives in curves. The truth is the list
-of reports that the decoder returns for the undamaged line. A report from a damaged line is right if
-the truth has an equal one after the previous right report; otherwise it is wrong.
+The simulated board drives in curves. It shares no code with the driver. The true reports are those
+that the decoder finds on the undamaged line. A report from a damaged line is right if it equals a
+true report after the previous right one. All other reports are wrong.
 """
 
 from collections import Counter
@@ -24,7 +24,7 @@ TICK_S: Final = 0.01
 STEER_EVERY: Final = 100
 """Number of the board's ticks between two commands."""
 LEAST_DELIVERED: Final = {"1 byte in 1,000 lost": 0.9, "1 byte in 100 lost": 0.5}
-"""By fault, the least share of the undamaged line's reports to decode; none may be wrong."""
+"""For each fault, the least share of the true reports that must be decoded. None may be wrong."""
 
 Stream = list[bytes]
 """The bytes of each tick."""
@@ -32,7 +32,12 @@ Stream = list[bytes]
 
 @dataclass(slots=True)
 class Score:
-    """Counts of decoded reports, which can be added. ``sent``: reports of the undamaged line."""
+    """Counts of decoded lines and reports. Scores can be added.
+
+    ``sent``: number of reports on the undamaged line.
+
+    ``lines``: number of valid lines on the undamaged line. ``lines_out``: on the damaged one.
+    """
 
     lines: int = 0
     lines_out: int = 0
@@ -47,7 +52,7 @@ class Score:
 
 
 def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
-    """Drive a board, with new speeds of the wheels each second; return what the board sends."""
+    """Drive a board with new wheel speeds each second, and return what the board sends."""
     random = Random(f"{firmware} {seed}")
     board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], seed=seed, running=True))
     stream = []
@@ -65,7 +70,7 @@ def drive(firmware: Firmware, seed: int, seconds: float) -> Stream:
 
 
 def decode(stream: Stream) -> tuple[list[Report], int]:
-    """Return all reports decoded from a stream, and the number of its valid lines."""
+    """Return all reports that are decoded from a stream, and the number of its valid lines."""
     decoder, found = LoisDecoder(), list[Report]()
     for tick, data in enumerate(stream):
         found += decoder.feed(data, tick * TICK_S)
@@ -74,7 +79,10 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
 
 
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
-    """Count the reports, each right if the truth has an equal one after the previous right one."""
+    """Count the reports of a damaged stream, and the wrong ones among them.
+
+    A report is right if it equals a true report after the previous right one.
+    """
     found, lines_out = decode(stream)
     result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
     left = Counter(map(repr, truth))
@@ -93,7 +101,7 @@ def score(truth: list[Report], lines: int, stream: Stream) -> Score:
 
 
 def one(seconds: float, job: tuple[Firmware, int]) -> dict[tuple[str, str], Score]:
-    """Damage one stream with each fault; return the scores."""
+    """Damage one stream with each fault, and return the scores."""
     firmware, seed = job
     stream = drive(firmware, seed, seconds)
     truth, lines = decode(stream)

@@ -2,8 +2,8 @@
 
 """Integrity of the values published for a MART controller on a bad network (``make integrity``).
 
-A complete session runs with the simulated controller, which shares no code with the driver, in
-simulated time. A pose counts as wrong if its error is too large for its covariance: if the
+A complete session runs with the simulated controller, in simulated time. The controller shares no
+code with the driver. A pose is wrong if its error is too large for its covariance. If the
 covariances are right, only one pose in 270,000 has such an error. A voltage or a range is wrong if
 it differs from the truth.
 """
@@ -49,19 +49,27 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""Largest squared error of a pose, normalized by its covariance; above it, the pose is wrong.
+"""A pose whose squared error, normalized by its covariance, is larger than this is wrong.
 
-If covariances are right, 1 pose in 270,000 exceeds it by chance.
+If the covariances are right, 1 pose in 270,000 exceeds this by chance.
 """
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
-"""Distance from the start, in m, beyond which only turns are commanded, to avoid the wall."""
+"""If the robot is farther than this from its start, in m, only turns are commanded.
+
+Otherwise it might reach the wall.
+"""
 
 
 @dataclass(slots=True)
 class Score:
-    """Numbers of ``published`` messages and of ``wrong`` messages, by kind. Scores can be added."""
+    """Counts of published messages. Scores can be added.
+
+    ``published``, ``wrong``: number of messages of each kind, and of wrong ones among them.
+
+    ``stood``: number of drives at whose end the robot stood.
+    """
 
     published: Counter[str] = field(default_factory=Counter)
     wrong: Counter[str] = field(default_factory=Counter)
@@ -76,13 +84,16 @@ class Score:
         return self
 
     def count(self, kind: str, wrong: bool) -> None:
-        """Count one message of this kind as published and, if ``wrong`` is true, also as wrong."""
+        """Count one published message of this kind, and whether it is wrong."""
         self.published[kind] += 1
         self.wrong[kind] += wrong
 
 
 def drive(name: str, seconds: float, seed: int) -> Score:
-    """Drive random motions; poll sonars and battery in the rests between them; return the score."""
+    """Drive random motions with rests between them, and return the score.
+
+    During the rests, the driver polls sonars and battery.
+    """
     random, score = Random(f"{name} {seed}"), Score()
     bench = MartBench(
         FIRMWARES[seed % 3],
@@ -110,7 +121,7 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 
 
 def _watch(bench: MartBench, score: Score) -> None:
-    """Run for 0.1 s, and compare each message with the truth at the moment of its publication."""
+    """Run for 0.1 s, and compare each message with the truth at the time of its publication."""
     seen = len(bench.events)
     for _ in range(10):
         told = len(bench.odometry)
@@ -131,7 +142,7 @@ def _watch(bench: MartBench, score: Score) -> None:
 def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
     """Return whether a sonar's range agrees with the true distance to the only wall.
 
-    The wall lies across x in front of the start. The sonar reports -1 from 254 inches on.
+    The wall is in front of the start, across x. From 254 inches on, the sonar reports -1.
     """
     ahead = math.cos(yaw_rad) if sonar.side == "front" else -math.cos(yaw_rad)
     sees_m = (FRONT_M - x_m) / ahead if ahead > 0.3 else math.inf

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How often does the motion monitor stop robots that obey, in hours of simulated driving?
+"""How often does the motion monitor stop robots that obey? Hours of driving are simulated.
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 
-``--first`` is the seed of the first robot, ``--period`` the period of displacements in s. The exit
-code is 1 when a robot was stopped.
+``--first`` is the seed of the first robot. ``--period`` is the period of the displacements, in s.
+The exit code is 1 when the monitor stopped a robot.
 """
 
 import argparse
@@ -18,7 +18,7 @@ SECONDS_EACH = 300.0
 
 
 def main() -> int:
-    """Drive all robots and print what happened; return 1 if the monitor stopped a robot, else 0."""
+    """Drive all robots and print what happened. Return 1 if the monitor stopped a robot, else 0."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--hours", type=float, default=10.0)
     arguments.add_argument("--first", type=int, default=0)

@@ -2,10 +2,10 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-The real session plays every scene over a damaged line to every receiver. The faults last until the
-stop of the scene is judged. ``--share``: run only this share of the trials, and write nothing.
-``--examples``: show the bytes that led to an error. The exit code is 1 when a bound is missed on
-any receiver.
+The real session plays every scene. Its bytes go over a damaged line to every kind of receiver. The
+faults last until the stop of the scene is judged. With ``--share``, only this share of the trials
+runs, and nothing is written. With ``--examples``, the bytes that led to an error are shown. The
+exit code is 1 when any receiver misses a bound.
 """
 
 import argparse
@@ -27,18 +27,22 @@ OTHERWISE: Final = {
     "mart": "datagrams arrive whole or not at all; tests search all that their losses can do",
     "fejemis": "outbound lines carry a sum; tests try all losses of one and two characters",
 }
-"""Boards that this report does not measure, with the reason."""
+"""Boards that this report does not measure. The value is the reason."""
 BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Limits of the errors that damage to the driver's writes may cause.
+    """Limits of the errors that a damaged line may cause.
 
-    ``share``: largest share of driving time with an uncommanded set point. ``long_in``: at most one
-    frame in this many leads to an uncommanded set point longer than 2 ms. Stray motion and false
-    letters are never allowed. Robots that still drive are an error only if ``overdue`` is True;
-    otherwise they are only reported.
+    ``share``: largest share of the driving time with an uncommanded set-point.
+
+    ``long_in``: at most one frame in this number may lead to an uncommanded set-point of more than
+    2 ms.
+
+    ``overdue``: whether a robot that still drives is an error. If not, it is only reported.
+
+    Stray motion and false letters are never allowed.
     """
 
     share: float = 1.0
@@ -46,7 +50,7 @@ class Bound:
     overdue: bool = True
 
     def missed(self, score: Score) -> list[str]:
-        """Return the names of the figures that exceed these limits."""
+        """Return the names of the numbers that exceed these limits."""
         found = {
             "stray motion": score.strayed,
             "false letters": score.false_letters,
@@ -67,7 +71,7 @@ BOUNDS: Final[dict[str, Bound]] = dict(
 
 
 def none_of(count: int, total: int) -> str:
-    """Format a count that should be zero, out of ``total``; bold if it is not."""
+    """Format a count that should be zero as "0 of N". A count that is not zero is bold."""
     return f"0 of {total:,}" if not count else f"**{count:,} of {total:,}**"
 
 
@@ -77,12 +81,12 @@ def one_in(count: int, total: int) -> str:
 
 
 def ms(seconds: float) -> str:
-    """Format a time in ms; a dash for zero."""
+    """Format a time in ms. Zero is a dash."""
     return f"{1e3 * seconds:.1f} ms" if seconds else "-"
 
 
 def share(score: Score) -> str:
-    """Format the share of driving time with an uncommanded set point, in percent."""
+    """Format the share of the driving time with an uncommanded set-point, in percent."""
     return f"{score.uncommanded_s / score.driving_s:.3%}" if score.driving_s else "-"
 
 
@@ -187,7 +191,7 @@ def _others(scores: Scores) -> Iterator[str]:
 
 
 def main() -> int:
-    """Run the trials, and print and write the figures; return the exit code."""
+    """Run the trials, print the results and write them. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
         "--board", choices=("omnibot", *OTHERWISE), default="omnibot", help="that is measured"

@@ -1,11 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver writes in a scene, rehearsed once for all trials with the same board states.
+"""What the driver writes in a scene.
 
-The line from the board is undamaged, so what the driver writes depends only on what the board
-shows: its mode, and whether the robot moves. A ``Course`` has what the session writes while the
-board shows one sequence of states. When the board shows another state in a trial, the trial
-continues with another course, which is rehearsed when it is first needed.
+It is rehearsed once for all trials in which the board shows the same.
+
+The line from the board is undamaged. So what the driver writes depends only on what the board
+shows: its mode, and whether the robot moves. A ``Course`` has the session's writes for one sequence
+of these states. When the board shows another state in a trial, the trial continues with another
+course. That course is rehearsed when it is first needed.
 """
 
 from dataclasses import dataclass
@@ -22,8 +24,10 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 class Understood:
     """What a receiver understands of the writes of a course if no byte is damaged.
 
-    held: the bytes that the receiver holds after each write. alike_until: for each write, the index
-    of the next write that differs: one is a motion and the other is not, or the receiver does not
+    ``held``: the bytes that the receiver holds after each write.
+
+    ``alike_until``: for each write, the index of the next write that is different. Two writes are
+    different if only one of them is a motion. A write is also different if the receiver does not
     understand it exactly as sent.
     """
 
@@ -32,7 +36,7 @@ class Understood:
 
 
 class Course:
-    """What the driver writes in a scene while the board's visible state follows ``history``."""
+    """The driver's writes in a scene while the board shows the states in ``history``."""
 
     def __init__(self, scene: Scene, history: History | None = None) -> None:
         self.scene = scene
@@ -45,7 +49,8 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the course to continue with if the board shows ``shown`` from this tick on."""
+        """Return the course that continues this one if the board shows ``shown`` from this tick on.
+        """
         other = self._others.get((tick, shown))
         if other is None:
             other = Course(self.scene, (*self.history, (tick, shown)))
@@ -60,7 +65,7 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """Number of runs of the session for this course and all courses that branch off from it."""
+        """How often the session ran for this course and for all courses that continue it."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

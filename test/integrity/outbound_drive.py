@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver's side of an outbound trial: what the real session writes, and when.
+"""The driver in an outbound trial: what the real session writes, and when.
 
-A ``Scene`` is what the driver is asked to do. ``rehearse`` runs the session through a scene in
-simulated time, with the states that the board shows. This module imitates what the driver's link
-and guard do when the driver ends.
+A ``Scene`` is what the driver has to do. ``rehearse`` runs the session through a scene in simulated
+time, while the board shows given states. When the driver ends, this module acts in place of the
+driver's link and guard.
 """
 
 import contextlib
@@ -29,17 +29,20 @@ from omnibot_driver.core.session import Session, SessionSettings
 from omnibot_driver.link import SILENCE_S, STANDS_WITHIN_S
 
 READ_S: Final = 0.002
-"""Time between a tick and the read of its bytes, in s."""
+"""Time from a tick until the driver reads its bytes, in s."""
 STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
 """Time between two readings of the clock, in s."""
 History = tuple[tuple[int, Shown], ...]
-"""States that the board shows, each with the tick from which it shows that state."""
+"""The states that the board shows. Each comes with the tick from which the board shows it."""
 
 
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Bytes that the driver or guard writes; ``flush``: whether to discard waiting bytes first."""
+    """Bytes that the driver or its guard writes.
+
+    ``flush``: whether the bytes that still wait are discarded first.
+    """
 
     at_s: float
     data: bytes
@@ -48,7 +51,7 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A call on the session at a time in s; the session may refuse the call."""
+    """A call of the session at a time in s. The session may refuse it."""
 
     at_s: float
     do: Callable[[Session, float], object]
@@ -56,13 +59,33 @@ class Command:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """One script of the driver's actions; times in s.
+    """One script of what the driver does. All times are in s.
 
-    begins: state that the board shows at first. run: whether the driver starts the board. control:
-    position of the board's switch. linear_scale: LSB per m/s. faults_from_s: time from which the
-    line has faults. still_by_s: time at which the robot must be at rest. exits_s, killed_s: time at
-    which the driver ends or is killed. on_exit: the parameter of that name. guard_after_s: delay
-    from the end of the driver until the guard acts.
+    ``kind``: the kind of scene, such as "timeout".
+
+    ``wishes``: the calls of the session.
+
+    ``ends_s``: the end of the scene.
+
+    ``faults_from_s``: the time from which the line has faults.
+
+    ``still_by_s``: the time at which the robot must be at rest.
+
+    ``begins``: the state that the board shows at first.
+
+    ``run``: whether the driver starts the board.
+
+    ``rate_hz``: how often the driver repeats a command.
+
+    ``control``: the position of the board's switch.
+
+    ``linear_scale``: LSB per m/s.
+
+    ``exits_s``, ``killed_s``: the time at which the driver ends or is killed.
+
+    ``guard_after_s``: the delay from the end of the driver until the guard acts.
+
+    ``on_exit``: the driver's parameter of this name.
     """
 
     kind: str
@@ -83,7 +106,8 @@ class Scene:
 
 
 def rehearse(scene: Scene, history: History) -> list[Write]:
-    """Run the session through a scene; return everything written since the port was opened."""
+    """Run the session through a scene. Return everything that is written after the port was opened.
+    """
     return [write for write in _Rehearsal(scene).run(dict(history)) if write.at_s < scene.ends_s]
 
 
@@ -146,9 +170,10 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """Leave as the link does: send Stop until the robot is at rest, then watch it in silence.
+        """Act as the link does when the driver ends.
 
-        If the robot does not come to rest, the guard writes.
+        The link sends Stop until the robot is at rest, and then watches it without writing. If the
+        robot does not come to rest, the guard writes.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)
@@ -173,7 +198,7 @@ class _Rehearsal:
             self._writes += self._guards_words(now)
 
     def _guards_words(self, now: float) -> Iterator[Write]:
-        """Yield the guard's writes; the first one discards bytes still waiting to be sent."""
+        """Yield the guard's writes. The first write discards the bytes that still wait."""
         words = joined(self._bot.stop())
         if self._session.estop_active:
             words = joined(self._bot.emergency_stop()) + words

@@ -1,17 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The judge of an outbound trial: it compares what was understood with what was sent.
+"""The judge of an outbound trial: it compares what the board understood with what the driver sent.
 
 - The driver *drives* from the first byte of a write with a motion frame until the next frame of
   another kind should have arrived completely at the board. Then it *stands* until the next write
   with a motion frame.
-- A set point is *commanded* if the board understands it while it is among the control frames of the
-  current write or of the write before. It stays commanded until another frame is understood.
-- Any other set point that the board understands while the driver drives is *uncommanded*, until the
-  next commanded set point, a pause or a reboot.
+- A set-point is *commanded* if the board understands it while it is among the control frames of the
+  current write or of the write before. It stays commanded until the board understands another
+  frame.
+- Any other set-point that the board understands while the driver drives is *uncommanded*. It stays
+  so until the next commanded set-point, a pause or a reboot.
 - A motion frame that the board understands while the driver stands is *stray*.
-- A letter that acts is *false* if its byte was not sent as a letter, and *added* if the line has
-  added or changed that byte.
+- A letter on which the board acts is *false* if its byte was not sent as a letter. It is *added* if
+  the line has added or changed that byte.
 """
 
 import math
@@ -30,14 +31,20 @@ _LONGEST: Final = ("stray_s", "longest_s")
 
 @dataclass(slots=True)
 class Score:
-    """Counts and times that can be added; times in s.
+    """Counts and times of trials. Scores can be added. Times are in s.
 
-    strayed: number of trials with stray motion. stray_s: longest duration of stray motion. overdue:
-    number of trials in which the robot was driven at the time when it had to be at rest. for_good:
-    number of trials in which it was driven at the end. driving_s, frames: time for which the driver
-    drove, and number of control frames sent meanwhile. uncommanded_s, uncommanded, long, longest_s:
-    total time of uncommanded set points, their number, the number of those longer than LONG_S, and
-    the longest.
+    ``strayed``: number of trials with stray motion. ``stray_s``: longest duration of stray motion.
+
+    ``overdue``: number of trials in which the robot was driven when it had to be at rest.
+
+    ``for_good``: number of trials in which the robot was driven at the end.
+
+    ``driving_s``: time for which the driver drove. ``frames``: number of control frames that it
+    sent meanwhile.
+
+    ``uncommanded_s``, ``uncommanded``: total time and number of uncommanded set-points.
+
+    ``long``: number of uncommanded set-points longer than LONG_S. ``longest_s``: the longest one.
     """
 
     trials: int = 0
@@ -66,7 +73,7 @@ class Score:
 
 
 class Judge:
-    """Follows every write, and everything that is understood, in the order of time.
+    """Follows every write, and everything that the board understands, in the order of time.
 
     ``driving``: whether the driver drives.
     """
@@ -82,11 +89,11 @@ class Judge:
 
     @property
     def calm(self) -> bool:
-        """Whether the active set point, if any, is neither stray nor uncommanded."""
+        """Whether the active set-point, if any, is neither stray nor uncommanded."""
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
-        """Return a judge of a further trial, which adds to this score."""
+        """Return a judge that continues from here in a further trial. It adds to this score."""
         other = copy(self)
         other.score = score
         score.trials += 1
@@ -109,14 +116,15 @@ class Judge:
     def writes(self, last: Items, frames: int) -> None:
         """Record several undamaged writes of the same kind as the previous one.
 
-        ``last``: the newest of these writes; ``frames``: the number of their control frames.
+        ``last``: the newest of these writes. ``frames``: the number of their control frames.
         """
         self._now = last
         if self.driving:
             self.score.frames += frames
 
     def frame(self, frame: ControlFrame, at_s: float) -> str:
-        """Record a control frame that the board understands; return its error's name, or ""."""
+        """Record a control frame that the board understands. Return the name of its error, or "".
+        """
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
             if not is_motion(frame.mode, frame.values):
@@ -137,9 +145,10 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Record that a letter acts; return the name of the error, or "".
+        """Record a letter on which the board acts. Return the name of its error, or "".
 
-        ``at``: place of its byte in the write; negative if the line added the byte.
+        ``at``: the position of its byte in the write. It is negative if the line added or changed
+        the byte.
         """
         if at < 0:
             self.score.added_letters += 1
@@ -149,7 +158,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the active set point, and count the time for which it was stray or uncommanded."""
+        """End the active set-point. Count how long it was stray or uncommanded."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s
@@ -163,7 +172,7 @@ class Judge:
             self._stray_from_s = None
 
     def end(self, at_s: float, *, driven_when_due: bool = False, driven: bool = False) -> bool:
-        """End the scene; return whether the robot still drives at the due time or at the end."""
+        """End the scene. Return whether the robot still drives at the due time or at the end."""
         self.no_setpoint(at_s)
         if self.driving:
             self.score.driving_s += at_s - self._driving_from_s

@@ -2,7 +2,7 @@
 
 """The line from the driver to the board, with its faults.
 
-The module knows nothing of frames.
+This module knows bytes; it does not know frames.
 """
 
 import math
@@ -14,18 +14,18 @@ ADDED: Final = -1
 CHANGED: Final = -2
 
 Arrival = tuple[int, float, int]
-"""An arrived byte: its value, its position in its write, and its origin.
+"""A byte that arrives: its value, its position in its write, and its origin.
 
-The position is a fraction for an added byte; the origin is the position, ADDED or CHANGED.
+The position of an added byte is a fraction. The origin is the position, or ADDED, or CHANGED.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 
 
 class Line(Protocol):
-    """The damaged line of one trial. ``whole``: number of bytes that arrive before the next fault.
+    """The damaged line of one trial.
 
-    For a write of at most ``whole`` bytes the caller only subtracts its length from ``whole``;
-    other writes go through ``carry``.
+    ``whole``: number of bytes that arrive before the next fault. For a write of at most ``whole``
+    bytes, the caller only subtracts its length. All other writes go through ``carry``.
     """
 
     whole: int
@@ -70,9 +70,9 @@ class NoFaults:
 
 
 class Bursts:
-    """A line that loses bytes in a row, even across writes.
+    """A line that loses several bytes in a row, even across writes.
 
-    ``rate``: probability that such a burst begins at a byte.
+    ``rate``: the probability that such a loss begins at a byte.
     """
 
     def __init__(self, rate: float, longest: int, random: Random) -> None:
@@ -103,7 +103,7 @@ def _lost(_data: bytes, _at: int, _random: Random) -> list[Arrival]:
 
 
 def _added(data: bytes, at: int, random: Random) -> list[Arrival]:
-    """Return this byte and an additional one of any value, before it or after it."""
+    """Return the byte at ``at`` and an additional byte of any value, before it or after it."""
     own, value = (data[at], at, at), random.randrange(256)
     if random.random() < 0.5:
         return [(value, at - 0.5, ADDED), own]

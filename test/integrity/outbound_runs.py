@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The choice of outbound trials (scenes, numbers and boards), and the trials' scores by name."""
+"""Which outbound trials run (scenes, numbers and boards), and the scores of these trials."""
 
 import math
 import os
@@ -20,23 +20,23 @@ from outbound_trial import BoardKind, Memo, Trial
 from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 
 SCRIPTS: Final = 6
-"""Number of scripts per scene, each with other commands."""
+"""Number of scripts for each scene. Each script has other commands."""
 NEEDED: Final = 10_000
-"""Number of trials per receiver and loss.
+"""Number of trials for each receiver and each loss.
 
-The scenes that end a drive share this number. At 1 byte in 100 lost, each scene of ``HURRIES`` has
-the whole number.
+The scenes that end a drive share this number. With 1 byte in 100 lost, each scene in ``HURRIES``
+has the whole number.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
 DRIVEN: Final = 150
-"""Number of trials of each script whose scene only drives, without a stop to be judged."""
+"""Number of trials of each script that only drives, so that no stop is judged."""
 OTHER_TRIALS: Final = 20
 """Number of trials of each script with a fault for which the report has no limits."""
 ESTOPS: Final = ("e-stop", "goal", "exit")
 """Scenes in which it matters whether the board obeys an emergency stop."""
 BOOTS: Final = ("reset", "exit")
-"""Scenes in which the bytes received during the boot may count as the wake-up bytes."""
+"""Scenes in which bytes that arrive during the boot may wake the board up."""
 
 RECEIVERS: Final = {
     f"{framing.replace('_', ' ')}, letters {letters}": (framing, letters)
@@ -44,11 +44,11 @@ RECEIVERS: Final = {
     for letters in ("between", "anywhere")
 }
 Scores = dict[tuple[str, str, str], Score]
-"""Scores by fault, receiver and scene."""
+"""The scores. A key is the names of fault, receiver and scene."""
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield a scene's boards with this receiver, each with the name under which it is scored."""
+    """Yield the boards with this receiver for a scene, each with the name for its scores."""
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
         name = f"{scene}, {'obeyed' if obeys else 'ignored'}" if scene == "e-stop" else scene
@@ -70,7 +70,10 @@ def trials(fault: str, scene: str) -> int:
 def one(
     share: float, job: tuple[str, int], faults: Mapping[str, Fault] = FAULTS
 ) -> tuple[Scores, int]:
-    """Run one script with each fault on all boards; return scores and number of session runs."""
+    """Run one script with each fault on all boards.
+
+    Return the scores, and how often the session ran.
+    """
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))
     scores: Scores = {}
@@ -98,7 +101,8 @@ def add(total: Scores, more: Scores) -> None:
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
     """Return the sum of the scores of one fault.
 
-    Empty ``receiver``: over all receivers; empty ``scene``: over all scenes that end a drive.
+    If ``receiver`` is empty, the sum is over all receivers. If ``scene`` is empty, it is over all
+    scenes that end a drive.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():
@@ -109,7 +113,7 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 
 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
-    """Run all trials on all processors; return scores and the number of session runs."""
+    """Run all trials on all processors. Return the scores, and how often the session ran."""
     jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
     total: Scores = {}
     rehearsals = 0

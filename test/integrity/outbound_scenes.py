@@ -2,8 +2,8 @@
 
 """Scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made from a seed. Speeds are random within the limits. They are often chosen so that a
-byte of the frame equals a letter or a header byte.
+A scene is made from a seed. The speeds are random within the limits. Many of them are chosen such
+that a byte of the frame equals a letter or a header byte.
 """
 
 import math
@@ -22,16 +22,16 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time from which the board runs and the driver knows that the board runs, in s."""
+"""Time in s from which the board runs and the driver knows this."""
 STANDS_S: Final = 1.2
-"""Time after the last command until the robot must be at rest, in s."""
+"""Time in s from the last command until the robot must be at rest."""
 ESTOPPED_S: Final = 0.3
 EXITED_S: Final = 0.5
 DRIVE_S: Final = 1.5
 DRIVE_RATES_HZ: Final = (20.0, 50.0, 100.0)
 RATES_HZ: Final = (10.0, 20.0, 30.0, 50.0, 100.0)
 AWKWARD_LSB: Final = (-1, -2, -6, 80, 82, 83, -176, -174, -173, 250, 0)
-"""Yaw rates in LSB whose bytes are FF, FE or letters."""
+"""Yaw rates in LSB. Some bytes of their frames are FF, FE or letters."""
 
 
 def _twist(random: Random) -> BodyTwist:
@@ -50,7 +50,7 @@ def _rates(random: Random) -> tuple[float, float, float]:
 def driving(
     random: Random, begin_s: float, end_s: float, *, by_wheels: bool = False, rate_hz: float = 0.0
 ) -> list[Command]:
-    """Return commands at a random rate; the commands change at random times."""
+    """Return commands at a random rate. The commands change at random times."""
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
     now = begin_s
@@ -91,7 +91,8 @@ def _estop(active: bool) -> Callable[[Session, float], object]:
 
 
 def _common(random: Random) -> dict[str, object]:
-    """Draw a scene's settings: sometimes an acceleration limit, another scale or another rate."""
+    """Draw settings of a scene: usual ones, or sometimes another scale, rate or acceleration limit.
+    """
     return {
         "linear_scale": random.choice((70.0, 70.0, 233.0)),
         "rate_hz": random.choice((20.0, 20.0, 20.0, 10.0, 50.0)),
@@ -102,7 +103,7 @@ def _common(random: Random) -> dict[str, object]:
 
 
 def _leg(random: Random) -> tuple[list[Command], float]:
-    """Return the commands of one drive, and the time of the last one in s."""
+    """Return the commands of one drive, and the time in s of the last command."""
     wishes = driving(random, FROM_S, FROM_S + random.uniform(0.1, 0.35), by_wheels=_wheels(random))
     return wishes, wishes[-1].at_s
 
@@ -112,7 +113,7 @@ def _wheels(random: Random) -> bool:
 
 
 def drive(rate_hz: float, random: Random) -> Scene:
-    """Make a scene that only drives, with commands at this rate; its end is not judged."""
+    """Make a scene that only drives, with commands at this rate. Its end is not judged."""
     wishes = driving(random, FROM_S, FROM_S + DRIVE_S, rate_hz=rate_hz)
     return Scene(
         kind=f"drive {rate_hz:g}",
@@ -124,7 +125,7 @@ def drive(rate_hz: float, random: Random) -> Scene:
 
 
 def timeout(random: Random) -> Scene:
-    """Make a scene in which the commander stops sending, so that the command times out."""
+    """Make a scene in which the commander stops sending, so the command times out."""
     wishes, last_s = _leg(random)
     return Scene(
         kind="timeout",
@@ -136,7 +137,7 @@ def timeout(random: Random) -> Scene:
 
 
 def zero(random: Random) -> Scene:
-    """Make a scene in which the commander sends zero, and repeats it for a while."""
+    """Make a scene in which the commander sends zeros for a while."""
     wishes, last_s = _leg(random)
     gap_s = 1.0 / random.choice(RATES_HZ)
     until_s, now = last_s + random.uniform(0.0, 0.7), last_s + gap_s
@@ -171,7 +172,7 @@ def switch(random: Random) -> Scene:
 
 
 def pause(random: Random) -> Scene:
-    """Make a scene in which ``~/pause`` is called while the robot drives or is at rest."""
+    """Make a scene in which a user calls ``~/pause`` while the robot drives or is at rest."""
     wishes, last_s = _leg(random) if random.random() < 0.7 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.PAUSE)))
@@ -185,7 +186,10 @@ def pause(random: Random) -> Scene:
 
 
 def start(random: Random) -> Scene:
-    """Make a scene in which ``~/start`` is called for a paused board, then a drive and its end."""
+    """Make a scene in which a user calls ``~/start`` for a paused board.
+
+    Then the robot drives and stops.
+    """
     wishes = [Command(FROM_S, _request(Request.START))]
     wishes += driving(random, FROM_S + 0.05, FROM_S + random.uniform(0.3, 1.0))
     last_s = wishes[-1].at_s
@@ -201,7 +205,10 @@ def start(random: Random) -> Scene:
 
 
 def reset(random: Random) -> Scene:
-    """Make a scene with ``~/reset`` during a drive; the board reboots and is started."""
+    """Make a scene in which a user calls ``~/reset`` after a drive.
+
+    The board reboots and is started.
+    """
     wishes, last_s = _leg(random) if random.random() < 0.8 else ([], FROM_S)
     asked_s = last_s + random.choice((0.005, 0.03, 0.3))
     wishes.append(Command(asked_s, _request(Request.RESET)))
@@ -215,7 +222,7 @@ def reset(random: Random) -> Scene:
 
 
 def estop(random: Random) -> Scene:
-    """Make a scene in which the e-stop is latched while commands continue, and then released."""
+    """Make a scene in which the e-stop is latched while commands continue, and later released."""
     begin_s = FROM_S + random.uniform(0.1, 0.3)
     released_s = begin_s + random.uniform(0.35, 0.6)
     wishes = driving(random, FROM_S, released_s - 0.05, by_wheels=_wheels(random))
@@ -230,7 +237,7 @@ def estop(random: Random) -> Scene:
 
 
 def goal(random: Random) -> Scene:
-    """Make a scene with two goal poses; goals do not expire, so the e-stop ends the drive."""
+    """Make a scene with goal poses. Goals do not expire, so the e-stop ends the drive."""
     wishes = [
         Command(at_s, partial(_go, Pose(*(random.uniform(-9, 9) for _ in range(3)))))
         for at_s in (FROM_S, FROM_S + random.uniform(0.05, 0.4), FROM_S + 0.4)
@@ -248,7 +255,7 @@ def goal(random: Random) -> Scene:
 
 
 def leave(random: Random) -> Scene:
-    """Make a scene in which the driver ends during commands, perhaps with a latched e-stop."""
+    """Make a scene in which the driver ends while commands arrive. The e-stop may be latched."""
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:
@@ -265,7 +272,7 @@ def leave(random: Random) -> Scene:
 
 
 def kill(random: Random) -> Scene:
-    """Make a scene in which the driver is killed, perhaps within a write; then its guard writes."""
+    """Make a scene in which the driver is killed, perhaps during a write. Then its guard writes."""
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:

@@ -2,9 +2,9 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-The board is booting, paused or running, and its robot moves or is at rest. A moving robot follows
-the last written motion frame at once and without slip. Thus the driver cannot notice a damaged
-command by seeing the robot do something else.
+The board boots, is paused or runs, and its robot moves or is at rest. A moving robot follows the
+last motion frame that was written, at once and without slip. So the driver cannot see that the
+board has received a damaged command.
 """
 
 import math
@@ -25,19 +25,24 @@ GYRO_LSB_PER_DPS = 131.0
 GOAL_MPS = 0.2
 """Speed on the way to a goal, in m/s."""
 ACCEL_Z = -16384
-"""Gravity as the upside-down sensor measures it, in LSB."""
+"""Gravity in LSB, as the upside-down sensor measures it."""
 
 
 class Shown(NamedTuple):
-    """The part of a board's state that can be seen in what the board sends."""
+    """The part of the board's state that the driver can see in what the board sends."""
 
     mode: str
-    """Mode: booting, paused or running."""
+    """The mode: booting, paused or running."""
     moves: bool
 
 
 class Teller:
-    """A minimal board. ``linear_scale``: LSB per m/s; ``goals``: whether it drives to goals."""
+    """A minimal board.
+
+    ``linear_scale``: LSB per m/s.
+
+    ``goals``: whether a frame is a goal to which the board drives.
+    """
 
     def __init__(self, linear_scale: float, *, goals: bool = False) -> None:
         self._linear_scale, self._goals = linear_scale, goals
@@ -46,7 +51,8 @@ class Teller:
         self._reboot()
 
     def moves_as(self, mode: int, words: Triple) -> None:
-        """Store the twist that this motion frame commands; the robot has it while it moves."""
+        """Store the twist that this motion frame commands. The robot has this twist while it moves.
+        """
         a, b, c = words
         if self._goals:
             way = math.atan2(1e-3 * b - self._y, 1e-3 * a - self._x) - self._yaw
@@ -63,7 +69,7 @@ class Teller:
             )
 
     def step(self, shown: Shown) -> bytes:
-        """Advance by one tick in this state; return the bytes that the board sends."""
+        """Advance by one tick in this state, and return the bytes that the board sends."""
         if shown.mode != self._mode:
             if self._mode == "booting":
                 self._reboot()

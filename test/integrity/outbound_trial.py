@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board is modelled by its mode and its set point. It has no motors. The board shows that the
-robot moves while the driver drives, and afterwards while the set point is a motion. What the board
-shows follows its state after one or two ticks; a set point of a shorter duration is not visible.
+The board is only a mode and a set-point, without motors. It shows that the robot moves while the
+driver drives, and afterwards while the set-point is a motion. A change of its state is visible
+after one or two ticks. A shorter change is not visible.
 """
 
 import math
@@ -33,17 +33,17 @@ MEMO: Final = 100_000
 
 Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
-"""Memo of receivers: the result of consecutive bytes in one kind of running receiver.
+"""Results of receivers that were computed before, for one kind of receiver on a running board.
 
-Key: the bytes that the receiver holds, whether a pause came before the new bytes, and the new
-bytes. Value: the bytes that the receiver holds afterwards, and each frame by the byte that
-completes it; None if letters act.
+A key is the bytes that the receiver holds, whether a pause comes before the new bytes, and the new
+bytes. A value is the bytes that the receiver holds afterwards, and the frames, each with the index
+of the byte that completes it. The value is None if the board acts on a letter.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class BoardKind:
-    """How the board finds commands, and whether it obeys an emergency stop."""
+    """How a board finds commands in the bytes, and whether it obeys an emergency stop."""
 
     receiver: ReceiverKind
     obeys_estop: bool = True
@@ -51,7 +51,10 @@ class BoardKind:
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """An error in a trial, and the last writes before it: time, bytes sent, bytes received."""
+    """An error in a trial, and the last writes before it.
+
+    ``writes``: the time, the bytes sent and the bytes received of each write.
+    """
 
     scene: str
     board: BoardKind
@@ -71,9 +74,10 @@ class Example:
 
 
 class Trial:
-    """A trial: its beginning without faults is played once, and each ``run`` continues from there.
+    """A trial of a scene on one kind of board.
 
-    ``memo`` may be shared by trials of one kind of receiver.
+    The beginning without faults is played only once. Each ``run`` continues from its end. Trials
+    with the same kind of receiver may share a ``memo``.
     """
 
     def __init__(self, course: Course, board: BoardKind, memo: Memo) -> None:
@@ -130,7 +134,10 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip the writes that arrive undamaged and change nothing, except the last of them."""
+        """Skip the writes that arrive undamaged and change nothing.
+
+        The last of them is not skipped.
+        """
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (
@@ -267,7 +274,6 @@ class Trial:
         self._changed(at_s)
 
     def _boot(self) -> None:
-        """End the boot."""
         at_s, self._boots_at_s = self._boots_at_s, math.inf
         self._mode = "paused"
         self._changed(at_s)
@@ -295,7 +301,8 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """Record the bytes that led to this error, for the first few errors of a score."""
+        """Record this error and the bytes that led to it. A score keeps only the first few errors.
+        """
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:
             examples.append(Example(self._course.scene.kind, self._board, what, tuple(self._last)))

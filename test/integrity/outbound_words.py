@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parser of the driver's writes, by the manual's layout alone.
+"""Parser of the driver's writes, by the layout in the manual alone.
 
-The parser knows zeros, control frames and letters, and uses no code of the driver.
+This module knows zeros, control frames and letters; it does not know any code of the driver.
 """
 
 from dataclasses import dataclass
@@ -12,10 +12,15 @@ Words = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """Control frames (offset of the last byte, mode, words), and letters by offset.
+    """The control frames and letters in a write.
 
-    moves: whether one of the frames is motion. stops: whether there are frames and none of them is
-    motion.
+    ``frames``: for each control frame the offset of its last byte, its mode and its words.
+
+    ``letters``: for each letter its offset and its byte.
+
+    ``moves``: whether one of the frames is a motion.
+
+    ``stops``: whether there are frames, and none of them is a motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()
@@ -25,15 +30,15 @@ class Items:
 
 
 def is_motion(mode: int, words: Words) -> bool:
-    """Return whether a frame is motion.
+    """Return whether a control frame is a motion.
 
-    Zeros in mode 01 are motion too, because with position control they are a goal.
+    Zeros in mode 01 are a motion, too, because under position control they are a goal.
     """
     return mode == 0x01 or (mode == 0x02 and any(words))
 
 
 def parse(data: bytes) -> Items:
-    """Parse a write; raise ValueError at anything but zeros, full frames and letters."""
+    """Parse a write. Raise ValueError at anything but zeros, complete frames and letters."""
     frames: list[tuple[int, int, Words]] = []
     letters: list[tuple[int, int]] = []
     at = 0

@@ -12,7 +12,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 
 def key_of(frame: Frame) -> Key:
-    """Return the kind and content of a decoded frame, in the form used for the true frames."""
+    """Return the kind and the content of a decoded frame, in the form of the true frames."""
     match frame:
         case ImuFrame(accel, gyro):
             return ("imu", accel, gyro)
@@ -25,7 +25,7 @@ def key_of(frame: Frame) -> Key:
 
 
 def driver() -> tuple[Feed, Feed]:
-    """Make the driver's decoder; return the functions that feed and flush it."""
+    """Make the driver's decoder. Return the functions that feed and flush it."""
     decoder = FrameDecoder()
     return (
         lambda data, now: [key_of(frame) for frame in decoder.feed(data, now)],
@@ -34,9 +34,9 @@ def driver() -> tuple[Feed, Feed]:
 
 
 def plain() -> tuple[Feed, Feed]:
-    """Make a plain parser; return the functions that feed and flush it.
+    """Make a plain parser. Return the functions that feed and flush it.
 
-    At a header the parser takes as many bytes as a frame of that kind has, without any check.
+    At a header, the parser takes as many bytes as a frame of this kind has. It checks nothing.
     """
     held = bytearray()
 

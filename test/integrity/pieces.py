@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Common parts of the integrity reports: damage to bytes in pieces, and sums of scores.
+"""Common parts of the integrity reports: damage to a stream in pieces, and sums of scores.
 
-The module does not use the format of frames; scores need only the operator ``+=``.
+This module knows bytes, and scores with the operator ``+=``; it does not know the format of frames.
 """
 
 import os
@@ -18,7 +18,7 @@ Job = TypeVar("Job")
 
 
 def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
-    """Damage a line; return the pieces without the lost bytes, and with the added ones."""
+    """Damage a line. Return its pieces without the lost bytes, and with the added ones."""
     whole = b"".join(pieces)
     ends, at = [], 0
     for piece in pieces:
@@ -33,7 +33,7 @@ def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes
 
 
 def add(total: dict[Key, Any], more: Mapping[Key, Any]) -> None:
-    """Add each score in ``more`` to the score of the same key in ``total``."""
+    """Add each score in ``more`` to the score with the same key in ``total``."""
     for key, score in more.items():
         if key in total:
             total[key] += score
@@ -42,7 +42,7 @@ def add(total: dict[Key, Any], more: Mapping[Key, Any]) -> None:
 
 
 def scores_of(one: Callable[[Job], Mapping[Key, Any]], jobs: Iterable[Job]) -> dict[Key, Any]:
-    """Run the jobs in parallel on all cores; return the sums of their scores."""
+    """Run the jobs in parallel on all cores, and return the sums of their scores."""
     total: dict[Key, Any] = {}
     with Pool(os.cpu_count()) as pool:
         for scores in pool.imap_unordered(one, jobs):

@@ -2,9 +2,9 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-Arguments: ``--seconds`` per stream, the number of ``--seeds`` and the ``--first`` seed. The
-decoder's costs were tuned on seeds from 1000 on. The codecs of other boards have modules of their
-own. The exit code is 1 when a bound is missed in any scenario.
+``--seconds`` is the length of a stream, ``--seeds`` the number of seeds, and ``--first`` the first
+seed. The decoder's costs were tuned with seeds from 1000 on. The codecs of other boards are
+measured in other modules. The exit code is 1 when a bound is missed in any scenario.
 """
 
 import argparse
@@ -25,15 +25,15 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
 OTHERS = {"lois_ecu": "lois_ecu_report", "mart": "mart_report", "fejemis": "fejemis_report"}
-"""By the board's name: the module that measures its codec."""
+"""For each other board, the module that measures its codec."""
 SEEDS_OF_THE_PLAIN_PARSER = 4
-"""Number of streams for the plain parser; its errors are frequent, so a few streams show them."""
+"""Number of streams for the plain parser. Its errors are frequent, so a few streams show them."""
 
 Job = tuple[str, int, str]
 
 
 def one(seconds: float, job: Job) -> tuple[str, Scores]:
-    """Return a parser's name and its scores for one stream; runs in a process of the pool."""
+    """Return a parser's name and its scores for one stream. This runs in a process of the pool."""
     scenario, seed, parser = job
     return parser, run(scenario, seed, seconds, parser)
 
@@ -95,7 +95,7 @@ def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:
 
 
 def main() -> int:
-    """Measure the streams, and print and write the figures."""
+    """Measure the streams, print the results and write them. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=60.0)
     arguments.add_argument(

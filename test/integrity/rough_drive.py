@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulated robots that obey, on bad floors and among people, to test the motion monitor.
+"""Simulated robots that obey, on bad floors and among people.
 
-The monitor should stop none of them.
+The motion monitor must not stop them.
 
-Each robot has its own motors, controllers, scales and line, 5 % slip and a slope. A robot's
-commander changes its way of commanding every few seconds; people hold, carry and push the robot.
-Everything is in simulated time.
+Each robot has its own motors, controllers, scales and line. It has 5 % slip and drives on a slope.
+Its commander changes the way of commanding every few seconds. People hold, carry and push the
+robot. Everything is in simulated time.
 """
 
 import math
@@ -26,12 +26,12 @@ from omnibot_driver.simulator.omnibot.motors import MotorConstants, WheelGains
 
 SLIP: Final = 0.05
 STEEPEST_PWM: Final = 200.0
-"""Greatest effort against a slope: 5 % of the motors' full effort."""
+"""Greatest effort against a slope, in PWM steps: 5 % of the motors' full effort."""
 HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
 """Greatest effort of a push against a driving robot, in PWM steps."""
 FASTEST_CARRY_MPS: Final = 0.5
-"""Greatest speed of a robot at rest that is carried, in m/s."""
+"""Greatest speed at which people carry a robot at rest, in m/s."""
 SECONDS_BETWEEN_HANDS: Final = 20.0
 
 HANDS: Final = ("push", "bump", "hold", "carry")
@@ -44,7 +44,11 @@ BEGUN_S: Final = 1000.0
 class Outcome:
     """Result of a drive.
 
-    ``said``: how often the driver gave each message. ``happened``: how often people did each thing.
+    ``trips``: how and when the motion monitor stopped the robot.
+
+    ``said``: how often the driver gave each message.
+
+    ``happened``: how often people did each thing.
     """
 
     seconds: float = 0.0
@@ -61,7 +65,7 @@ class Outcome:
 
 
 def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
-    """Draw the settings of a robot with the usual spread of motors, controllers and scales."""
+    """Draw the settings of a robot. Its motors, controllers and scales vary as usual."""
     random = Random(f"robot {seed}")
     motors = [
         MotorConstants(
@@ -97,7 +101,7 @@ def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
 
 
 class RoughDrive(Bench):
-    """A simulated robot with a line that delays both ways, a commander, and people around."""
+    """A simulated robot with a commander, among people. Its line delays data in both directions."""
 
     def __init__(self, seed: int, delta_period_s: float = 0.04) -> None:
         self._random = random = Random(f"drive {seed}")
@@ -124,7 +128,7 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """Count the session's notices; deliver its writes to the board after the line's delay."""
+        """Count the session's notices. Deliver its writes to the board after the line's delay."""
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)
@@ -145,7 +149,7 @@ class RoughDrive(Bench):
             self.settle()
 
     def go(self, seconds: float) -> Outcome:
-        """Drive for ``seconds``; return the outcome."""
+        """Drive for ``seconds``, and return the outcome."""
         self.open()
         self.run(2.0)
         self._hands_at = self.now + self._random.expovariate(1 / SECONDS_BETWEEN_HANDS)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of the integrity report, with streams long enough to test every limit."""
+"""A short version of the integrity report. Its streams are long enough to test every limit."""
 
 import os
 from functools import partial
@@ -21,7 +21,8 @@ SECONDS, SEEDS = 11.0, 2
 
 @pytest.fixture(scope="module")
 def scores() -> Scores:
-    """Return scores of every scenario, fault and chunking: about 16,000 frames for each bound."""
+    """Return the scores of every scenario, fault and chunking. Each bound has about 16,000 frames.
+    """
     jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
     total: Scores = {}
     with get_context("spawn").Pool(os.cpu_count()) as pool:
@@ -34,14 +35,14 @@ def scores() -> Scores:
     ("fault", "chunker"), [(fault, chunker) for fault in FAULTS for chunker in chunkings(fault)]
 )
 def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, scores: Scores) -> None:
-    """The limits of wrong and of lost frames hold for the sum over all scenarios."""
+    """All scenarios together keep the limits of wrong frames and of lost frames."""
     score = over_scenarios(scores, fault, chunker)
     assert BOUNDS[fault].holds(chunker, score), score
     assert score.out > 12_500
 
 
 def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
-    """On an undamaged stream even the plain parser scores no error, from the first byte on."""
+    """The stream is undamaged. The judge finds no error, even of the plain parser."""
     truth = generate(SCENARIOS["driving"], 1, 10.0)
     received = receive(truth, lambda length, _: list(range(length)), Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())
@@ -49,7 +50,8 @@ def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
 
 
 def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
-    """The judge finds the many false frames that the plain parser returns."""
+    """The stream is damaged, and the plain parser returns many false frames. The judge finds them.
+    """
     truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
     received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))
     score = judge(received, CHUNKERS["FTDI"](received, Random(1)), *plain())

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of ``no_false_trips``: one minute for each kind of robot."""
+"""A short version of ``no_false_trips``: one minute with each kind of robot."""
 
 import pytest
 from rough_drive import RoughDrive
@@ -11,14 +11,16 @@ from rough_drive import RoughDrive
 def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
     seed: int, delta_period_s: float
 ) -> None:
-    """Robots that obey are not stopped, in spite of slip, slope, delays, and people around."""
+    """A robot obeys on a slope, with slip and delays, among people. The monitor does not stop it.
+    """
     outcome = RoughDrive(seed, delta_period_s).go(60.0)
     assert outcome.trips == []
     assert outcome.happened.total() > 0
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """In a rough drive, the monitor stops a robot whose wheels turn twice as fast as commanded."""
+    """The wheels of a robot turn more than twice as fast as commanded. The monitor stops the robot.
+    """
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)
     assert drive.go(30.0).trips

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A short version of the outbound report, and tests of its judge."""
+"""A short version of the outbound report, and tests of the report's judge."""
 
 from copy import copy
 from dataclasses import replace
@@ -36,7 +36,7 @@ class Losing:
 
 
 def on_all_receivers(course: Course, line: Line) -> Score:
-    """Run a course with the same damage on each receiver; return the sum of the scores."""
+    """Run a course with the same damage on each receiver, and return the sum of the scores."""
     total = Score()
     for receiver in RECEIVERS:
         for _, board in boards(course.scene.kind, receiver):
@@ -45,13 +45,14 @@ def on_all_receivers(course: Course, line: Line) -> Score:
 
 
 def shown(score: Score) -> str:
-    """Return a text with the score's counts, and with the bytes that led to its errors."""
+    """Return a text with the counts of a score, and with the bytes that led to its errors."""
     return "\n".join([str(score), *map(str, score.examples)])
 
 
 @pytest.mark.parametrize("scene", ENDED)
 def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
-    """On an undamaged line receivers understand only what was sent, and the robot stops in time."""
+    """The line is undamaged. Receivers understand only what was sent, and the robot stops in time.
+    """
     course = Course(ENDED[scene](Random(scene)))
     score = on_all_receivers(course, GOOD)
     found = score.strayed, score.overdue, score.uncommanded, score.false_letters, score.false_estops
@@ -60,7 +61,8 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """With one script per scene, every receiver keeps the limits that a short run can check."""
+    """One script of each scene is run. Every receiver keeps the limits that a short run can check.
+    """
     scores, _ = one(0.05, (scene, 0), LOSSES)
     for fault in LOSSES:
         score = Score()
@@ -75,9 +77,10 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """A motion frame that lost its last byte has no effect until the next write.
+    """The last byte of a motion frame is lost. The frame has no effect until the next write.
 
-    The zeros before the next write complete the frame, and the frame of that write replaces it.
+    The zeros at the beginning of the next write complete the frame. The frame of this write then
+    replaces it at once.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
@@ -99,7 +102,12 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """Two adjacent Stops, of which the first lacks a byte, look like 255 LSB for wheel C."""
+    """Two Stops follow each other, and the first lacks a byte.
+
+    The board understands 255 LSB for wheel C.
+
+    The judge calls this stray motion.
+    """
     judge = Judge()
     judge.write(parse(STOP), 0.0)
     judge.write(parse(STOP), 0.05)
@@ -111,7 +119,10 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """A set point of the write before is right; a set point with a changed bit is an error."""
+    """The board still follows the set-point of the write before, which is right.
+
+    A set-point with a changed bit is an error.
+    """
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
     judge = Judge()
@@ -129,9 +140,9 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """A letter that was sent is right.
+    """The board acts on letters. A letter that was sent is right.
 
-    A payload byte that acts as a letter is false; a letter that the line has made is "added".
+    A payload byte that acts as a letter is false. A letter that the line has made is "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
@@ -142,9 +153,9 @@ def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
 
 
 def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
-    """The judge reports a robot that still drives.
+    """The line is cut during a drive, so Stop never arrives.
 
-    All bytes after a certain one are lost, so Stop never arrives.
+    The judge reports that the robot still drives.
     """
     course = Course(ENDED["timeout"](Random("cut")))
     driving = next(n for n, items in enumerate(course.items) if items.moves)
@@ -159,7 +170,7 @@ def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
-    """Skipping undamaged writes gives the same score as playing every write."""
+    """Skipping the undamaged writes gives the same score as playing every write."""
 
     class Slow(Trial):
         def _skip(self) -> None:
@@ -176,7 +187,7 @@ def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
 
 
 def test_a_write_is_read_by_the_layout_alone() -> None:
-    """Zeros, frames and letters are parsed; anything else raises ValueError."""
+    """The parser finds zeros, frames and letters. Anything else raises ValueError."""
     items = parse(bytes(8) + STOP + bytes(8) + b"S")
     assert items.frames == ((16, 2, (0, 0, 0)),)
     assert items.letters == ((25, 0x53),)
@@ -185,7 +196,10 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """The sum over all endings omits scenes that only drive; these have a sum of their own."""
+    """The sum over all endings omits the scenes that only drive.
+
+    A scene that drives has its own sum.
+    """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),
         ("a", "r", "kill"): Score(trials=2),

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Shortcuts of the decoder: none of them changes the result.
+"""Tests of three shortcuts of the decoder: none of them changes the result.
 
-They are the quick loop for calm frames, the path of an IMU frame that comes alone, and the parts of
-the trellis that are left out.
+One shortcut is the quick loop for calm frames. Another is the path for an IMU frame that arrives
+alone. The third one leaves out parts of the trellis.
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,10 @@ TRUTHS = {name: generate(scenario, 11, SECONDS) for name, scenario in SCENARIOS.
 
 
 def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
-    """Return the frames that each call decodes, the decoder's counts, and the incomplete frame."""
+    """Return what the decoder finds in each chunk: frames, counts, and the incomplete frame.
+
+    ``quick``: whether the decoder may use its shortcuts.
+    """
     with pytest.MonkeyPatch.context() as patch:
         if not quick:
             patch.setattr(decoder, "take_run", lambda _held, at, context, *_: (at, context))
@@ -84,9 +87,9 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_streams_come_out_alike(scenario: str, fault: str, chunker: str) -> None:
-    """With and without shortcuts, the decoder returns the same frames and counts at each call.
+    """A stream is damaged or undamaged.
 
-    The streams are damaged or undamaged.
+    With and without shortcuts, each call of the decoder gives the same.
     """
     chunks = chunks_of(scenario, fault, chunker, 1)
     assert outcome(chunks, quick=True) == outcome(chunks, quick=False)
@@ -100,7 +103,8 @@ pieces = st.sampled_from(
 @settings(max_examples=200)
 @given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
 def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
-    """Shortcuts change no result for pieces of streams and noise in any order, with any pauses."""
+    """Pieces of streams and noise arrive in any order, with any pauses. Shortcuts change no result.
+    """
     now, chunks = 0.0, []
     for data, pause_s in arrivals:
         now += pause_s
@@ -115,7 +119,10 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With requests in between, shortcuts change neither the board's readings nor its mode."""
+    """Requests are made while a stream arrives.
+
+    Shortcuts change neither the board's readings nor its mode.
+    """
     chunks = chunks_of(scenario, fault, chunker, 2)
 
     def told() -> list[object]:
@@ -139,7 +146,10 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most reads must use the shortcut for single IMU frames; otherwise its tests prove nothing."""
+    """Most reads use the shortcut for single IMU frames.
+
+    Otherwise the other tests would prove nothing.
+    """
     fed = []
     feed = FrameDecoder.feed
 
@@ -156,7 +166,7 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The quick loop handles at least 90 % of the IMU frames; the others are weighed one by one."""
+    """The stream is calm. The quick loop handles more than 90 % of its IMU frames."""
     weighed = []
     weigh = decoder.Expectation.weigh
 
@@ -172,7 +182,8 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The quick loop handles a jump of the readings, odd readings after it, and the jump back."""
+    """The readings jump, are odd for a moment, and jump back. The quick loop handles all of this.
+    """
     rest = ImuFrame((120, -80, -16384), (1, 2, 3))
     shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
     sent = [rest, *shock, rest, rest, rest]
@@ -188,7 +199,8 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder can restore its state after any frame by weighing at most 6 frames again."""
+    """The decoder can restore its state after any frame. It weighs at most 6 frames again for this.
+    """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
     expected = [context]
@@ -208,7 +220,10 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
 
 
 def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most edges must be left out; otherwise the tests here would compare two complete searches."""
+    """Most edges of the trellis are left out.
+
+    Otherwise the tests would compare two complete searches.
+    """
     edges = {True: 0, False: 0}
     pieces = trellis._Search.pieces
     chunks = chunks_of("driving", "1 byte in 100 lost", "4096-byte blocks", 1)
@@ -226,7 +241,10 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """The lower bound of the remaining cost falls along each edge by at most the edge's cost."""
+    """The search has a lower bound of the cost that remains at each node of the trellis.
+
+    Along an edge, this bound falls by at most the cost of the edge.
+    """
     least = least_costs(data)
     search = trellis._Search(
         data, NOTHING_KNOWN, Expectation(16384.0), InterFrameGaps(BYTE_S), "big"

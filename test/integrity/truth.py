@@ -3,8 +3,8 @@
 """Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
 The generator packs frames with ``struct`` by the layouts of the manual, and uses no code of the
-driver. Sensor noise is that of an MPU6050 with its filter on: about 46 counts of the accelerometer,
-6.5 of the gyro.
+driver. The sensor noise is that of an MPU6050 with its filter on: about 46 counts of the
+accelerometer and 6.5 counts of the gyro.
 """
 
 import math
@@ -17,14 +17,14 @@ BYTE_S = 10 / 115200
 
 Words = tuple[int, int, int]
 Key = tuple[object, ...]
-"""A frame's content: its kind, then its fields."""
+"""The content of a frame: its kind, then its fields."""
 
 
 @dataclass(slots=True)
 class Truth:
-    """A true stream: bytes, their arrival times in s, and frames.
+    """A true stream: its bytes, their times of arrival in s, and its frames.
 
-    A frame consists of its content, the index of its first byte, and the index after its last byte.
+    A frame is its content, the index of its first byte, and the index after its last byte.
     """
 
     data: bytearray = field(default_factory=bytearray)
@@ -34,7 +34,7 @@ class Truth:
 
 @dataclass(slots=True)
 class Setpoint:
-    """The velocity of a robot: it approaches random targets, or is always zero."""
+    """The velocity of a robot. It approaches random targets, or is always zero."""
 
     random: Random
     driving: bool
@@ -43,7 +43,7 @@ class Setpoint:
     pose: list[float] = field(default_factory=lambda: [0.0, 0.0, 0.0])
 
     def step(self) -> tuple[float, float]:
-        """Advance one tick; return the acceleration along the body's x and y, in m/s²."""
+        """Advance by one tick. Return the acceleration along the body's x and y, in m/s²."""
         if not self.driving:
             return 0.0, 0.0
         if self.random.random() < 0.02:
@@ -69,7 +69,7 @@ class Scenario:
     accel_noise: float = 46.0
     gyro_noise: float = 6.5
     pauses: bool = False
-    """Whether the board is sometimes paused for seconds, with only one text per second."""
+    """Whether the board is sometimes paused for seconds. Then it sends only one text per second."""
 
 
 SCENARIOS: dict[str, Scenario] = {
@@ -85,7 +85,8 @@ WITH_TEXTS = "paused now and then"
 
 
 def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
-    """Return what the board sends in this scenario for ``seconds``, from a random moment on."""
+    """Return what the board sends for ``seconds`` in this scenario, beginning at a random moment.
+    """
     random = Random(f"{scenario} {seed}")
     gauss = random.gauss
     bias = [random.uniform(-6, 6) for _ in range(3)]
@@ -140,7 +141,7 @@ def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
 
 
 def _append(truth: Truth, key: Key, packed: bytes, now: float) -> float:
-    """Append a frame that begins at ``now``; return the time at which its last byte has arrived."""
+    """Append a frame that begins at ``now``. Return the time at which its last byte has arrived."""
     at = len(truth.data)
     truth.data += packed
     truth.frames.append((key, at, at + len(packed)))

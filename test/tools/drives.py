@@ -51,7 +51,8 @@ class Topic:
         return Series(arrived_s[order], self.stamp_s[order], self.values[order])
 
     def drop(self, begin_s: float, end_s: float) -> None:
-        """Remove messages with timestamps between these times, in s, as if they had been lost."""
+        """Remove the messages with timestamps from ``begin_s`` to ``end_s``, as if they were lost.
+        """
         kept = (self.stamp_s < begin_s) | (self.stamp_s >= end_s)
         self.stamp_s, self.late_s = self.stamp_s[kept], self.late_s[kept]
         self.values = self.values[kept]

@@ -46,7 +46,8 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` at each of its calls after ``AFTER_S`` of motion."""
+    """Return a callback that calls ``action`` at each call, from ``AFTER_S`` seconds of motion on.
+    """
     return lambda seconds: action() if seconds > AFTER_S else None
 
 

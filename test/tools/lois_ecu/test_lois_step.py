@@ -159,7 +159,7 @@ def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -
 def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> None:
     """The tuned gains meet the goals for overshoot and phase margin.
 
-    Tn compensates the slow pole. Td is 0 if there is not any goal for the phase margin.
+    Tn compensates the slow pole. Without a goal for the phase margin, Td is 0.
     """
     goals = Goals(overshoot=overshoot, phase_margin_deg=margin)
     found = tune(PLANT, LOOP, goals)
@@ -290,10 +290,10 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """The tool refuses a record whose times have overflowed.
+    """The times of a record have overflowed. The tool refuses the record.
 
     The manual gives 100 ns as the unit of these times. In this unit, the time between two ticks of
-    a usual wheel exceeds the largest number that a record can have.
+    a usual wheel is too large for a record.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
@@ -303,7 +303,8 @@ def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> No
 
 
 def test_whoever_has_gains_as_parameters_can_do_it() -> None:
-    """``calibrate step`` accepts a driver by its parameters for gains, not by its board's name."""
+    """``calibrate step`` accepts each driver that has parameters for gains, whatever its board is.
+    """
     values = PARAMETERS.check_all({})
     require_able("step", values)
     with pytest.raises(ToolError, match="the OmniBot's wheels"):
@@ -313,10 +314,10 @@ def test_whoever_has_gains_as_parameters_can_do_it() -> None:
 def test_a_robot_is_calibrated_from_its_records(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``calibrate step`` finds corrections, plants and gains, and sets them in the driver.
+    """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
 
-    The robot has marks that are 10 % off, unequal wheels, dead time and backlash. The driver's
-    calibration file may contain every parameter that is set.
+    ``calibrate step`` finds corrections, plants and gains, and sets them in the driver. The
+    driver's calibration file may contain each of these parameters.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
@@ -347,7 +348,7 @@ def test_a_robot_is_calibrated_from_its_records(
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
-    """The predicted control error of a step is larger with slow gains than with tuned gains."""
+    """A step with slow gains has a larger predicted control error than a step with tuned gains."""
     good = tune(PLANT, LOOP, Goals()).gains
     slow = PiGains(0.05, 2.0, 1.0)
     assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
