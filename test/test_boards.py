@@ -82,7 +82,9 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 
 @pytest.mark.parametrize("wrong", ["martha", "", 5, True, None, ["omnibot"]])
 def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: object) -> None:
-    """The parameter ``board`` has an unknown value, of any type. The error lists the known boards.
+    """The parameter ``board`` has an unknown value, of any type.
+
+    The error lists the known boards.
     """
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})

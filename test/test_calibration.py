@@ -99,7 +99,9 @@ def test_others_may_read_the_file(tmp_path: Path) -> None:
 
 
 def test_a_symbolic_link_stays_one(tmp_path: Path) -> None:
-    """The file is a symbolic link. A save changes the file to which it points, and the link stays.
+    """The file is a symbolic link.
+
+    A save changes the file to which it points, and the link stays.
     """
     path, link = tmp_path / "far" / "robot.yaml", tmp_path / "robot.yaml"
     link.symlink_to(path)

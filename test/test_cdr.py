@@ -101,7 +101,9 @@ def test_the_bytes_are_rclpys_for_any_values_and_frames(
 
 
 def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
-    """A robot with two wheels of radius 0.1 m drives 1 m forward. Both its joints turn by 10 rad.
+    """A robot with two wheels of radius 0.1 m drives 1 m forward.
+
+    Both its joints turn by 10 rad.
     """
     two = replace(
         MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS)),

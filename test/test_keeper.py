@@ -142,7 +142,9 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """The guard is suspended and cannot read that the driver ends. The driver does not wait for it.
+    """The guard is suspended and cannot read that the driver ends.
+
+    The driver does not wait for it.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

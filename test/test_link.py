@@ -29,8 +29,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> None:
-    """The reader thread itself delivers measurements, because a queue or a timer would add latency.
-    """
+    """The reader thread itself delivers measurements. A queue or a timer would add latency."""
     listener = Listener()
     link = link_to(board.path, listener, session())
     link.start()

@@ -63,7 +63,9 @@ def goal(
 def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     yaw_rad: float, length: float
 ) -> None:
-    """The length of a goal's quaternion does not change its yaw. Some senders do not normalize it.
+    """The length of a goal's quaternion does not change its yaw.
+
+    Some senders do not normalize it.
     """
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
     pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")

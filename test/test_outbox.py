@@ -47,7 +47,9 @@ class Held:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_everything_leaves_once_in_the_order_of_the_lock_and_one_at_a_time(seed: int) -> None:
-    """Six threads bring events and pause at random. Each event leaves once, and all leave in order.
+    """Six threads bring events and pause at random.
+
+    Each event leaves once, and all leave in order.
     """
     outbox, lock = Outbox(), threading.Lock()
     happened: list[int] = []

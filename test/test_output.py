@@ -29,7 +29,9 @@ def taken(pipe: int) -> None:
 
 
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
-    """A full disk refuses a line, which is lost. The next line is written when there is room again.
+    """A full disk refuses a line, which is lost.
+
+    The next line is written when there is room again.
     """
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the parameter table: it agrees with the promised names, the core and the parameter file.
+"""Tests of the parameter table.
+
+It agrees with the promised names, with the core and with the parameter file.
 """
 
 from pathlib import Path

@@ -155,7 +155,9 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user changes the wheel parameters while the robot stands. The joint angles do not change.
+    """The user changes the wheel parameters while the robot stands.
+
+    The joint angles do not change.
     """
     _, publishing = session_with(node)
     published: list[bytes] = []

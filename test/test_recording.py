@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``replay://``, which reads the recorded bytes of a line from a bag, and of its errors.
+"""Tests of ``replay://``, which reads the recorded bytes of a line from a bag.
+
+Many tests are of bags and options that are wrong.
 """
 
 import sys

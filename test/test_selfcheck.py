@@ -14,8 +14,7 @@ from omnibot_driver import selfcheck
 
 
 def adapter(root: Path, device: str, latency: str) -> Path:
-    """Make an imitation of sysfs with one adapter in the folder ``root``, and return that folder.
-    """
+    """Make an imitation of sysfs in the folder ``root``, with one adapter. Return the folder."""
     folder = root / "class/tty" / device / "device"
     folder.mkdir(parents=True)
     (folder / "latency_timer").write_text(latency)

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the stall detector: it finds stalls of the watchdog's thread, and commands from a stall.
+"""Tests of the stall detector.
+
+It finds stalls of the watchdog's thread, and commands that waited in a stall.
 """
 
 import pytest
@@ -146,7 +148,9 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """The sender's clock is wrong. Its commands are not fresh right after a stall, and fresh later.
+    """The sender's clock is wrong.
+
+    Its commands are not fresh right after a stall, and fresh later.
     """
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)

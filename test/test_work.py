@@ -88,13 +88,13 @@ def most_calls(
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 14), (DELTA, 9), (POSE, 9)])
 def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The decoder makes at most this number of calls for a read with the bytes of one tick."""
+    """The decoder makes at most ``bound`` calls for a read with the bytes of one tick."""
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 159), (POSE, 281)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
-    """The session needs at most this number of calls per tick, from the bytes to its events.
+    """The session needs at most ``bound`` calls per tick, from the bytes to its events.
 
     The link's calls for output and for the next wake-up are included.
     """
@@ -111,8 +111,7 @@ def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 
 @pytest.mark.parametrize(("kind", "bound"), [(IMU, 31), (DELTA, 58), (POSE, 150)])
 def test_no_more_than_it_did_stands_between_the_wire_and_an_imu(kind: int, bound: int) -> None:
-    """The session makes an IMU reading from the bytes of a read with at most this number of calls.
-    """
+    """The session makes an IMU reading from the bytes of a read with at most ``bound`` calls."""
     session = opened_session()
 
     def work(data: bytes, now: float) -> None:

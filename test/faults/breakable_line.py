@@ -44,7 +44,9 @@ def losing_bursts(rate: float, random: Random) -> Damage:
 
 
 def gaining(rate: float, random: Random) -> Damage:
-    """Return a damage that inserts bytes of any value, at each place with the probability ``rate``.
+    """Return a damage that inserts bytes of any value.
+
+    ``rate``: the probability that a byte is inserted at a place.
     """
 
     def damage(data: bytes) -> bytes:

@@ -27,7 +27,9 @@ SILENCE_S: Final = 1.0
 TRANSIT: Final = 200
 """Number of frames that may still be on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""A message is compared with this number of the next sent frames. If none equals it, it is wrong.
+"""A message is compared with this number of the next sent frames.
+
+If none equals it, it is wrong.
 """
 
 
@@ -98,8 +100,7 @@ def _compared(published: list[Key], sent: list[Key]) -> tuple[int, int]:
 
 
 def is_busy(rig: PiecesRig, ticks: int = TICKS) -> None:
-    """Drive the robot on a busy computer, and compare all messages with the frames that were sent.
-    """
+    """Drive the robot on a busy computer, and compare all messages with the sent frames."""
     rig.drive()
     before = max(0, len(rig.line.sent) - TRANSIT)
     imu, odom, line = len(rig.imu), len(rig.odom), len(rig.driver.lines)

@@ -150,7 +150,9 @@ def board_reboots(rig: Rig) -> None:
 
 
 def board_reboots_while_somebody_drives_on(rig: Rig) -> None:
-    """Reboot the board while commands continue. They must move the robot again only after the boot.
+    """Reboot the board while commands continue.
+
+    They must move the robot again only after the boot.
     """
     rig.drive()
     rig.reboot_board()

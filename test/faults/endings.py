@@ -79,7 +79,9 @@ class Ending:
     read: bool = False
 
     def __call__(self, rig: Rig) -> None:
-        """End the driver while the robot drives. Check the robot, the exit code and the last bytes.
+        """End the driver while the robot drives.
+
+        Check the robot, the exit code and the last bytes.
         """
         rig.drive()
         self.end(rig)

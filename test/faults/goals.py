@@ -87,8 +87,7 @@ def hang(rig: GoalRig) -> int:
 
 
 def discards(event: Callable[[GoalRig], int], allowed_s: float, rig: GoalRig) -> None:
-    """Check that the event discards the goal, so that the robot rests during and after the event.
-    """
+    """Check that the event discards the goal: the robot must rest during and after the event."""
     rig.drive()
     rig.wait_ticks(50)
     since = event(rig)

@@ -59,7 +59,9 @@ def other_type(rig: Rig) -> None:
 
 
 def flood_of_releases(rig: Rig) -> None:
-    """Publish ``false`` on ``estop`` 1000 times a second. Only the service may release the e-stop.
+    """Publish ``false`` on ``estop`` 1000 times a second.
+
+    Only the service may release the e-stop.
     """
     publisher = rig.probe.publisher(Bool, "estop")
     rig.drive()

@@ -34,7 +34,9 @@ class NetworkRig(Rig):
 
 
 class GoalRig(Rig):
-    """A rig whose board is under position control. It drives to goals and does not obey velocities.
+    """A rig whose board is under position control.
+
+    It drives to goals and does not obey velocities.
     """
 
     def __init__(self, folder: Path, kind: RigBoard, **options: Any) -> None:

@@ -258,8 +258,7 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """Expect a fresh command to move the robot, and expect the robot to stop when commands end.
-        """
+        """Expect a fresh command to move the robot. Expect it to stop when the commands end."""
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the fault campaign must know of each kind of board. The values are in ``<board>_board.py``.
+"""What the fault campaign must know of each kind of board.
+
+The values are in ``<board>_board.py``.
 """
 
 from collections.abc import Callable, Iterable, Mapping

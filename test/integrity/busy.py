@@ -75,7 +75,9 @@ def read(
     most: Callable[[], int],
     delay_s: Callable[[Random, float], float] = delay_s,
 ) -> Chunks:
-    """Return the chunks of a late reader. One read takes at most ``most()`` of the waiting bytes.
+    """Return the chunks of a late reader.
+
+    One read takes at most ``most()`` of the waiting bytes.
     """
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
@@ -92,7 +94,9 @@ def read(
 
 
 def few_bytes_straddling(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes, each when its last byte arrives. A piece may contain a pause.
+    """Deliver pieces of 1 to 8 bytes, each when its last byte arrives.
+
+    A piece may contain a pause.
     """
     chunks, at = [], 0
     while at < len(received.times_s):
@@ -113,7 +117,9 @@ def in_parts(received: Received, random: Random) -> Chunks:
 
 
 def each_by_itself(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes. The delay of each piece is independent of the other delays.
+    """Deliver pieces of 1 to 8 bytes.
+
+    The delay of each piece is independent of the other delays.
     """
     chunks: Chunks = []
     now = 0.0

@@ -49,7 +49,9 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the course that continues this one if the board shows ``shown`` from this tick on.
+        """Return the course that continues this one when the board shows another state.
+
+        The board shows ``shown`` from ``tick`` on.
         """
         other = self._others.get((tick, shown))
         if other is None:

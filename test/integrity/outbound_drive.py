@@ -106,7 +106,9 @@ class Scene:
 
 
 def rehearse(scene: Scene, history: History) -> list[Write]:
-    """Run the session through a scene. Return everything that is written after the port was opened.
+    """Run the session through a scene.
+
+    Return everything that is written after the port was opened.
     """
     return [write for write in _Rehearsal(scene).run(dict(history)) if write.at_s < scene.ends_s]
 

@@ -123,7 +123,9 @@ class Judge:
             self.score.frames += frames
 
     def frame(self, frame: ControlFrame, at_s: float) -> str:
-        """Record a control frame that the board understands. Return the name of its error, or "".
+        """Record a control frame that the board understands.
+
+        Return the name of its error, or "".
         """
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)

@@ -91,7 +91,9 @@ def _estop(active: bool) -> Callable[[Session, float], object]:
 
 
 def _common(random: Random) -> dict[str, object]:
-    """Draw settings of a scene: usual ones, or sometimes another scale, rate or acceleration limit.
+    """Draw settings of a scene.
+
+    Sometimes the scale, the rate or the acceleration limit is unusual.
     """
     return {
         "linear_scale": random.choice((70.0, 70.0, 233.0)),

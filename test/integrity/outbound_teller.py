@@ -51,7 +51,9 @@ class Teller:
         self._reboot()
 
     def moves_as(self, mode: int, words: Triple) -> None:
-        """Store the twist that this motion frame commands. The robot has this twist while it moves.
+        """Store the twist that this motion frame commands.
+
+        The robot has this twist while it moves.
         """
         a, b, c = words
         if self._goals:

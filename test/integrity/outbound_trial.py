@@ -301,7 +301,9 @@ class Trial:
         self._understood = self._course.understood(self._board.receiver)
 
     def _example(self, what: str) -> None:
-        """Record this error and the bytes that led to it. A score keeps only the first few errors.
+        """Record this error and the bytes that led to it.
+
+        A score keeps only the first few errors.
         """
         examples = self._judge.score.examples
         if len(examples) < EXAMPLES:

@@ -21,7 +21,9 @@ SECONDS, SEEDS = 11.0, 2
 
 @pytest.fixture(scope="module")
 def scores() -> Scores:
-    """Return the scores of every scenario, fault and chunking. Each bound has about 16,000 frames.
+    """Return the scores of every scenario, fault and chunking.
+
+    Each bound has about 16,000 frames.
     """
     jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
     total: Scores = {}
@@ -50,7 +52,9 @@ def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
 
 
 def test_the_judge_finds_what_the_plain_parser_makes_up() -> None:
-    """The stream is damaged, and the plain parser returns many false frames. The judge finds them.
+    """The stream is damaged, and the plain parser returns many false frames.
+
+    The judge finds them.
     """
     truth = generate(SCENARIOS["gyro stuck at (-6, -5, -4)"], 1, 20.0)
     received = receive(truth, FAULTS["1 byte in 1,000 lost"], Random(1))

@@ -11,7 +11,9 @@ from rough_drive import RoughDrive
 def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
     seed: int, delta_period_s: float
 ) -> None:
-    """A robot obeys on a slope, with slip and delays, among people. The monitor does not stop it.
+    """A robot obeys on a slope, with slip and delays, among people.
+
+    The monitor does not stop it.
     """
     outcome = RoughDrive(seed, delta_period_s).go(60.0)
     assert outcome.trips == []
@@ -19,7 +21,9 @@ def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
 
 
 def test_the_rough_drive_would_notice() -> None:
-    """The wheels of a robot turn more than twice as fast as commanded. The monitor stops the robot.
+    """The wheels of a robot turn more than twice as fast as commanded.
+
+    The monitor stops the robot.
     """
     drive = RoughDrive(0)
     drive.board.settings = drive.board.settings.__class__(linear_scale=30.0, running=True)

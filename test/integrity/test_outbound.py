@@ -51,7 +51,9 @@ def shown(score: Score) -> str:
 
 @pytest.mark.parametrize("scene", ENDED)
 def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
-    """The line is undamaged. Receivers understand only what was sent, and the robot stops in time.
+    """The line is undamaged.
+
+    Receivers understand only what was sent, and the robot stops in time.
     """
     course = Course(ENDED[scene](Random(scene)))
     score = on_all_receivers(course, GOOD)
@@ -61,7 +63,9 @@ def test_nothing_is_wrong_on_a_good_line(scene: str) -> None:
 
 @pytest.mark.parametrize("scene", [*ENDED, "drive 20"])
 def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
-    """One script of each scene is run. Every receiver keeps the limits that a short run can check.
+    """One script of each scene is run.
+
+    Every receiver keeps the limits that a short run can check.
     """
     scores, _ = one(0.05, (scene, 0), LOSSES)
     for fault in LOSSES:

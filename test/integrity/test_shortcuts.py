@@ -103,7 +103,9 @@ pieces = st.sampled_from(
 @settings(max_examples=200)
 @given(st.lists(st.tuples(pieces, st.sampled_from([0.0, 0.001, 0.01, 0.2])), min_size=1))
 def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, float]]) -> None:
-    """Pieces of streams and noise arrive in any order, with any pauses. Shortcuts change no result.
+    """Pieces of streams and noise arrive in any order, with any pauses.
+
+    Shortcuts change no result.
     """
     now, chunks = 0.0, []
     for data, pause_s in arrivals:
@@ -182,7 +184,9 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The readings jump, are odd for a moment, and jump back. The quick loop handles all of this.
+    """The readings jump, are odd for a moment, and jump back.
+
+    The quick loop handles all of this.
     """
     rest = ImuFrame((120, -80, -16384), (1, 2, 3))
     shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
@@ -199,7 +203,9 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder can restore its state after any frame. It weighs at most 6 frames again for this.
+    """The decoder can restore its state after any frame.
+
+    It weighs at most 6 frames again for this.
     """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)

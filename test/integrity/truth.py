@@ -85,8 +85,7 @@ WITH_TEXTS = "paused now and then"
 
 
 def generate(scenario: Scenario, seed: int, seconds: float) -> Truth:
-    """Return what the board sends for ``seconds`` in this scenario, beginning at a random moment.
-    """
+    """Return what the board sends for ``seconds`` in this scenario, from a random moment on."""
     random = Random(f"{scenario} {seed}")
     gauss = random.gauss
     bias = [random.uniform(-6, 6) for _ in range(3)]

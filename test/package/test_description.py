@@ -141,8 +141,7 @@ def test_the_imu_hangs_upside_down() -> None:
 
 
 def test_another_robot_is_described_by_arguments() -> None:
-    """Arguments describe a bigger robot with its IMU at another place, so no new file is necessary.
-    """
+    """Arguments describe a bigger robot with its IMU at another place. No new file is necessary."""
     robot = description(
         wheel_radius="0.05",
         base_radius="0.2",

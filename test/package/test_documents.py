@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the documents: generated parts are current, links and commands exist, the site is built.
+"""Tests of the documents and of the site that is built from them.
+
+Generated parts are current, and all links and commands exist.
 """
 
 import re

@@ -25,7 +25,9 @@ SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
 def text_of(node: ast.AST) -> str:
-    """Return the text of a string node, with gaps for inserted values. For other nodes, return "".
+    """Return the text of a string node, with gaps for inserted values.
+
+    For other nodes, return "".
     """
     if isinstance(node, ast.JoinedStr):
         parts = [part.value if isinstance(part, ast.Constant) else GAP for part in node.values]

@@ -165,7 +165,9 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 
 
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
-    """``colcon test`` runs the tests, because setup.py names pytest. Otherwise it would run none.
+    """``colcon test`` runs the tests, because setup.py names pytest.
+
+    Otherwise it would run none.
     """
     one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]

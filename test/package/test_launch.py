@@ -155,7 +155,9 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 
 
 class Stub(ModuleType):
-    """A substitute for a module of launch. A call of any function in it only records its arguments.
+    """A substitute for a module of launch.
+
+    A call of any function in it only records its arguments.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -294,7 +296,9 @@ def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
 
 @needs_launch
 def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]) -> None:
-    """The filter publishes the transform, and the driver does not. All nodes are in one namespace.
+    """The filter publishes the transform, and the driver does not.
+
+    All nodes are in one namespace.
     """
     started = launch("ekf.launch.py", "namespace:=robot1", "frame_prefix:=robot1/")
     assert set(started) == {"driver", "ekf_node", "robot_state_publisher", "xacro"}

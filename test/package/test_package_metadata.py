@@ -149,7 +149,9 @@ def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any
 
 
 def test_only_tools_need_what_an_extra_brings() -> None:
-    """Only the tools import libraries of the extras. The one exception is the replay with rosbags.
+    """Only the tools import libraries of the extras.
+
+    The one exception is the replay with rosbags.
     """
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {
@@ -222,7 +224,9 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 
 
 def test_the_simulator_shares_nothing_with_the_core() -> None:
-    """The simulator uses no code of the driver. So one misreading of a manual cannot affect both.
+    """The simulator uses no code of the driver.
+
+    So one misreading of a manual cannot affect both.
     """
     shared = {
         f"{file.relative_to(ROOT)}: {name}"

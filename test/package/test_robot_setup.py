@@ -80,8 +80,7 @@ def unit_settings() -> dict[str, list[str]]:
 
 
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
-    """The unit starts the driver without a shell between, so that signals reach the driver itself.
-    """
+    """The unit starts the driver without a shell between, so signals reach the driver itself."""
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
     assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)

@@ -181,10 +181,10 @@ def compare(
 def trace(
     sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
 ) -> list[int | None]:
-    """Return for each message the index of the IMU frame with its values, or None if there is none.
+    """Return the index of the IMU frame for each message, or None if no frame has its values.
 
-    Only frames after the previous match are searched, the nearest in time first. Noise makes each
-    frame different from all others.
+    The noise makes each frame different from all others. A message's frame is searched after the
+    frame of the previous message. The frame that is nearest in time is tried first.
     """
     found: list[int | None] = []
     at, at_s = -1, stamps_s[0]

@@ -24,7 +24,9 @@ from pathlib import Path
 from typing import NoReturn
 
 LARGEST_REQUEST = 1 << 17
-"""Largest size of a request, in bytes. A request has the arguments and the environment of a driver.
+"""Largest size of a request, in bytes.
+
+A request has the arguments and the environment of a driver.
 """
 
 

@@ -117,8 +117,7 @@ def wire(drive: Drive, topic: str) -> list[bytes]:
 
 
 def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
-    """A raw topic has one message for each read of the port, and another topic one for each write.
-    """
+    """One raw topic has a message for each read of the port, and another one for each write."""
     received, sent = (wire(drive, topic) for topic in RAW)
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)

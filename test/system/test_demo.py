@@ -40,7 +40,9 @@ poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
 
 @given(poses, st.integers(0, 1000))
 def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
-    """The robot may have any pose. The demo always commands motion, at most at its maximum speed.
+    """The robot may have any pose.
+
+    The demo always commands motion, at most at its maximum speed.
     """
     _, twist = square.steer(pose, leg)
     assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
@@ -287,7 +289,9 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
 
 
 def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The demo runs on a terminal. The monitor shows the driver, and the result follows at the end.
+    """The demo runs on a terminal.
+
+    The monitor shows the driver, and the result follows at the end.
     """
     monkeypatch.setenv("DEMO_SECONDS", "20")  # the monitor may find the driver or draw late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
@@ -329,7 +333,9 @@ def test_who_ends_it_before_it_drives_is_told_so() -> None:
 
 
 def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
-    """The driver is killed during the demo. The demo says so, exits with 1 and ends the simulator.
+    """The driver is killed during the demo.
+
+    The demo says so, exits with 1 and ends the simulator.
     """
     with running_demo() as (process, mark):
         read_until_it_drives(process)

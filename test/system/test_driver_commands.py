@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of commands that another process sends over real DDS, and that the driver obeys or refuses.
+"""Tests of commands that another process sends over real DDS.
+
+The driver obeys or refuses them.
 """
 
 import math
@@ -130,7 +132,9 @@ def test_a_zero_twist_is_the_stop_frame(
 
 
 def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
-    """A user commands a wheel to turn at 10 rad/s. The driver sends 20 LSB for a radius of 29 mm.
+    """A user commands a wheel to turn at 10 rad/s.
+
+    The driver sends 20 LSB for a radius of 29 mm.
     """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=[10.0, -10.0, 0.0]))

@@ -70,7 +70,9 @@ def wait_until(predicate: Callable[[], object]) -> None:
 def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
     board: PtyBoard, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """The driver dies while the robot drives. The guard stops the robot without an emergency stop.
+    """The driver dies while the robot drives.
+
+    The guard stops the robot without an emergency stop.
     """
     driving(probe, board)
     assert driver.end(number) == -number
@@ -229,7 +231,9 @@ def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_a
 def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """A guard is killed. The driver logs this and starts another guard, which also stops the robot.
+    """A guard is killed.
+
+    The driver logs this and starts another guard, which also stops the robot.
     """
     with probe.commanding(0.3):
         (first,) = driver.guards()

@@ -181,7 +181,9 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     """The diagnostics have seven statuses, show the expected IMU rate, and count no faults."""
 
     def keeps_pace() -> bool:
-        """Return whether the IMU rate is right. After a stall it is first too low, then too high.
+        """Return whether the IMU rate is right.
+
+        After a stall it is first too low, then too high.
         """
         if (status := robot.status("Stream")) is None:
             return False

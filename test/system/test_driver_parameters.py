@@ -42,7 +42,9 @@ Start = Callable[..., Any]
 def test_wrong_parameters_end_the_start_with_a_sentence(
     start_driver: Start, parameters: dict[str, object], message: str
 ) -> None:
-    """A parameter is wrong. The driver prints the reason without a traceback and exits with code 2.
+    """A parameter is wrong.
+
+    The driver prints the reason without a traceback and exits with code 2.
     """
     driver: Driver = start_driver("/dev/null", **parameters)
     driver.wait_for_line(message)
@@ -91,7 +93,9 @@ runpy.run_module("omnibot_driver.driver", run_name="__main__")
 
 @pytest.mark.parametrize("arguments", [["-h"], ["--help"], ["--ros-args", "-p", "x:=1", "--help"]])
 def test_help_tells_how_parameters_are_given(arguments: list[str]) -> None:
-    """``--help`` explains how to give parameters. It works without any library, with exit code 0.
+    """``--help`` explains how to give parameters.
+
+    It works without any library, with exit code 0.
     """
     command = [sys.executable, "-c", WITHOUT_ROS, *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)

@@ -160,7 +160,9 @@ def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: P
 
 
 def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBoard) -> None:
-    """A user latches the e-stop during a drive and releases it. Only a new command moves the robot.
+    """A user latches the e-stop during a drive and releases it.
+
+    Only a new command moves the robot.
     """
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     drive(probe, board)
@@ -244,7 +246,9 @@ def test_estop_answers_while_a_reset_waits(
 def test_a_second_request_is_refused_while_one_is_under_way(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A user calls ``~/pause`` during a reset. The driver refuses, and its message names the reset.
+    """A user calls ``~/pause`` during a reset.
+
+    The driver refuses, and its message names the reset.
     """
     board = start_board(boot_time_s=3.0, running=True)
     probe: Probe = probe_of(start_driver(board.path))
@@ -259,7 +263,9 @@ def test_a_second_request_is_refused_while_one_is_under_way(
 
 
 def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
-    """A user calls ``~/reset_odometry`` after a drive. The present pose becomes the origin of odom.
+    """A user calls ``~/reset_odometry`` after a drive.
+
+    The present pose becomes the origin of odom.
     """
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
@@ -272,7 +278,9 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
 def test_services_answer_with_a_reason_when_the_board_is_silent(
     start_driver: Start, probe_of: Start, silent_port: str, kind: type, service: str
 ) -> None:
-    """The board is silent. ``~/start`` and ``~/pause`` fail with a message that says what to check.
+    """The board is silent.
+
+    ``~/start`` and ``~/pause`` fail with a message that says what to check.
     """
     driver: Driver = start_driver(silent_port)
     probe: Probe = probe_of(driver)
@@ -283,7 +291,9 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
-    """The port does not exist. Start, pause and reset fail at once, but the e-stop still latches.
+    """The port does not exist.
+
+    Start, pause and reset fail at once, but the e-stop still latches.
     """
     probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
     for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:

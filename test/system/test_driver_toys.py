@@ -83,7 +83,9 @@ def start_toy(start_driver: Start, toy: Toy, **parameters: object) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, toy: Toy) -> Iterator[None]:
-    """Command the robot at 10 Hz until the context ends. The context begins when the robot moves.
+    """Command the robot at 10 Hz until the context ends.
+
+    The context begins when the robot moves.
     """
     with probe.commanding(0.2):
         toy.wait_for(lambda robot: not robot.stands)
@@ -168,7 +170,9 @@ def test_wheels_have_the_boards_number_and_names(
 def test_the_raw_bytes_of_each_line_have_a_topic(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A board has two lines, and ``publish_raw`` is true. Each line has raw topics with its name.
+    """A board has two lines, and ``publish_raw`` is true.
+
+    Each line has raw topics with its name.
     """
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     probe: Probe = probe_of(start_toy(start_driver, toy, publish_raw=True))

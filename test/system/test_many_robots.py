@@ -73,7 +73,9 @@ def test_each_speaks_of_its_own_frames(fleet: list[Robot]) -> None:
 
 
 def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
-    """Two of three robots get commands. One drives forward, one backward, and the third one rests.
+    """Two of three robots get commands.
+
+    One drives forward, one backward, and the third one rests.
     """
     forward, still, backward = fleet
     speeds = {forward.name: 0.3, backward.name: -0.3}

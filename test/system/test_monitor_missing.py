@@ -104,7 +104,9 @@ def test_topics_that_are_missing_are_named(fake: Probe, capsys: pytest.CaptureFi
 
 
 def test_two_drivers_of_one_name_are_told(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
-    """Two drivers have the same name. The monitor reports this, because its output would mix both.
+    """Two drivers have the same name.
+
+    The monitor reports this, because its output would mix both.
     """
     fake.node.create_publisher(String, "omnibot_driver/state", LATCHED)
     measure(fake, Odometry())

@@ -103,7 +103,9 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def seen(graph: Node, home: str) -> Rules:
-    """Return the names that the driver uses, as the ROS graph shows them. The keys are qualifiers.
+    """Return the names that the driver uses, as the ROS graph shows them.
+
+    The keys are qualifiers.
     """
 
     def names(found: list[tuple[str, list[str]]]) -> set[str]:

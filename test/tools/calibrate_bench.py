@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated robot for calibrations: a session and a board in simulated time, without a ROS node.
-"""
+"""A robot in simulated time for calibrations: a session and a board, without a ROS node."""
 
 from collections.abc import Callable
 from typing import Any

@@ -67,8 +67,7 @@ class Rig:
 def rig(
     folder: Path, parameters: dict[str, object] | None = None, **settings: Any
 ) -> Iterator[Rig]:
-    """Run a simulated board with ``settings`` and a driver with ``parameters``, and yield the rig.
-    """
+    """Run a simulated board with ``settings`` and a driver with ``parameters``. Yield the rig."""
     board = SimulatedBoard(BoardSettings(running=True, **settings))
     with (
         pytest.MonkeyPatch.context() as patch,

@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 
 
 def message(kind: str, *values: Any) -> Any:
-    """Return a ROS message whose fields have these values, in order. A tuple is a nested message.
+    """Return a ROS message whose fields have these values, in order.
+
+    A tuple is a nested message.
     """
     fields = TYPES.fielddefs[kind][1]
     filled = []
@@ -51,7 +53,9 @@ class Topic:
         return Series(arrived_s[order], self.stamp_s[order], self.values[order])
 
     def drop(self, begin_s: float, end_s: float) -> None:
-        """Remove the messages with timestamps from ``begin_s`` to ``end_s``, as if they were lost.
+        """Remove the messages from ``begin_s`` to ``end_s``, as if they were lost.
+
+        The times are timestamps, in s.
         """
         kept = (self.stamp_s < begin_s) | (self.stamp_s >= end_s)
         self.stamp_s, self.late_s = self.stamp_s[kept], self.late_s[kept]

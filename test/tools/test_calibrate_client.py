@@ -24,7 +24,9 @@ from omnibot_driver.tools.needs import ToolError
 def test_a_wrong_namespace_names_the_drivers_there_are(
     rigged: Rig, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user gives a wrong namespace. The tool names the running drivers and exits with code 1.
+    """The user gives a wrong namespace.
+
+    The tool names the running drivers and exits with code 1.
     """
     monkeypatch.setattr(client, "FOUND_WITHIN_S", 4.0)
     assert main(["imu", "--yes", "--namespace", "/nowhere/"]) == 1
@@ -47,7 +49,9 @@ def test_two_drivers_in_one_namespace_move_neither(robot: Robot, rigged: Rig) ->
 def test_a_driver_of_another_version_is_told(
     rigged: Rig, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The driver lacks one of the tool's parameters. The message says that their versions differ.
+    """The driver lacks one of the tool's parameters.
+
+    The message says that their versions differ.
     """
     newer = Parameter("of_tomorrow", 1, "", "")
     table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})
@@ -57,7 +61,9 @@ def test_a_driver_of_another_version_is_told(
 
 
 def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
-    """The tool sets a value out of range, and the driver refuses it. The error names the parameter.
+    """The tool sets a value out of range, and the driver refuses it.
+
+    The error names the parameter.
     """
     with pytest.raises(ToolError, match="the driver refuses linear_scale: "):
         robot.set_parameters({"linear_scale": -1.0})

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``calibrate commission`` with a real driver, and a simulated user who sees the wheels.
+"""Tests of ``calibrate commission`` with a real driver.
+
+A simulated user sees the wheels turn and answers the questions.
 """
 
 import math
@@ -100,7 +102,9 @@ class Deaf:
 
 
 def walk(*answers: str) -> Found:
-    """Run the part of the procedure for wheels and axes with these answers. Return what it finds.
+    """Run the part of the procedure for wheels and axes with these answers.
+
+    Return what it finds.
     """
     left = list(answers)
     found = Found(before=Deaf.parameters)
@@ -133,7 +137,9 @@ def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:
 
 
 def test_a_single_reversed_wheel_is_nothing_that_a_parameter_mends() -> None:
-    """A single wheel is reversed. The error names the wheel, because its wiring must be corrected.
+    """A single wheel is reversed.
+
+    The error names the wheel, because its wiring must be corrected.
     """
     with pytest.raises(ToolError, match="wheel B turns in the opposite direction to the other two"):
         walk("+00", "0-0", "00+")

@@ -108,8 +108,7 @@ def test_a_broken_pipe_loses_nothing(
 def test_what_is_to_be_copied_stands_on_one_line(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Text for copying is on one line, because a shell would read a wrapped path as two arguments.
-    """
+    """Text for copying is on one line. A shell would read a wrapped path as two arguments."""
     folder = tmp_path / ("a_long_name_" * 12)
     assert ending(folder=folder) == 0
     assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()

@@ -95,7 +95,9 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
 
 
 def test_a_bias_that_walks_is_known_less_well() -> None:
-    """The bias drifts during a rest of ten minutes. The claimed uncertainty covers its last value.
+    """The bias drifts during a rest of ten minutes.
+
+    The claimed uncertainty covers its last value.
     """
     scores = []
     for seed in range(12):
@@ -140,7 +142,9 @@ def test_readings_that_say_nothing_are_turned_away() -> None:
 
 
 def test_a_robot_that_moves_is_not_at_rest() -> None:
-    """The tool rejects a rest during which the odometry moves or the gyro's rate exceeds any bias.
+    """The robot should rest, but the odometry moves, or the gyro's rate exceeds any bias.
+
+    The tool rejects such a rest.
     """
     still(np.zeros(3))(log_of(sensor(3.0)))
     with pytest.raises(ToolError, match="its wheels turn"):

@@ -46,8 +46,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` at each call, from ``AFTER_S`` seconds of motion on.
-    """
+    """Return a callback that calls ``action`` at each of its calls after ``AFTER_S`` seconds."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -248,7 +247,9 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A topic is silent after 0.3 s without data. Only the topics that a motion needs are checked.
+    """A topic is silent after 0.3 s without data.
+
+    Only the topics that a motion needs are checked.
     """
     monkeypatch.setattr(listener, "LOST_S", LOST_S)
     heard_s = {listener.IMU: 10.0, listener.ODOMETRY: 9.9}

@@ -112,8 +112,7 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """A log without a steady speed is an error, and also a robot that drives against its commands.
-    """
+    """The log has no steady speed, or the robot drives against its commands. This is an error."""
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):

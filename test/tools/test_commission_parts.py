@@ -136,7 +136,9 @@ def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
 ) -> None:
-    """The sensor has any mounting. It is found exactly, whatever the angles of the two tilts are.
+    """The sensor has any mounting.
+
+    It is found exactly, whatever the angles of the two tilts are.
     """
     planted = rotation(roll, pitch, yaw)
     found = mounting(*postures(planted, nose_rad, left_rad))
@@ -153,7 +155,9 @@ def test_angles_are_those_of_a_description(roll: float, pitch: float, yaw: float
 
 @pytest.mark.parametrize("pitch", [math.pi / 2, -math.pi / 2])
 def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
-    """The pitch is 90°, so roll and yaw have the same axis. One of the many solutions is returned.
+    """The pitch is 90°, so roll and yaw have the same axis.
+
+    One of the many solutions is returned.
     """
     made = rotation(0.3, pitch, 0.4)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)

@@ -106,7 +106,9 @@ def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
 
 
 def test_the_estop_is_released_by_two_keys() -> None:
-    """The key R asks whether to release the e-stop. The key y confirms, and any other key cancels.
+    """The key R asks whether to release the e-stop.
+
+    The key y confirms, and any other key cancels.
     """
     assert press("R", "y").asked == ["release"]
     answers = ("n", "enter", "escape", "R", "w")
@@ -166,7 +168,9 @@ def test_who_looks_elsewhere_does_not_steer() -> None:
 
 
 def test_nothing_in_a_message_is_markup() -> None:
-    """A message has brackets. The dashboard shows them unchanged and does not format the message.
+    """A message has brackets.
+
+    The dashboard shows them unchanged and does not format the message.
     """
     robot = FakeRobot()
     robot.shown = view(said="[/bold] [red", driver="/[b]")

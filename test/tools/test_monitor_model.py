@@ -22,7 +22,9 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 
 @given(st.floats(0.5, 120.0), st.floats(2.0, 30.0), st.floats(0.0, 1e6))
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
-    """Messages arrive at a constant rate. The measured rate is right within one message per window.
+    """Messages arrive at a constant rate.
+
+    The measured rate is right within one message per window.
     """
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):

@@ -28,7 +28,9 @@ def commands(dead_man: DeadMan, since_s: float, ticks: int) -> list[BodyTwist | 
 
 @given(st.lists(st.tuples(keys, st.floats(0.0, ASLEEP_S - 0.01)), min_size=1, max_size=20))
 def test_nobody_moves_longer_than_the_last_key_allows(presses: list[tuple[str, float]]) -> None:
-    """The motion ends with ``ZEROS`` zero commands, at the latest ``FIRST_S`` after the last key.
+    """The motion ends at the latest ``FIRST_S`` seconds after the last key.
+
+    The monitor then sends ``ZEROS`` zero commands.
     """
     dead_man, now_s = DeadMan(), 0.0
     for key, wait_s in presses:
@@ -55,7 +57,9 @@ def test_a_held_key_moves_without_a_break(key: str, delay_s: float, every_s: flo
 
 
 def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
-    """After a single press, the motion ends after 0.6 s. After a repetition, it ends after 0.3 s.
+    """After a single press, the motion ends after 0.6 s.
+
+    After a repetition, it ends after 0.3 s.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)
@@ -117,7 +121,9 @@ def test_who_has_not_steered_commands_nothing() -> None:
     ],
 )
 def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> None:
-    """Each key commands its direction: x is forward, y is left, and a positive turn is to the left.
+    """Each key commands its direction.
+
+    In a command, x is forward, y is left, and left turns are positive.
     """
     dead_man = DeadMan()
     dead_man.press(key, 0.0)
@@ -127,7 +133,9 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """The user changes the speed. It stays between a tenth of the driver's limits and the limits.
+    """The user changes the speed.
+
+    It stays between a tenth of the driver's limits and the limits.
     """
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)

@@ -128,7 +128,9 @@ def test_the_picture_of_a_square_is_a_square() -> None:
     [(0.0, "→"), (math.pi / 2, "↑"), (math.pi, "←"), (-math.pi / 4, "↘"), (20 * math.pi, "→")],
 )
 def test_the_robot_points_where_it_looks(yaw_rad: float, arrow: str) -> None:
-    """An arrow in the plot shows the robot's heading. In the plot, x is to the right and y is up.
+    """An arrow in the plot shows the robot's heading.
+
+    In the plot, x is to the right and y is up.
     """
     assert any(arrow in row for row in draw_path([], 10, 5, Pose(1.0, 1.0, yaw_rad)).rows)
 

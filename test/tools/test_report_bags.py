@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that the report reads bags of all storage formats without ROS, and rejects unreadable ones.
+"""Tests of bags for the report: it reads every storage format without ROS.
+
+It rejects what it cannot read.
 """
 
 import os
@@ -70,7 +72,9 @@ def test_a_bag_of_any_kind_tells_the_same(
 def test_a_single_file_of_a_bag_is_enough(
     drive: Drive, tmp_path: Path, plugin: StoragePlugin
 ) -> None:
-    """A killed recorder has not written metadata.yaml. The report reads the bag's file without it.
+    """A killed recorder has not written metadata.yaml.
+
+    The report reads the bag's file without it.
     """
     (file,) = (
         file
@@ -173,7 +177,9 @@ def test_nothing_but_nan_is_reported_on(
 def test_a_place_that_cannot_be_written_is_told(
     drive: Drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A file has the name of the output folder, so the folder cannot be made. The report says so.
+    """A file has the name of the output folder, so the folder cannot be made.
+
+    The report says so.
     """
     (tmp_path / "out").write_text("taken")
     assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)

@@ -51,7 +51,9 @@ def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None
 
 
 def test_a_long_gap_is_worse(drive: Drive) -> None:
-    """The odometry has a gap of 1 s. Because it is longer than 0.5 s, its level is BAD, not WARN.
+    """The odometry has a gap of 1 s.
+
+    Because it is longer than 0.5 s, its level is BAD, not WARN.
     """
     drive.odom.drop(8.0, 9.0)
     assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
@@ -189,7 +191,9 @@ def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
 
 
 def test_numbers_that_are_none_are_counted_and_do_no_harm(drive: Drive) -> None:
-    """Some messages have NaN or infinity. The report counts and omits them, and judges all others.
+    """Some messages have NaN or infinity.
+
+    The report counts and omits them, and judges all others.
     """
     drive.imu.values[100:103, 4] = np.nan
     drive.odom.values[50, 0] = np.inf
@@ -219,7 +223,9 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
-    """The report gives the worst level of each status, its message, and how often it was reported.
+    """For each status of the diagnostics, the report gives the worst level and its message.
+
+    It also says how often this was reported.
     """
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))

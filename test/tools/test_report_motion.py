@@ -192,7 +192,9 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
 
 
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
-    """The pose jumps by 0.5 m, which the twist does not explain. The level of this finding is BAD.
+    """The pose jumps by 0.5 m, which the twist does not explain.
+
+    The level of this finding is BAD.
     """
     drive.odom.values[300:, 0] += 0.5
     (leap,) = troubles(drive)
@@ -202,7 +204,9 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
 
 
 def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None:
-    """The pose begins again at zero. The report notes this, and the jump is not a driven distance.
+    """The pose begins again at zero.
+
+    The report notes this, and the jump is not a driven distance.
     """
     way = said(drive, "Odometry", "Driven").text.split(",")[0]
     drive.odom.values[450:, :3] = 0.0
@@ -244,7 +248,9 @@ def two_wheels() -> Recorder:
 
 
 def test_wheels_have_the_names_and_the_number_of_their_joints() -> None:
-    """A steering joint is not a wheel. A wheel command with a wrong number of values becomes NaN.
+    """A steering joint is not a wheel.
+
+    A wheel command with a wrong number of values becomes NaN.
     """
     log = two_wheels().log()
     assert log.wheels == JOINTS[:2]

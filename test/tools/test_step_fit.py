@@ -139,7 +139,9 @@ def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
 
 
 def test_other_gains_must_be_told() -> None:
-    """The firmware has other gains than the manual's. Only a fit with the firmware's gains is good.
+    """The firmware has other gains than the manual's.
+
+    Only a fit with the firmware's gains is good.
     """
     gains = WheelGains(feed_forward=15.0, proportional=40.0, integral=5.0)
     steps = steps_of(*steps_to_and_fro(MotorConstants(), gains), 0, LEVELS)

@@ -1,7 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the calculated control loop of a wheel, of its models, and of the gains chosen for it.
-"""
+"""Tests of the calculated control loop of a wheel, its models, and the gains chosen for it."""
 
 import numpy as np
 import pytest
@@ -148,7 +147,9 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 @settings(max_examples=5)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
-    """The proposed gains keep the limits of Ms and overshoot, and make the control errors smaller.
+    """The proposed gains keep the limits of Ms and overshoot.
+
+    They make the control errors smaller.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

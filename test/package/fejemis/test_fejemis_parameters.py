@@ -19,8 +19,7 @@ def check(**given: Any) -> dict[str, Any]:
 
 
 def test_nothing_is_written_by_default() -> None:
-    """By default the driver writes nothing, because it must not overwrite a board's own settings.
-    """
+    """By default the driver writes nothing. It must not overwrite a board's own settings."""
     values = check()
     assert settings(values).written == {}
     assert kinematics(values).track_m == 0.4

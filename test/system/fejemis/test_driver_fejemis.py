@@ -180,7 +180,9 @@ def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     robot: TwoPorts, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """A signal ends or suspends the driver during a drive. The robot, the brush and the lift stop.
+    """A signal ends or suspends the driver during a drive.
+
+    The robot, the brush and the lift stop.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):

@@ -133,7 +133,9 @@ def test_a_teensy_of_another_kind_is_named_and_nothing_moves(
     ids: tuple[int, int],
     wrong: str,
 ) -> None:
-    """A port leads to a board with a wrong id. The driver logs what is wrong, and the robot rests.
+    """A port leads to a board with a wrong id.
+
+    The driver logs what is wrong, and the robot rests.
     """
     robot = robot_of(stack, tmp_path, ids=ids)
     driver = started(robot, start_driver)

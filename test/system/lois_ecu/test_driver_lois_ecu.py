@@ -89,7 +89,9 @@ def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(
     ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
 ) -> None:
-    """A signal ends or suspends the driver during a drive. The driver or its guard stops the robot.
+    """A signal ends or suspends the driver during a drive.
+
+    The driver or its guard stops the robot.
     """
     with driven(probe, ecu):
         driver.process.send_signal(number)

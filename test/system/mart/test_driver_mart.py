@@ -67,7 +67,9 @@ class Mart:
         assert not self.do(lambda board: board.server.hung)
 
     def answer(self, probe: Probe, service: str) -> Any:
-        """Call the service each second until the driver does not refuse it. Return the last answer.
+        """Call the service each second until the driver does not refuse it.
+
+        Return the last answer.
         """
         for _ in range(round(PATIENCE_S)):
             done = probe.call(Trigger, service)
@@ -91,7 +93,9 @@ def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
 
 @contextmanager
 def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[None]:
-    """Command a velocity at 10 Hz until the context ends. The context begins when the robot moves.
+    """Command a velocity at 10 Hz until the context ends.
+
+    The context begins when the robot moves.
     """
     with probe.commanding(vx, yaw_rate):
         mart.wait_for(lambda board: board.server.chassis.moving)
@@ -247,7 +251,9 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 
 
 def test_a_server_that_does_not_answer_is_told(start_driver: Start) -> None:
-    """The server at the board's address does not answer. The driver reports that no data arrives.
+    """The server at the board's address does not answer.
+
+    The driver reports that no data arrives.
     """
     driver = start_driver("udp://127.0.0.1:9", board="mart")
     driver.wait_for_line("no data from the board")

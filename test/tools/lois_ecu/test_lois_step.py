@@ -303,8 +303,7 @@ def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> No
 
 
 def test_whoever_has_gains_as_parameters_can_do_it() -> None:
-    """``calibrate step`` accepts each driver that has parameters for gains, whatever its board is.
-    """
+    """``calibrate step`` accepts every driver that has parameters for gains, with any board."""
     values = PARAMETERS.check_all({})
     require_able("step", values)
     with pytest.raises(ToolError, match="the OmniBot's wheels"):
