@@ -85,7 +85,7 @@ def driver_threads() -> list[str]:
 
 @pytest.fixture
 def terminal() -> Iterator[Terminal]:
-    """Yield a terminal; close it before ``nothing_left_behind`` looks for open descriptors."""
+    """Yield a terminal. Close it before ``nothing_left_behind`` looks for open descriptors."""
     terminal = Terminal()
     yield terminal
     terminal.close()
@@ -93,7 +93,7 @@ def terminal() -> Iterator[Terminal]:
 
 @pytest.fixture
 def line() -> Iterator["Line"]:
-    """Yield a guarded line; check at the end that no process and no descriptor is left behind."""
+    """Yield a guarded line. At the end, check that no process and no descriptor is left behind."""
     from guarded_line import Line
 
     descriptors = len(os.listdir("/proc/self/fd"))

@@ -42,7 +42,7 @@ class Line:
         return [pid for pid in children() if pid not in self._others]
 
     def hear(self, words: bytes) -> bytes:
-        """Read until ``words`` has arrived; return everything received so far."""
+        """Read until ``words`` has arrived, and return everything received so far."""
         end = time.monotonic() + PATIENCE_S
         while words not in self.heard:
             assert select.select([self._far], [], [], end - time.monotonic())[0], self.heard
@@ -88,7 +88,7 @@ def status_of(pid: int, field: str) -> str:
 
 
 def alive(keeper: Keeper, seconds: float) -> float:
-    """Send heartbeats for ``seconds`` at the driver's rate; return their longest interval in s."""
+    """Send heartbeats for ``seconds`` at the driver's rate. Return their longest interval in s."""
     begun_s = beaten_s = time.monotonic()
     longest_s = 0.0
     while (now := time.monotonic()) < begun_s + seconds:
@@ -99,7 +99,7 @@ def alive(keeper: Keeper, seconds: float) -> float:
 
 
 def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
-    """Send heartbeats at the driver's rate until ``predicate`` holds; return the log messages."""
+    """Send heartbeats at the driver's rate until ``predicate`` holds. Return the log messages."""
     told, end = "", time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end
@@ -109,6 +109,6 @@ def beat_until(keeper: Keeper, predicate: Callable[[], bool]) -> str:
 
 
 def replaced(line: Line, guard: int) -> bool:
-    """Return whether the guard with this process id is gone, and another guard runs."""
+    """Return whether the guard with the process id ``guard`` is gone and another guard runs."""
     found = line.children()
     return bool(found) and guard not in found

@@ -47,7 +47,7 @@ class PseudoTerminal:
         self.hang_up()
 
     def hang_up(self) -> None:
-        """Close the terminal's window."""
+        """Close the terminal, as if the user closed its window."""
         self._hung_up.set()
         self._reader.join()
 
@@ -58,7 +58,7 @@ class PseudoTerminal:
 
     @contextlib.contextmanager
     def holding(self, key: str) -> Iterator[None]:
-        """Repeat a key every 0.1 s in the context, until the terminal is closed."""
+        """Repeat a key every 0.1 s while the context lasts, or until the terminal is closed."""
         released = threading.Event()
 
         def repeat() -> None:
@@ -82,7 +82,7 @@ class PseudoTerminal:
             self._drawn = self._drawn.partition(text.encode())[2]
 
     def end(self) -> int:
-        """Wait until the program ends; return its exit code."""
+        """Wait until the program ends, and return its exit code."""
         return self.process.wait(PATIENCE_S)
 
     def _read(self) -> None:

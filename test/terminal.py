@@ -38,11 +38,10 @@ class Terminal:
         self.path = os.ttyname(self._near)
 
     def fill(self) -> None:
-        """Write until the terminal accepts no more."""
         fill(self._near)
 
     def read_until(self, words: bytes) -> bytes:
-        """Read until ``words`` has arrived; return all that was read."""
+        """Read until ``words`` has arrived, and return all that was read."""
         heard, end = b"", time.monotonic() + PATIENCE_S
         while words not in heard:
             assert select.select([self.far], [], [], end - time.monotonic())[0], heard

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the profiles; a profile connects one kind of board to the rest of the driver."""
+"""Tests of the profiles. A profile connects one kind of board to the rest of the driver."""
 
 import ast
 import re
@@ -30,7 +30,7 @@ KNOW_BOARDS = ("boards", *boards.PROFILES)
 
 
 def imported(path: Path) -> set[str]:
-    """Return the names of the modules that this one imports."""
+    """Return the names of the modules that a module imports."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
@@ -162,7 +162,10 @@ def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
 
 @pytest.mark.parametrize("name", ["guard", "port", "on_exit", "auto_gyro_bias", "max_linear_speed"])
 def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
-    """A profile cannot omit a parameter that the driver needs; the error lists what it can omit."""
+    """A profile omits a parameter that the driver needs. This is refused.
+
+    The error lists the parameters that a profile may omit.
+    """
     with pytest.raises(ValueError, match=f"few must not lack {name}, .* may only lack axis_signs"):
         table("few", FEW, without=("baudrate", name))
 

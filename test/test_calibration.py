@@ -92,7 +92,10 @@ def test_a_save_that_fails_leaves_the_old_file_and_nothing_else(
 
 
 def test_others_may_read_the_file(tmp_path: Path) -> None:
-    """Every user may read a saved file, although only the owner may read a file of ``mkstemp``."""
+    """Every user may read a saved file.
+
+    The default of ``mkstemp`` would allow this only to the owner.
+    """
     path = tmp_path / "robot.yaml"
     calibration.save(path, {"gyro_bias": BIAS})
     assert stat.S_IMODE(path.stat().st_mode) == 0o644

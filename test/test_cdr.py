@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver's own serializer makes the same bytes as rclpy."""
+"""Tests of the driver's own serializer. It makes the same bytes as rclpy."""
 
 import struct
 from dataclasses import replace
@@ -47,7 +47,7 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
 def message_name(message: object) -> str:
-    """Return the name in the form "sensor_msgs/msg/Imu"."""
+    """Return the name of a message's type, in the form "sensor_msgs/msg/Imu" that rosbags needs."""
     return f"{type(message).__module__.split('.')[0]}/msg/{type(message).__name__}"
 
 
@@ -140,9 +140,8 @@ def test_a_difference_is_found_at_start(
 ) -> None:
     """A constant part of the driver's messages is wrong.
 
-    The comparison with rclpy finds it at the start.
-
-    Another test compares messages with varying values.
+    The comparison with rclpy at the driver's start finds this. Another test compares messages with
+    varying values.
     """
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))

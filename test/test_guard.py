@@ -31,7 +31,7 @@ from omnibot_driver.keeper import Keeper
 
 @pytest.fixture(autouse=True)
 def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the driver wait longer, because a busy computer may delay a guard's start and stops."""
+    """Let the driver wait longer for its guard, whose start and stops a busy computer may delay."""
     monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", PATIENCE_S)
 
 
@@ -118,7 +118,7 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """A guard ignores the signals that end the driver.
+    """Signals arrive that usually end a process. The guard ignores them.
 
     The guard has its own session, so ctrl-C in the driver's terminal does not reach it.
     """
@@ -179,9 +179,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """A board has two lines, and one of them is gone.
-
-    The guard writes the stop bytes to the other one.
+    """A board has two lines, and one of them is gone. The guard still stops the other one.
 
     Each line gets only its own stop bytes.
     """
@@ -221,7 +219,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """If stop bytes are replaced just before the driver ends, the guard writes the new ones."""
+    """The driver replaces the stop bytes just before it ends. The guard writes the new ones."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
@@ -233,9 +231,8 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
     """The guard gets heartbeats and stop bytes through one pipe.
 
-    It separates them, however reads cut them.
-
-    Stop bytes may contain the letter ``e``, which alone means a heartbeat with a latched e-stop.
+    It separates them correctly, wherever a read ends. Stop bytes may contain the letter ``e``,
+    which alone means a heartbeat with a latched e-stop.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Guards that end, hang, or cannot be started: the driver replaces them without waiting."""
+"""Tests of guards that end, hang, or cannot be started.
+
+The driver replaces them without waiting.
+"""
 
 import contextlib
 import os
@@ -63,7 +66,7 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
 def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If a guard cannot be started, the driver reports it, continues, and tries again later."""
+    """A guard cannot be started. The driver reports this, continues, and tries again later."""
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
         keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -142,7 +145,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """The guard is suspended and cannot read that the driver ends.
+    """The guard is suspended when the driver ends, so it cannot read the end message.
 
     The driver does not wait for it.
     """

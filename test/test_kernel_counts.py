@@ -23,9 +23,9 @@ def test_a_pseudo_terminal_counts_no_overruns() -> None:
 
 
 def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The overruns are the eighth and the eleventh number of ``serial_icounter_struct``.
+    """The number of overruns is the sum of two numbers that the kernel gives.
 
-    The struct is in linux/serial.h.
+    They are the eighth and the eleventh number of ``serial_icounter_struct`` in linux/serial.h.
     """
 
     def ioctl(_descriptor: int, request: int, _data: bytes) -> bytes:

@@ -102,7 +102,7 @@ def test_the_figures_tell_of_the_port_and_its_bytes(board: PtyBoard, tmp_path: P
 def test_closing_writes_stop_and_ends_the_threads(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Closing a link writes Stop and ends its threads; closing it again does nothing."""
+    """Closing a link writes Stop and ends its threads. Closing it again does nothing."""
     end_patiently(monkeypatch)
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -119,7 +119,7 @@ def test_closing_writes_stop_and_ends_the_threads(
 def test_every_read_and_every_write_can_be_listened_to(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A listener gets exactly the bytes on the line, including the opening and the final Stop.
+    """``on_read`` and ``on_write`` get exactly the bytes on the line, also those of the final Stop.
 
     What the board sent before the port was opened is discarded.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A link whose port accepts no data for a while: afterwards the link writes Stop first."""
+"""Tests of a link whose port accepts no data for a while. Afterwards the link writes Stop first."""
 
 import os
 import threading
@@ -33,8 +33,8 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 ) -> None:
     """A write fails because the port is full. The link then repeats its opening sequence first.
 
-    The board may have received half a command. The link also writes a Stop before it opens the port
-    again, because the board may read again before that.
+    The board may have received half a command. A Stop comes before the sequence: the link writes it
+    before it opens the port again, because the board may accept data sooner.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -48,7 +48,10 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 
 
 def at_rest(terminal: Terminal) -> tuple[Link, Session]:
-    """Return a link that has opened this port; it will write nothing to the board by itself."""
+    """Return a link that has opened this port, and its session.
+
+    The link writes nothing to the board by itself.
+    """
     ours = session(run=False)
     link = link_to(terminal.path, Listener(), ours)
     link.start()

@@ -171,7 +171,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 
 
 def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
-    """Without its drive line the robot is not driven, but its measurements still arrive."""
+    """The drive line of a board is missing, so motion is refused. Its measurements still arrive."""
     lines.connect()
     missing = lines.openers[0] = partial(SerialPort, str(lines.name) + "-not", 115200)
     lines.link.start()
@@ -199,7 +199,7 @@ def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> No
 
 
 def ends_at_rest() -> bool:
-    """Close the link of a driving robot; return whether odometry showed the robot at rest."""
+    """Close the link of a driving robot, and return whether odometry showed the robot at rest."""
     with ServedBoard(LineRobot()) as robot:
         lines = [partial(SerialPort, path, 115200) for path in robot.addresses]
         listener, ours = Listener(), session_of(LineBoard())

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A port that appears late, disappears, comes back, or comes back during the shutdown."""
+"""Tests of a port that appears late, disappears, comes back, or comes back during the shutdown."""
 
 import itertools
 import threading
@@ -17,7 +17,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
-    """A port that appears late is opened; a link can also be closed before its port appears."""
+    """A port appears late, and the link opens it.
+
+    A link can also be closed before its port appears.
+    """
     listener, ours = Listener(), session()
     name = str(tmp_path / "omnibot")
     link = link_to(name, listener, ours)
@@ -34,11 +37,10 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
 def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The port is missing.
+    """The port is missing. The link tries to open it, and waits longer before each new attempt.
 
-    Before each new attempt, the link waits 1.5 times as long, up to a limit.
-
-    Because of the limit, a board that is plugged in late is found soon.
+    Each wait is 1.5 times as long as the previous one, up to a limit. Because of the limit, a board
+    that is plugged in late is found soon.
     """
 
     class Timed(Listener):
@@ -125,9 +127,8 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
     """The port is lost during a drive, and the driver ends.
 
-    It tries to open the port once more for a Stop.
-
-    The driver knows that the stop was sent and is unconfirmed.
+    The driver tries to open the port once more for a Stop. It knows that the stop was sent and is
+    unconfirmed.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()

@@ -101,7 +101,7 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """The offset of two clocks does not change when one of them is read late. It follows a step."""
+    """One of two clocks is read late. Their offset does not change. It changes if a clock steps."""
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset
@@ -200,9 +200,8 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
 def test_joint_states_are_the_manuals_wheels() -> None:
     """The robot drives 1 m forward at 0.1 m/s.
 
-    Wheel A turns backwards, B forwards, and C not at all.
-
-    Angles are in rad and rates in rad/s. The wheels have a radius of 29 mm.
+    Wheel A turns backwards, B forwards, and C not at all. Angles are in rad and rates in rad/s. The
+    wheels have a radius of 29 mm.
     """
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)
@@ -240,7 +239,7 @@ def test_wheels_of_another_size_go_on_from_where_they_stand() -> None:
 
 
 def test_diagnostics_are_named_as_by_diagnostic_updater() -> None:
-    """The name of a status is node, colon, task; its level is one byte."""
+    """The name of a status is the node, a colon and the task. Its level is one byte."""
     statuses = [
         Status("Link", Level.OK, "connected", {"Port": "p"}),
         Status("IMU", Level.STALE, "nothing", {}),

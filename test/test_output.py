@@ -113,9 +113,8 @@ raise SystemExit("then the last words")
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
     """A standard output is closed, so its descriptor is free.
 
-    A port that is opened does not get it.
-
-    Otherwise, printed text would go to the board.
+    A port that is opened then does not get this descriptor. Otherwise, printed text would go to the
+    board.
     """
     program = """
 import os, sys

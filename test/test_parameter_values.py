@@ -159,7 +159,10 @@ def test_axis_signs_are_nothing_but_ones(wrong: list[float]) -> None:
 
 @pytest.mark.parametrize("signs", [[1, -1, 1], (1, -1, 1), [1.0, -1.0, 1.0]])
 def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
-    """``axis_signs`` is any sequence of three values 1 or -1; the result is a list of integers."""
+    """``axis_signs`` accepts any sequence of three values 1 or -1.
+
+    The result is a list of integers.
+    """
     taken = PARAMETERS.by_name["axis_signs"].check(signs)
     assert taken == [1, -1, 1]
     assert isinstance(taken, list)
@@ -190,7 +193,7 @@ def test_a_frame_prefix_has_no_leading_slash(wrong: str) -> None:
 
 @pytest.mark.parametrize("parameter", VECTORS, ids=name_of)
 def test_a_bias_is_three_numbers_each_within_its_range(parameter: Parameter) -> None:
-    """A bias is three numbers; integers are accepted, and the result is floats."""
+    """A bias is three numbers. Integers are accepted and become floats."""
     assert parameter.high is not None
     taken = parameter.check((1, -1, 0.5))
     assert taken == [1.0, -1.0, 0.5]

@@ -118,7 +118,7 @@ def test_identity_cannot_change_while_it_runs(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["max_linear_speed", "linear_scale", "cmd_vel_timeout"])
 def test_tuning_may_change_while_it_runs(name: str) -> None:
-    """Tuning parameters can change while the driver runs, as users find their values by trial."""
+    """Tuning parameters can change while the driver runs. Users find their values by trial."""
     assert not PARAMETERS.by_name[name].fixed
 
 
@@ -143,7 +143,10 @@ def test_what_is_not_given_is_the_default() -> None:
     ],
 )
 def test_an_unknown_name_is_refused_with_the_nearest_known_one(mistyped: str, meant: str) -> None:
-    """An unknown name is refused with the most similar known name; rclpy would just ignore it."""
+    """An unknown name is refused, and the error gives the most similar known name.
+
+    rclpy alone would ignore the unknown name.
+    """
     with pytest.raises(ParameterError, match=f"'{mistyped}'.*'{meant}'"):
         check_all({mistyped: 1})
 
@@ -163,7 +166,7 @@ def test_one_wrong_value_among_many_is_found() -> None:
 
 
 def test_odom_and_base_must_be_different_frames() -> None:
-    """``odom_frame`` and ``base_frame`` must differ, since TF would have a loop.
+    """``odom_frame`` and ``base_frame`` must differ. Otherwise TF would have a loop.
 
     The IMU frame may equal the base frame.
     """

@@ -2,7 +2,7 @@
 
 """Tests of ``replay://``, which reads the recorded bytes of a line from a bag.
 
-Many tests are of bags and options that are wrong.
+Unsuitable bags and options are refused with a message.
 """
 
 import sys
@@ -38,7 +38,7 @@ def cdr(data: bytes) -> bytes:
 def bag(
     path: Path, *topics: str, plugin: StoragePlugin = StoragePlugin.MCAP, kind: str = RAW
 ) -> Path:
-    """Write a bag in which each topic contains the chunks; return its path."""
+    """Write a bag in which each topic contains the chunks, and return its path."""
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         for topic in topics:
             connection = writer.add_connection(topic, kind, typestore=TYPES)
@@ -71,11 +71,9 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 
 
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
-    """A bag has two robots with two lines each.
+    """A bag has two robots with two lines each. The topic of one line selects the robot.
 
-    A replay gives the bytes of each line to its channel.
-
-    The topic of one line selects the robot.
+    The replay gives the bytes of each line to the right channel of the board.
     """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))
@@ -168,7 +166,7 @@ def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> Non
 
 
 def test_only_its_own_urls_are_taken() -> None:
-    """Only URLs that begin with ``replay:`` are recordings; any other name may be a device."""
+    """Only URLs that begin with ``replay:`` are recordings. Any other name may be a device."""
     assert is_recording("replay://x")
     assert not is_recording("/dev/replay")
     assert not is_recording("sim://")

@@ -49,7 +49,7 @@ class Sender:
         self._shared = SharedSession(bench.session, bench.events.extend, lambda _reason: None, None)
 
     def is_obeyed(self, action: Action, sent_ns: tuple[int, ...] = ()) -> bool:
-        """Send a command and let 0.1 s pass; return whether the command was accepted."""
+        """Send a command, let 0.1 s pass, and return whether the command was accepted."""
         try:
             self._shared.command(action, None, sent_ns)
         except CommandRefused:
@@ -79,11 +79,9 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot.
+    """The motion monitor has stopped the robot. A stall then makes the driver refuse commands.
 
-    The sender's commands are refused because of a stall.
-
-    These do not count as a pause of the sender.
+    The refused commands do not count as a pause of their sender.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -217,7 +217,10 @@ TAPE = simulated(100)
 
 
 def test_a_recording_that_breaks_off_says_so() -> None:
-    """A recording that becomes unreadable ends with a notice; all earlier events are valid."""
+    """A recording becomes unreadable.
+
+    The replay ends with a notice, and all earlier events are valid.
+    """
 
     def broken() -> Iterator[tuple[int, bytes]]:
         yield from TAPE

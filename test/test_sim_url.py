@@ -21,7 +21,7 @@ def test_a_robot_drives_without_a_port_and_without_another_process() -> None:
     listener.wait_for(lambda: ours.state == "nominal")
 
     def drives() -> bool:
-        """Repeat the command, so that it cannot time out; return whether the robot drives."""
+        """Repeat the command, so that it cannot time out. Return whether the robot drives."""
         link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
         return any(
             isinstance(event, OdometryEstimate) and event.twist and event.twist.vx_mps > 0.1

@@ -71,9 +71,8 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
     """The driver stalls three times in a few seconds.
 
-    Commands from before the last stall are not fresh.
-
-    On a very busy computer the driver may stall again before a retransmission delivers a command.
+    Commands from before the last stall are not fresh. On a very busy computer the driver may stall
+    again before a retransmission delivers a command.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
@@ -113,9 +112,9 @@ def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_fro
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """A command sent during a stall is not fresh.
+    """A command is sent during a stall and arrives seconds later. It is not fresh.
 
-    Some seconds after the stall, this no longer matters.
+    Ten seconds after the stall, the detector no longer suspects such commands.
     """
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The publisher of transforms, with and without tf2_ros."""
+"""Tests of the publisher of transforms, with and without tf2_ros."""
 
 import sys
 from types import SimpleNamespace

@@ -27,7 +27,7 @@ NS = 1_000_000_000
 
 @dataclass
 class Sender:
-    """Publishes on one topic; its clock is ahead of the true time by ``ahead_s``."""
+    """Publishes on one topic. Its clock is ahead of the true time by ``ahead_s``."""
 
     ahead_s: float = 0.0
     numbered: bool = True
@@ -47,7 +47,7 @@ class Receiver:
     def hear(
         self, sender: Sender, sent_s: float, under_way_s: float = 0.0, waited_s: float = 0.0
     ) -> Delay:
-        """Receive a message that was sent at the true time ``sent_s``; return its delay."""
+        """Receive a message that was sent at the true time ``sent_s``, and return its delay."""
         sender.sent += 1
         received_s = sent_s + under_way_s
         now_s = received_s + waited_s

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Diagnostics with and without the library diagnostic_updater."""
+"""Tests of diagnostics with and without the library diagnostic_updater."""
 
 import sys
 from collections.abc import Callable

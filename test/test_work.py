@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bounds for the number of Python calls per tick of the nominal stream; times are not measured.
+"""Bounds for the number of Python calls per tick of the nominal stream. Times are not measured.
 
 A bound is a little above the number of calls at the time when it was set. A change that needs more
 calls raises the bound and gives the reason in docs/internals/performance.md.

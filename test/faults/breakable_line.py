@@ -2,8 +2,9 @@
 
 """A simulated board on a line that can be broken, and a record of what the board really sent.
 
-A ``Damage`` changes the bytes of one tick, or of one write. This module knows bytes and ticks; it
-does not know frames.
+A ``Damage`` changes the bytes of one tick, or of one write.
+
+This module knows bytes and ticks; it does not know frames.
 """
 
 from collections.abc import Callable

@@ -56,9 +56,8 @@ class Terminal(PtyBoard):
     def full(self, old: bytes) -> Iterator[None]:
         """Fill the kernel's buffer with ``old`` commands, about 20 kB.
 
-        The board does not read them.
-
-        At the end of the context, wait until the board has received all of them.
+        The board does not read them. At the end of the context, wait until the board has received
+        all of them.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)

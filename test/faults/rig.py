@@ -134,7 +134,6 @@ class Rig:
         self._stack.close()
 
     def make_hand(self) -> Hand:
-        """Make the commander of the robot."""
         stick = Stick(self.probe)
         self._stack.callback(stick.leave)
         return stick

@@ -84,7 +84,6 @@ def row(
 
 
 def main() -> None:
-    """Print all rows."""
     print("| the robot | commanded | stopped after | with `delta_period: 0.1` |\n|---|---|---|---|")
     row(
         "the board's switch is on position, 3 m from its origin",

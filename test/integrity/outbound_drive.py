@@ -133,7 +133,7 @@ class _Rehearsal:
         self._writes: list[Write] = []
 
     def run(self, changes: dict[int, Shown]) -> list[Write]:
-        """Run the events in the order of their times; return everything that was written."""
+        """Run the events in the order of their times, and return everything that was written."""
         scene, session = self._scene, self._session
         wishes = iter(sorted(scene.wishes, key=lambda wish: wish.at_s))
         wish = next(wishes, None)

@@ -45,7 +45,6 @@ class SingleFaults:
         self._rate, self._change, self._random = rate, change, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """Return the bytes that arrive when ``data`` is written."""
         arrivals: list[Arrival] = []
         at = 0
         while at < len(data):
@@ -65,7 +64,6 @@ class NoFaults:
     whole = 1 << 62
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """Return all bytes, undamaged."""
         return [(byte, at, at) for at, byte in enumerate(data)]
 
 
@@ -80,7 +78,6 @@ class Bursts:
         self._rate, self._longest, self._random = rate, longest, random
 
     def carry(self, data: bytes) -> list[Arrival]:
-        """Return the bytes that arrive when ``data`` is written."""
         arrivals: list[Arrival] = []
         for at, byte in enumerate(data):
             if self.whole:

@@ -2,7 +2,7 @@
 
 """Parser of the driver's writes, by the layout in the manual alone.
 
-This module knows zeros, control frames and letters; it does not know any code of the driver.
+The parser knows zeros, control frames and letters. It uses no code of the driver.
 """
 
 from dataclasses import dataclass

@@ -108,9 +108,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
     """Two Stops follow each other, and the first lacks a byte.
 
-    The board understands 255 LSB for wheel C.
-
-    The judge calls this stray motion.
+    The board understands 255 LSB for wheel C. The judge calls this stray motion.
     """
     judge = Judge()
     judge.write(parse(STOP), 0.0)

@@ -92,10 +92,8 @@ def test_the_default_geometry_is_the_drivers() -> None:
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
     """The wheels turn at the rates for a twist.
 
-    Each wheel rolls as fast as the body moves at that place.
-
-    Rollers let a wheel slide along its axle, so only velocities in the rolling direction are
-    compared.
+    Each wheel rolls as fast as the body moves at that place. Rollers let a wheel slide along its
+    axle, so only velocities in the rolling direction are compared.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -139,7 +139,10 @@ def test_every_assumption_has_its_step_and_what_mends_it() -> None:
 
 
 def test_the_wheels_turn_as_the_guide_says() -> None:
-    """A wheel that turns counter-clockwise, seen from outside, has a positive rate."""
+    """The guide says in which direction each wheel turns for a command. The kinematics agree.
+
+    A wheel with a positive rate turns counter-clockwise, seen from outside the robot.
+    """
     kinematics = OmniKinematics(wheel_radius_m=0.029, base_radius_m=0.143)
     expected = {
         "linear: {x": kinematics.wheel_rates(BodyTwist(1.0, 0.0, 0.0)),

@@ -245,9 +245,7 @@ def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
 ) -> None:
     """The user gives the argument ``board``, and a parameter file without a board.
 
-    The argument is used.
-
-    Otherwise the driver would send the OmniBot's frames to another board.
+    The argument is used. Otherwise the driver would send the OmniBot's frames to another board.
     """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")

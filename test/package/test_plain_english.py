@@ -57,7 +57,7 @@ CONJUNCTIONS = {"And", "But", "Nor", "Or"}
 
 @cache
 def texts() -> dict[str, str]:
-    """Return every text file of the repository by its name."""
+    """Return every text file of the repository. The keys are the names of the files."""
     return {
         str(name): (ROOT / name).read_text(encoding="utf-8")
         for name in sorted(file.relative_to(ROOT) for file in ROOT.rglob("*"))

@@ -50,7 +50,9 @@ def as_recorded(qos: QoSProfile) -> Qos:
 
 
 def as_played(qos: Qos) -> QoSProfile:
-    """Convert the quality of service from a bag to rclpy's type, for a publisher or a subscription.
+    """Convert the quality of service from a bag to rclpy's type.
+
+    A publisher or a subscription can use the result.
     """
     return QoSProfile(
         depth=DEPTH,
@@ -107,7 +109,7 @@ class Recorder:
             self.hear(topic, kind, as_played(self.offered[topic]))
 
     def hear(self, topic: str, kind: str, qos: QoSProfile) -> list[Message]:
-        """Subscribe to a topic; return the list to which its messages are appended."""
+        """Subscribe to a topic, and return the list to which its messages are appended."""
         heard = self.messages.setdefault(topic, [])
         self._probe.listen_raw(message_class(kind), topic, qos, partial(_append, heard))
         return heard

@@ -28,7 +28,7 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """A stack of context managers; the end of the test closes them in reverse order."""
+    """A stack of context managers. The end of the test closes them in reverse order."""
     with ExitStack() as stack:
         yield stack
 

@@ -41,7 +41,7 @@ class Forked:
         self._lock = threading.Lock()
 
     def wait(self, timeout: float | None = None) -> int:
-        """Return the exit code; raise subprocess.TimeoutExpired if the driver still runs."""
+        """Return the exit code. Raise subprocess.TimeoutExpired if the driver still runs."""
         with self._lock:
             if self.returncode is None:
                 if not select.select([self._status], [], [], timeout)[0]:

@@ -50,7 +50,7 @@ class Probe:
         self.node.destroy_node()
 
     def listen(self, kind: type, topic: str, *, latched: bool = False) -> list[Any]:
-        """Subscribe to a topic; return the list to which its messages are appended."""
+        """Subscribe to a topic, and return the list to which its messages are appended."""
         messages = self._received.setdefault(topic, [])
         qos = QoSProfile(depth=1000)
         if latched:
@@ -68,7 +68,7 @@ class Probe:
     def listen_raw(
         self, kind: type, topic: str, qos: QoSProfile, append: Callable[[bytes, Any], None]
     ) -> None:
-        """Subscribe to a topic; pass each serialised message and its message info to ``append``."""
+        """Subscribe to a topic. Pass each serialised message and its message info to ``append``."""
 
         def take(data: bytes, info: Any) -> None:
             with self._changed:

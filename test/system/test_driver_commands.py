@@ -155,9 +155,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 ) -> None:
     """A wheel_cmd has a wrong number of values, or NaN or infinity.
 
-    The driver rejects it with a reason.
-
-    The driver obeys the next correct one.
+    The driver rejects it with a reason. The driver obeys the next correct one.
     """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))

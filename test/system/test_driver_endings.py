@@ -68,9 +68,7 @@ def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
 ) -> None:
     """One or two signals arrive while the robot drives.
 
-    The driver sends Stop and exits with code 0.
-
-    Ctrl-C on ``ros2 launch`` sends two signals.
+    The driver sends Stop and exits with code 0. Ctrl-C on ``ros2 launch`` sends two signals.
     """
     board = start_board()
     driver: Driver = start_driver(board.path, before=PATIENT)
@@ -132,9 +130,7 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 ) -> None:
     """A callback has a defect, or ROS is shut down, while the robot drives.
 
-    The driver sends Stop last.
-
-    It exits with code 1 after a defect, and with 0 after a shutdown.
+    The driver sends Stop last. It exits with code 1 after a defect, and with 0 after a shutdown.
     """
     board = start_board()
     driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)

@@ -169,8 +169,8 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 
     When it resumes, the driver stops the robot.
 
-    The clock for the command timeout does not advance during a suspension. The driver still
-    discards the old command.
+    The clock for the command timeout does not advance during a suspension, so the command has not
+    timed out. The driver still discards it.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
@@ -191,9 +191,8 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 ) -> None:
     """A stamped command is sent while the driver hangs.
 
-    The driver refuses it, although its stamp is recent.
-
-    The sender may be a planner that does not know about the hang.
+    The driver refuses it, although its stamp is recent. The sender may be a planner that does not
+    know about the hang.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)

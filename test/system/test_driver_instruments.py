@@ -239,10 +239,8 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
 ) -> None:
     """The parameter ``use_sim_time`` is true, and /clock has no time yet.
 
-    No measurements are published.
-
-    When /clock has a time, measurements are published. This also applies to a simulated board,
-    whose own time differs from /clock.
+    The driver publishes measurements only when /clock has a time. This also applies to a simulated
+    board, whose own time differs from /clock.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

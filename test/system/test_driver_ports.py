@@ -96,9 +96,8 @@ def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
 ) -> None:
     """The board is unplugged, and a user calls ``~/estop``.
 
-    The stop will be sent when the port opens.
-
-    The answer says so. The log says that the service latched the e-stop.
+    The answer says that the stop will be sent when the port opens. The log says that the service
+    latched the e-stop.
     """
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):

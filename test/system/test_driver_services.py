@@ -184,9 +184,7 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_and_a_reset_frees_it(
 ) -> None:
     """A board still ignores commands after the e-stop is released.
 
-    The driver recommends ``~/reset``.
-
-    After a reset the robot drives again.
+    The driver recommends ``~/reset``. After a reset the robot drives again.
     """
     board = start_board(estop_latches=True, running=True)
     driver: Driver = start_driver(board.path)

@@ -128,9 +128,8 @@ def test_who_lets_go_of_the_key_stops_the_robot(
 ) -> None:
     """The user presses a key once.
 
-    The monitor sends a motion, then a few zero commands, then nothing.
-
-    When the user quits the monitor, it sends another zero command.
+    The monitor sends a motion, then a few zero commands, then nothing. When the user quits the
+    monitor, it sends another zero command.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -181,9 +180,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 ) -> None:
     """The monitor is suspended while it steers, so the driver stops the robot.
 
-    The user presses keys.
-
-    When the monitor resumes, these keys do not move the robot.
+    The user presses keys. When the monitor resumes, these keys do not move the robot.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

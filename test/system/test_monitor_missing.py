@@ -48,9 +48,8 @@ def measure(fake: Probe, odometry: Odometry) -> None:
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
     """The service ``~/estop`` is missing.
 
-    The monitor sends the e-stop on the topic ``estop`` instead.
-
-    It repeats the message until the driver reports a latched e-stop.
+    The monitor sends the e-stop on the topic ``estop`` instead. It repeats the message until the
+    driver reports a latched e-stop.
     """
     said = fake.listen(Bool, "estop")
     feed = Feed([], "fake", "omnibot_driver")

@@ -43,10 +43,8 @@ def test_the_whole_walk_finds_what_was_planted(
 ) -> None:
     """The robot has reversed axes, another delta frame and a turned IMU.
 
-    The tool finds all of these.
-
-    The user's first answer is impossible, so the tool explains this and asks again. At the end, a
-    driver loads the written file.
+    The tool finds all of these. The user's first answer is impossible, so the tool explains this
+    and asks again. At the end, a driver loads the written file.
     """
     with rig(
         tmp_path,

@@ -85,9 +85,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 ) -> None:
     """The e-stop, a reboot, commands of another node or ctrl-C interrupt a motion.
 
-    The robot comes to rest.
-
-    The error gives the reason.
+    The robot comes to rest. The error gives the reason.
     """
     node = robot._node
     estop = node.create_publisher(Bool, "estop", 10)
@@ -173,9 +171,8 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
     """A defect in the tool interrupts a motion.
 
-    The tool switches the driver's motion monitor on again.
-
-    Otherwise the monitor would stay off until the driver restarts.
+    The tool switches the driver's motion monitor on again. Otherwise the monitor would stay off
+    until the driver restarts.
     """
 
     def fail() -> None:
@@ -295,9 +292,8 @@ def test_ctrl_c_at_an_open_question_ends_it(
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
     """The driver is killed during a motion.
 
-    Its guard stops the robot, and the tool reports missing data.
-
-    This is the last test of the module, because it ends the driver that the tests share.
+    Its guard stops the robot, and the tool reports missing data. This is the last test of the
+    module, because it ends the driver that the tests share.
     """
 
     def kill() -> None:

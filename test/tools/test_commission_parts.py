@@ -256,7 +256,7 @@ def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
 
 @given(st.floats(0.3, 3.0), angles)
 def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> None:
-    """The robot drives twice as fast when the command is doubled.
+    """A command is doubled, and the robot drives twice as fast.
 
     The tool recognises velocity control.
 

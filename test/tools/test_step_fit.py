@@ -59,9 +59,7 @@ def test_a_motor_is_found_in_the_manuals_loop(
 ) -> None:
     """A motor runs in the manual's control loop.
 
-    Its parameters are found within five claimed sigmas.
-
-    A model of first order does not fit better.
+    Its parameters are found within five claimed sigmas. A model of first order does not fit better.
     """
     planted = (1.0, pwm_per_count, lag_s, delay_s)
     steps = made_up(motor_model(MANUAL), planted, seed)

@@ -24,9 +24,8 @@ def steps_to_and_fro(
 ) -> tuple[Commands, Wheels]:
     """Return the commands to wheel A and its measured rates.
 
-    The wheel alternates between two speeds.
-
-    The commands arrive at random moments of the control tick.
+    The wheel alternates between two speeds. The commands arrive at random moments of the control
+    tick.
     """
     settings: dict[str, Any] = {} if gains is None else {"wheel_gains": gains}
     board = SimulatedBoard(

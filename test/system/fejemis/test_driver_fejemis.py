@@ -130,9 +130,7 @@ def test_a_lift_command_that_waited_while_the_driver_was_stalled_is_refused(
 ) -> None:
     """A lift command arrives while the driver is suspended.
 
-    It is refused, and the lift does not move.
-
-    The base obeys the next velocity command.
+    It is refused, and the lift does not move. The base obeys the next velocity command.
     """
     probe.wait_for_state("nominal")
     lift = probe.publisher(Float32, "lift_cmd")

@@ -71,7 +71,7 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
                 terminal.close()
 
     def wait_until(self, predicate: Callable[[SimulatedFejemis], object]) -> None:
-        """Wait until the predicate holds; fail after ``PATIENCE_S``."""
+        """Wait until the predicate holds. Fail after ``PATIENCE_S``."""
         found = self.wait_for(lambda board: bool(predicate(board)), PATIENCE_S)
         assert found, {**self.facts, "last": self.last()}
 

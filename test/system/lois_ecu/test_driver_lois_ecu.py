@@ -149,9 +149,8 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """A user calls ``~/reset`` after a drive.
 
-    The encoder ticks are then 0, but the pose in odom continues.
-
-    After the reset the robot drives again.
+    The encoder ticks are then 0, but the pose in odom continues. After the reset the robot drives
+    again.
     """
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
@@ -167,9 +166,8 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
     """A user sets a gain.
 
-    The driver writes it to the board, and again after a restart of the board.
-
-    The driver does not write gains that the user has not set.
+    The driver writes it to the board, and again after a restart of the board. The driver does not
+    write gains that the user has not set.
     """
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)

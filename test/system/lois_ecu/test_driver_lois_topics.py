@@ -161,9 +161,8 @@ def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
 ) -> None:
     """The calibration tool makes a record while the robot drives.
 
-    The file has the ticks of both wheels.
-
-    After the record, the robot rests. If the driver refuses a record, the tool reports the reason.
+    The file has the ticks of both wheels. After the record, the robot rests. If the driver refuses
+    a record, the tool reports the reason.
     """
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(

@@ -230,10 +230,9 @@ def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
 ) -> None:
     """A user changes ``range_maximum`` and ``dock_distance``.
 
-    Both take effect while the driver runs.
-
-    An integer is accepted for a real number. For a distance of 0.1 m the driver requests only 2
-    inches, because the robot may drive 1.6 times as far as requested.
+    Both take effect while the driver runs. An integer is accepted for a real number. For a distance
+    of 0.1 m the driver requests only 2 inches, because the robot may drive 1.6 times as far as
+    requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
