@@ -27,9 +27,9 @@ SILENCE_S: Final = 1.0
 TRANSIT: Final = 200
 """Number of frames that may still be on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""A message is compared with this number of the next sent frames.
+"""A message is compared with this number of the frames that were sent next.
 
-If none equals it, it is wrong.
+If none of these frames equals the message, the message is wrong.
 """
 
 

@@ -208,10 +208,8 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test stops on a line that loses bytes to the board.
 
-        Each of ``numbers`` gets a new driver.
-
-        ``number_of_life``: index of the group of stops in LIVES. The line loses bytes until the
-        last stop has been judged.
+        Each of ``numbers`` gets a new driver. ``number_of_life`` is the index of the group of stops
+        in LIVES. The line loses bytes until the last stop has been judged.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

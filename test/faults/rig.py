@@ -203,10 +203,10 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect the motors to be off for good soon after ``since_tick``.
+        """Expect the motors to go off soon after ``since_tick``, and to stay off.
 
-        They may still be on for ``allowed_s`` plus the grace time. They are off for good once they
-        have been off for ``REST_TICKS``.
+        They may still be on for ``allowed_s`` plus the grace time. Then they must be off for
+        ``REST_TICKS``.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)
@@ -242,7 +242,7 @@ class Rig:
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
         """Expect the driver to end in time with one of these exit codes.
 
-        It may end ``late_s`` later.
+        ``late_s``: additional time that it may take, in s.
         """
         begin_s = time.monotonic()
         try:

@@ -58,13 +58,13 @@ class RigBoard:
     ``not_sent``: returns for each kind of message how many published ones were never sent, and how
     many were published.
 
-    ``lossy``: returns the settings of the board with a number, for a line that loses bytes.
+    ``lossy``: takes a number, and returns the settings of a board on a line that loses bytes.
 
     ``line``: makes the line. None means a breakable line of bytes.
 
     ``serve``: makes the server of the line. None means a terminal.
 
-    ``port``: returns the driver's ``port`` in a folder.
+    ``port``: takes a folder, and returns the driver's ``port``.
 
     ``cases``: takes the number of a round, and returns the faults of the round. None means the
     usual faults of a serial line.

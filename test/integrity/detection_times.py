@@ -4,10 +4,10 @@
 
 PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-A correct robot moves between rest and its command. A reaction time begins with the first tick in
-which the robot is 0.05 m/s or 0.15 rad/s outside this range. It ends when the driver sends Stop.
-The displacements have a phase relative to this beginning. The table has the shortest and the
-longest time over all phases.
+The velocity of a robot that obeys is between rest and its command. A reaction time begins with the
+first tick in which the velocity is 0.05 m/s or 0.15 rad/s outside this range. It ends when the
+driver sends Stop. The first displacement may follow sooner or later. The table has the shortest and
+the longest time over all these phases of the displacements.
 """
 
 from collections.abc import Callable

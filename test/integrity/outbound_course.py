@@ -2,12 +2,11 @@
 
 """What the driver writes in a scene.
 
-It is rehearsed once for all trials in which the board shows the same.
-
-The line from the board is undamaged. So what the driver writes depends only on what the board
-shows: its mode, and whether the robot moves. A ``Course`` has the session's writes for one sequence
-of these states. When the board shows another state in a trial, the trial continues with another
-course. That course is rehearsed when it is first needed.
+The writes are rehearsed once for all trials in which the board shows the same states. The line from
+the board is undamaged. So what the driver writes depends only on what the board shows: its mode,
+and whether the robot moves. A ``Course`` has the session's writes for one sequence of these states.
+When the board shows another state in a trial, the trial continues with another course. That course
+is rehearsed when it is first needed.
 """
 
 from dataclasses import dataclass

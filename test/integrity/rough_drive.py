@@ -2,11 +2,9 @@
 
 """Simulated robots that obey, on bad floors and among people.
 
-The motion monitor must not stop them.
-
-Each robot has its own motors, controllers, scales and line. It has 5 % slip and drives on a slope.
-Its commander changes the way of commanding every few seconds. People hold, carry and push the
-robot. Everything is in simulated time.
+The motion monitor must not stop them. Each robot has its own motors, controllers, scales and line.
+It has 5 % slip and drives on a slope. Its commander changes the way of commanding every few
+seconds. People hold, carry and push the robot. Everything is in simulated time.
 """
 
 import math

@@ -121,7 +121,7 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """The board still follows the set-point of the write before, which is right.
+    """The board still follows the set-point of the previous write. This is right.
 
     A set-point with a changed bit is an error.
     """

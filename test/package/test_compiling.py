@@ -2,10 +2,8 @@
 
 """Tests of ``OMNIBOT_DRIVER_COMPILE=1``.
 
-If compiling fails, the package is installed as plain Python.
-
-A substitute for mypyc makes one small C module, because mypyc itself takes a minute. ``make
-compiled`` runs mypyc.
+If compiling fails, the package is installed as plain Python. In the tests, a substitute for mypyc
+makes one small C module, because mypyc itself takes a minute. ``make compiled`` runs mypyc.
 """
 
 import os
@@ -52,7 +50,7 @@ FAILURES = {
 
 
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
-    """Build the package into the folder ``lib`` with a replaced mypyc, and return the output."""
+    """Build the package into ``lib`` in ``folder``, with a replaced mypyc. Return the output."""
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
     (folder / "stand_in/mypyc/build.py").write_text(
@@ -97,7 +95,7 @@ def test_what_cannot_be_compiled_is_installed_as_it_is(
     reason="no C compiler is installed",
 )
 def test_what_is_compiled_goes_where_the_source_is_and_goes_away_again(tmp_path: Path) -> None:
-    """The package is installed with compiled modules, and later without.
+    """The package is installed with compiled modules, and later without them.
 
     The later installation removes the compiled modules.
     """

@@ -129,7 +129,10 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the end of the guide lists all steps, and names only parameters of the driver."""
+    """The form at the end of the guide lists all steps of the guide.
+
+    It names only parameters of the driver.
+    """
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))
     form = re.findall(r"^\| (.+) \| (\d) \| (.+) \| \|$", text, re.MULTILINE)

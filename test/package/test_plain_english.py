@@ -52,7 +52,10 @@ ALLOWED = {
 """Files that are not searched. The value is the reason."""
 
 CONJUNCTIONS = {"And", "But", "Nor", "Or"}
-"""Words that must not begin a docstring, because it would depend on the function's name."""
+"""Words that must not begin a docstring.
+
+Such a docstring could not be understood without the function's name.
+"""
 
 
 @cache

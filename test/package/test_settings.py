@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the settings for other packages: they use only topics and values of the driver."""
+"""Tests of the configuration for other packages: it has only topics and values of the driver."""
 
 import ast
 import json
@@ -156,7 +156,10 @@ def test_every_critic_that_is_tuned_is_used() -> None:
 
 
 def test_the_mux_is_locked_by_the_drivers_estop() -> None:
-    """The mux's lock is the driver's topic ``estop_active``. It has priority over all sources."""
+    """The lock of twist_mux is the driver's topic ``estop_active``.
+
+    The lock has priority over all sources.
+    """
     mux = parameters("twist_mux.yaml", "twist_mux")
     (lock,) = mux["locks"].values()
     assert lock["topic"] == f"{NODE}/estop_active"
@@ -166,9 +169,9 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 
 
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
-    """The mux's sources are topics that the driver does not use.
+    """The sources of twist_mux are topics that the driver does not use.
 
-    They have the driver's command timeout.
+    Their timeout is the driver's command timeout.
     """
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()

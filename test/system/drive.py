@@ -28,9 +28,9 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""How far from the delta that its timestamp suggests a message's own delta may be, in deltas."""
+"""Largest distance, in deltas, between a message's own delta and the delta at its timestamp."""
 LONGEST_STALL = 1000
-"""How far from the frame that its timestamp suggests a message's own frame may be, in IMU frames.
+"""Largest distance, in IMU frames, between a message's own frame and the frame at its timestamp.
 
 A stall of the computer may shift the timestamps by this distance.
 """

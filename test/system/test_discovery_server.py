@@ -62,7 +62,8 @@ def free_udp_port() -> int:
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
     """16 drivers and an observer are clients of a discovery server. The observer finds all drivers.
 
-    A client of a server does not use multicast, so the observer cannot find a driver by multicast.
+    Clients of a server do not use multicast, so the observer finds the drivers only through the
+    server.
     """
     port = str(free_udp_port())
     environment = {

@@ -47,9 +47,9 @@ def names(found: list[tuple[str, list[str]]], home: str) -> set[str]:
 def test_what_a_board_lacks_is_not_advertised(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The board has no IMU, no wheel commands and no pause. The driver has no interfaces for these.
+    """The board has no IMU, no wheel commands and no pause.
 
-    It has no topics, services and parameters of theirs.
+    The driver has no topics, services and parameters for these.
     """
     driver = start_plain(start_driver, start_board().path)
     probe: Probe = probe_of(driver)
@@ -84,7 +84,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 ) -> None:
     """A user asks to delete an optional parameter. The driver refuses.
 
-    It reads all parameters at each later change of one, so a deleted parameter would block every
+    The driver reads all parameters whenever one is changed, so a deleted one would block every
     change.
     """
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))

@@ -167,10 +167,8 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 ) -> None:
     """The computer is suspended while the robot drives.
 
-    When it resumes, the driver stops the robot.
-
-    The clock for the command timeout does not advance during a suspension, so the command has not
-    timed out. The driver still discards it.
+    When it resumes, the driver stops the robot. The clock for the command timeout does not advance
+    during a suspension, so the command has not timed out. The driver still discards it.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(

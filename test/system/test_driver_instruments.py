@@ -79,9 +79,8 @@ def test_the_gyro_is_calibrated_saved_and_loaded_again(
 ) -> None:
     """The simulated gyro has a known bias.
 
-    ``~/calibrate_gyro`` reports it and saves it in the file.
-
-    The driver then subtracts the bias. Another driver loads it from the file.
+    ``~/calibrate_gyro`` reports the bias and saves it in the file. The driver then subtracts it.
+    Another driver loads it from the file.
     """
     planted = [math.radians(value) for value in PLANTED_DPS]
     answer = robot.probe.call(Trigger, "calibrate_gyro")

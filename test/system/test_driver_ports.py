@@ -141,7 +141,7 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """The port's name is impossible.
+    """The port can never be opened.
 
     The driver logs the reason and keeps trying until SIGINT ends it.
     """

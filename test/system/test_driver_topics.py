@@ -94,9 +94,11 @@ def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
 def test_a_board_at_10_hz_needs_its_delta_period(
     start_board: Start, start_driver: Start, probe_of: Start, told_s: float
 ) -> None:
-    """A board sends displacements every 0.1 s. With this ``delta_period``, the twist is right.
+    """A board sends displacements every 0.1 s.
 
-    With another ``delta_period``, the driver names the right value.
+    If ``delta_period`` has this value, the twist is right.
+
+    If it has another value, the driver names the right one.
     """
     board: PtyBoard = start_board(running=True, delta_period_s=0.1)
     driver: Driver = start_driver(board.path, delta_period=told_s)

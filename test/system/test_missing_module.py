@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The driver in a shell in which ROS is not set up."""
+"""Tests of the driver in a shell in which ROS is not set up."""
 
 import subprocess
 import sys

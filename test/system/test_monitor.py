@@ -203,9 +203,9 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
     driver: Driver, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The monitor is suspended by SIGSTOP, so it cannot restore the terminal, and resumes.
+    """SIGSTOP suspends the monitor before it can restore the terminal. Then the monitor resumes.
 
-    The key q then ends it, and it restores the terminal.
+    The key q ends it, and it restores the terminal.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

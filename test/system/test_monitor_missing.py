@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def fake(stack: ExitStack) -> Probe:
-    """An imitation of a driver that repeats the state nominal and publishes no measurements."""
+    """An imitation of a driver. It repeats the state "nominal" and publishes no measurements."""
     probe = stack.enter_context(Probe("fake"))
     estop = probe.node.create_publisher(Bool, "omnibot_driver/estop_active", LATCHED)
     estop.publish(Bool(data=False))

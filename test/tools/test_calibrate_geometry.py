@@ -111,7 +111,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
     """``rolled`` gets the sizes that the tool assumes.
 
-    It returns the path itself, from its start.
+    It returns the path itself, relative to its start.
     """
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)

@@ -158,9 +158,8 @@ def test_planted_errors_are_found_and_the_driver_loads_them(
 ) -> None:
     """The IMU has a bias, noise and a tilt.
 
-    ``calibrate imu`` finds them in 4 s through a real driver.
-
-    Another driver loads the written file.
+    ``calibrate imu`` finds them in 4 s through a real driver. Another driver loads the written
+    file.
     """
     planted = (1.2, -0.8, 0.4)
     sensor = {

@@ -66,7 +66,7 @@ def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.n
 def test_the_table_of_the_commissioning_guide_is_what_is_wanted() -> None:
     """The expected signs of the wheels are those in the table of the commissioning guide.
 
-    They were copied by hand.
+    The test has a copy of this table.
     """
     assert [wanted(axis) for axis in range(3)] == [(-1, 1, 0), (-1, -1, 1), (-1, -1, -1)]
 
@@ -171,9 +171,9 @@ def test_a_sensor_on_its_edge_has_angles_too(pitch: float) -> None:
 def test_a_clumsy_hand_still_finds_right_angles(
     mounted: tuple[float, float, int], slips: list[float]
 ) -> None:
-    """The user tilts the robot askew by 5°.
+    """The user's tilts are askew by up to 5°.
 
-    The right one of the 24 right-angled mountings is found.
+    The right one of the 24 right-angled mountings is still found.
     """
     planted = rotation(mounted[0], mounted[1], mounted[2] * math.pi / 2)
     level = postures(planted, 0.5, 0.6)[0]
@@ -204,7 +204,10 @@ def test_a_side_lowered_instead_of_raised_is_a_contradiction(
 
 @pytest.mark.parametrize("tilt_rad", [0.05, 1.5])
 def test_a_tilt_that_is_none_is_a_contradiction(tilt_rad: float) -> None:
-    """The user tilts the robot by 3°, which is too little, or by 86°, which is too much."""
+    """The user tilts the robot by 3°, which is too little, or by 86°, which is too much.
+
+    Both are rejected.
+    """
     with pytest.raises(Contradiction, match="front raised"):
         mounting(*postures(np.eye(3), tilt_rad, 0.5))
 
@@ -258,9 +261,7 @@ def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
 def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> None:
     """A command is doubled, and the robot drives twice as fast.
 
-    The tool recognises velocity control.
-
-    The command's unit and direction do not matter.
+    The tool recognises velocity control. The command's unit and direction do not matter.
     """
     x, y = 0.06 * scale * math.cos(direction_rad), 0.06 * scale * math.sin(direction_rad)
     assert control_method(steady(x, y), steady(2 * x, 2 * y), 0.06) == "velocity"

@@ -79,7 +79,10 @@ def test_what_needs_somebody_stands_first() -> None:
 
 
 def test_what_has_happened_is_counted() -> None:
-    """The monitor shows the counts of faults, without those that are zero."""
+    """The monitor shows how often each fault has occurred.
+
+    It omits faults that have not occurred.
+    """
     stream = Status("Stream", Level.OK, "complete", {"Framing faults": "3", "Sequence gaps": "0"})
     assert text.counts(view(statuses=(stream,))) == "since its start: framing faults 3"
     assert text.counts(view()) == "since its start: nothing lost, nothing refused"

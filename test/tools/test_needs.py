@@ -36,7 +36,10 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
 )
 def test_help_needs_no_library(words: str) -> None:
-    """The Python has no other libraries, so also no ROS. The help of each tool still works."""
+    """Python has no other libraries here, and therefore no ROS.
+
+    The help of each tool still works.
+    """
     module, *subcommand = words.split()
     done = subprocess.run(
         [sys.executable, "-ES", "-m", f"omnibot_driver.{module}", *subcommand, "--help"],

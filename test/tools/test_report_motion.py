@@ -27,7 +27,7 @@ def drive() -> Drive:
 def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
     drive: Drive, factor: float, advice: str
 ) -> None:
-    """The measured gravity is only half or a quarter.
+    """The measured gravity is only half or a quarter of the true one.
 
     The report recommends another accelerometer range.
     """
@@ -88,9 +88,9 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """The odometry has a gap.
+    """The odometry has a gap. The robot may turn during the gap.
 
-    The report does not take it for rest, because the robot may turn meanwhile.
+    So the report does not regard the gap as rest.
     """
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
@@ -99,7 +99,7 @@ def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
 def test_without_odometry_an_even_turn_is_not_taken_for_rest(drive: Drive) -> None:
     """The odometry is missing, and the robot turns steadily.
 
-    The report does not take this for a bias.
+    The report does not mistake this for the bias of a gyro at rest.
     """
     drive.odom.drop(0.0, 99.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
@@ -172,7 +172,7 @@ def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
 def test_an_estop_is_noted_and_what_it_stops_is_not_trouble(drive: Drive) -> None:
     """The e-stop keeps the robot at rest while commands arrive.
 
-    The report does not blame the robot.
+    The report does not call this a fault.
     """
     drive.estops += [(10.0, True), (19.0, False)]
     rows = drive.odom.stamp_s > 10.1

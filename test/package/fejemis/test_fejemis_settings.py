@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the settings of other packages for a Fejemis, and of its robot description."""
+"""Tests of the configuration of Nav2 and of the filter for a Fejemis, and of its description."""
 
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,8 @@ def load(name: str) -> Any:
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
     """The filter fuses only velocities and the yaw rate of the gyro.
 
-    It fuses no poses and accelerations, and not the board's yaw, which is computed from the gyro.
+    It fuses no poses and no accelerations. It does not fuse the board's yaw, because the board
+    computes it from the gyro.
     """
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {

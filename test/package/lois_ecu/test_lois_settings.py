@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the settings of other packages for the LOIS ECU: topics, limits, no sideways motion."""
+"""Tests of the configuration of Nav2 and of the filter for the LOIS ECU."""
 
 from pathlib import Path
 from typing import Any

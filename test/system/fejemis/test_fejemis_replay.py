@@ -22,7 +22,7 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of recorded packets that a replay needs to recognise both Teensys, at rest for about 1 s.
+"""Number of packets by which a replay recognises both Teensys. They are from about 1 s of rest.
 
 A recording may begin after the Teensys have answered the driver's first questions.
 """

@@ -105,7 +105,7 @@ def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant(
 def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
     """The times have only random noise.
 
-    The tool does not take a chance pattern for misplaced marks.
+    The tool does not mistake a chance pattern for misplaced marks.
     """
     random = np.random.default_rng(4)
     assert marks_in([0.1 * random.standard_normal(120) for _ in range(24)], TICKS) is None
