@@ -2,8 +2,8 @@
 
 """Faults in random order, several of them at once, under random commands.
 
-Every few steps the commander leaves. Then the robot must come to rest in time, the driver must be
-in its usual state, and the robot must obey a fresh command. All faults of the line end when the
+Every few steps the commander leaves. Then the robot must come to rest in time, and the driver must
+be in its usual state. The robot must then obey a fresh command. All faults of the line end when the
 commander leaves. Only a loss of bytes to the board lasts until the robot is at rest.
 """
 

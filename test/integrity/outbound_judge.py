@@ -2,12 +2,10 @@
 
 """The judge of an outbound trial: it compares what the board understood with what the driver sent.
 
-- The driver *drives* from the first byte of a write with a motion frame until the next frame of
-  another kind should have arrived completely at the board. Then it *stands* until the next write
-  with a motion frame.
-- A set-point is *commanded* if the board understands it while it is among the control frames of the
-  current write or of the write before. It stays commanded until the board understands another
-  frame.
+- The driver *drives* from the first byte of a write with a motion frame. It *stands* from the time
+  at which the next frame of another kind should have arrived completely at the board.
+- A set-point is *commanded* if the board understands it while it is one of the control frames in
+  the current or the previous write. It stays commanded until the board understands another frame.
 - Any other set-point that the board understands while the driver drives is *uncommanded*. It stays
   so until the next commanded set-point, a pause or a reboot.
 - A motion frame that the board understands while the driver stands is *stray*.

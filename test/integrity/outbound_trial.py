@@ -33,11 +33,12 @@ MEMO: Final = 100_000
 
 Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
-"""Results of receivers that were computed before, for one kind of receiver on a running board.
+"""Results that were computed before, for one kind of receiver on a running board.
 
-A key is the bytes that the receiver holds, whether a pause comes before the new bytes, and the new
-bytes. A value is the bytes that the receiver holds afterwards, and the frames, each with the index
-of the byte that completes it. The value is None if the board acts on a letter.
+A key has the bytes that the receiver holds, whether a pause comes next, and the new bytes.
+
+A value has the bytes that the receiver holds afterwards, and the frames. Each frame comes with the
+index of the byte that completes it. The value is None if the board acts on a letter.
 """
 
 

@@ -44,7 +44,7 @@ PATTERNS = {
     "lattice": r"lattices?",
     "farewell": r"farewells?",
 }
-"""The phrases that must not be used: the name of each phrase, and its pattern in full words."""
+"""The phrases that must not be used: the name of each phrase, and its pattern as full words."""
 
 ALLOWED = {
     "test/package/test_plain_english.py": "names the phrases",

@@ -83,7 +83,7 @@ def test_the_drivers_names_are_found() -> None:
 def test_ros_reads_each_parameter_file(path: Path) -> None:
     """rcl reads each parameter file.
 
-    Its parser is stricter than YAML: it has no anchors or mixed lists.
+    Its parser is stricter than YAML: it accepts neither anchors nor mixed lists.
     """
     context = Context()
     rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of all ways in which the driver can end.
+"""Tests of ways in which the driver can end.
 
 It sends Stop last, and its exit code gives the reason.
 """

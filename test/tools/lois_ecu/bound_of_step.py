@@ -36,7 +36,7 @@ Column = NDArray[np.float64]
 def times_s(values: Column) -> Column:
     """Return the times in s at which a starting wheel passes its marks.
 
-    ``values`` are the final rate in marks per s, the slow and the fast time constant in s, and then
+    ``values``: the final rate in marks per s, the slow time constant in s, the fast one in s, and
     the places of the marks.
     """
     rate, slow_s, fast_s = values[:3]
