@@ -77,8 +77,7 @@ class Jobs:
 
     ``moving``: whether the driver has sent the controlled move of the docking job.
 
-    ``turn_record``: pieces of the last TURN_RECORD, until the caller takes them. It is empty if the
-    download failed.
+    ``turn_record``: pieces of the last TURN_RECORD, perhaps none; None if the job was cancelled.
     """
 
     def __init__(self) -> None:
@@ -134,7 +133,6 @@ class Jobs:
         refused if no log was started, or if the server may have lost it.
         """
         if self.job in OWN and not self._waiting:
-            self.turn_record = []
             self._clear()
         if self.job is not None:
             raise RequestRefused(
@@ -151,7 +149,7 @@ class Jobs:
                 " no file would come: copy the file from the controller, or begin a new log by"
                 " ~/start_log"
             )
-        self.job, self._token = job, token
+        self.job, self._token, self.turn_record = job, token, None
         self._request = WORD_OF[job].request(*arguments)
         self._until_s = now + WITHIN_S.get(job, USUAL_S)
 
@@ -236,8 +234,10 @@ class Jobs:
             )
 
     def cancel(self, why: str) -> None:
-        """End the job as failed, for the reason ``why``."""
-        if self.job is not None:
+        """End the job as failed, for the reason ``why``; one of the driver's own jobs just ends."""
+        if self.job in OWN:
+            self._clear()
+        elif self.job is not None:
             self._finish(False, f"{why}; {COPY}" if self.ended and self._waiting else why)
 
     def _close_file(self) -> None:

@@ -98,14 +98,13 @@ class Moves(Asking):
 
     def _use_turn_record(self) -> None:
         """Correct the heading by the record of the last turn, if its download has ended."""
-        pieces, self.jobs.turn_record = self.jobs.turn_record, None
-        turn, self._recorded = self._recorded, None
-        if turn is None or pieces is None:
-            self._recorded = turn
+        if self._recorded is None or self.jobs.job is Job.TURN_RECORD:
             return
-        degrees = recorded_deg(pieces, turn)
-        used = degrees is not None and self.odometry.turn_recorded(degrees)
-        self._unrecorded = 0 if used else self._unrecorded + 1
+        turn, self._recorded = self._recorded, None
+        if self.jobs.turn_record is not None:
+            degrees = recorded_deg(self.jobs.turn_record, turn)
+            used = degrees is not None and self.odometry.turn_recorded(degrees)
+            self._unrecorded = 0 if used else self._unrecorded + 1
         self._surplus.learn(turn, 0.0, self.odometry.spun_rad)
 
     def _doubt_a_copy(self, now: float) -> None:

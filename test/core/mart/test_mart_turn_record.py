@@ -110,6 +110,17 @@ def test_a_new_command_does_not_wait_for_the_record() -> None:
     assert bench.server.chassis.powered
 
 
+def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
+    """The user cancels the goal during each download. This says nothing about the server."""
+    bench = MartBench("source").ready()
+    for count in range(1, UNRECORDED + 3):
+        bench.go_to(0.0, (-1.0) ** count, 0.0)
+        bench.run_until(lambda count=count: downloads(bench) == count, 30.0)
+        bench.session.command_twist(BodyTwist(0.0, 0.0, 0.0), bench.now)
+        bench.run(1.0)
+    assert downloads(bench) > UNRECORDED
+
+
 def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> None:
     """The new frame begins at the present heading, so there is nothing to correct."""
     bench = MartBench("source").ready()
