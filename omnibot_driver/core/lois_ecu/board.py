@@ -4,8 +4,8 @@
 
 Odometry is returned ``odom_rate_hz`` times a second. Between two groups of ticks, it is predicted.
 
-Displacement readings show whether the robot obeys its commands, and whether it is at rest. Such a
-reading is marked as not measured if the board's ticks did not show the motion.
+Displacement readings show whether the robot obeys its commands, and whether it is at rest. If the
+board's ticks did not show the motion, such a reading is marked as not measured.
 """
 
 import math
@@ -47,8 +47,8 @@ RESET_AGAIN_S: Final = 0.9
 """Time in s after which a reset is repeated. By then, the wheels have come to rest after a stop,
 and at least four groups of ticks have arrived at the usual period."""
 STEADY_S: Final = 0.3
-"""Time in s. After this time without a change of the tick counts, the driver treats the counts as
-steady. It is longer than the usual period of the ticks."""
+"""If the tick counts have not changed for this time in s, the driver treats them as steady. The
+time is longer than the usual period of the ticks."""
 
 
 class LoisEcuBoard(Board):
@@ -101,8 +101,8 @@ class LoisEcuBoard(Board):
     def shows_standstill(self) -> bool:
         """Whether the board counts both wheels' ticks now.
 
-        Only then, unchanged ticks prove a standstill. The public firmware counts a wheel's ticks
-        only while its RPM target is positive.
+        Unchanged ticks prove a standstill only while both are counted. The public firmware counts a
+        wheel's ticks only while its RPM target is positive.
         """
         return self._ecu.translation.odometry.counting
 

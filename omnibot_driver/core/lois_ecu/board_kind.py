@@ -2,10 +2,12 @@
 
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-The two kinds differ in two ways. The public firmware sends odometry directly after each group of
-ticks, with the command byte of the ticks (0x12). A board as in the manual sends odometry with its
-own command byte (0x20), and its ticks count in both directions. So if a count falls, the ticks
-count in both directions.
+The two kinds differ in two ways:
+
+- The public firmware sends odometry directly after each group of ticks, with the command byte of
+  the ticks (0x12). A board as in the manual sends odometry with its own command byte (0x20).
+- The public firmware counts ticks only while a wheel is commanded forward, so its counts never
+  fall. A board as in the manual counts in both directions, so its counts can fall.
 
 This module works on changes of the counts and on the order of groups.
 """
@@ -17,8 +19,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""If this number of groups of ticks arrive without odometry directly after them, a group of
-odometry with its own command byte (0x20) shows a board as in the manual."""
+"""A group of odometry with its own command byte (0x20) shows a board as in the manual, if at least
+this number of groups of ticks arrived without odometry directly after them."""
 UNCOUNTED_M: Final = 0.06
 """Distance in m, of both wheels together. If wheels roll backward this far and no count falls, the
 driver concludes that ticks do not count backward."""

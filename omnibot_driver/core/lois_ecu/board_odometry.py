@@ -3,7 +3,8 @@
 """Changes from one group of odometry (0x20) to the next: turn, distance and wheel speeds.
 
 The public firmware computes its odometry from the speeds of both wheels, in whole RPM. While both
-speeds are equal, it does not change the position. The velocity in 0x20 is that of the last tick.
+speeds are equal, the public firmware does not change the position. The velocity in 0x20 is that of
+the last tick.
 
 This module works on groups of odometry, without their times.
 """

@@ -51,13 +51,13 @@ UNFORESEEN_TICKS: Final = 1.5
 """Largest usual difference between a reported and the expected count, in ticks. Above it, the
 filter assumes that the wheel's speed has changed although its set-point has not."""
 SAME_TICKS: Final = 0.6
-"""If a count has not changed, the filter uses it only if it differs from the expected count by at
-least this number of ticks. At a smaller difference, the next tick may not be due yet."""
+"""An unchanged count is used only if it differs from the expected count by at least this number of
+ticks. At a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP``, ``LEAP_M``: largest difference between a reported and the expected heading, in standard
-deviations and in m at the rims. A heading that exceeds both limits is discarded. The board has then
-added up an old speed while the wheel was at rest."""
+deviations and in m at the rims. If a difference exceeds both limits, the heading is discarded: the
+board has added up an old speed while the wheel was at rest."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012

@@ -2,8 +2,8 @@
 
 """Conversation with a LOIS ECU: received lines become readings, and orders become lines.
 
-Each time bytes are sent to the board, ``wrote`` must be called. The odometry depends on the
-commands, because the board reports little about the motion of its wheels.
+The board reports little about the motion of its wheels, so the odometry also depends on the
+commands. Therefore ``wrote`` must be called for all bytes that are sent to the board.
 
 ``translation`` explains what the board sends. ``opening`` explains how settings reach the board,
 and ``outbound`` which set-points are sent.
@@ -261,8 +261,8 @@ class LoisConversation:
         The board does not latch an e-stop. So during an e-stop, the driver sends RPM 0/0 and Stop
         in turn.
 
-        In a terminal mode, only Stop is sent. The public firmware then forwards each received
-        character to the sensor, so it reads at most 480 characters a second.
+        In a terminal mode, the public firmware forwards each received character to the sensor, so
+        it reads at most 480 characters a second. So the driver then sends only Stop.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 

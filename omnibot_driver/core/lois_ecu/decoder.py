@@ -9,8 +9,8 @@ A line that lost or gained characters has a wrong length, so it is discarded. Tw
 one valid line only if fourteen characters in a row are lost: the end of the first line and the
 beginning of the second. The checksum would have to be right too.
 
-This module does not read a clock, and no input raises an error. It holds less than ``LONGEST_LINE``
-bytes between calls, and looks at each byte a bounded number of times.
+This module does not read a clock, and no input raises an error. Between calls, the decoder holds
+fewer than ``LONGEST_LINE`` bytes. It looks at each byte a bounded number of times.
 """
 
 from dataclasses import dataclass, field

@@ -2,24 +2,23 @@
 
 """Assembly of reports that take several lines.
 
-Each is a group: a marker line, then lines with values.
+Such a report is a group: a marker line, then lines with values. A group is returned complete or not
+at all. A lost line makes a group too short. A repeated line makes it too long, and a line of
+another group interrupts it. So usually, only the next line shows whether the group is complete.
 
-A group is returned complete or not at all. A lost line makes a group too short. A repeated line
-makes it too long, and a line of another group interrupts it. So only what follows a group shows
-whether the group is complete.
+A group is returned at once with its last line if two conditions are met:
 
-But a group is returned at once with its last line if it meets two conditions. First, no line equals
-the line before it, so no line was received twice. Second, the values can follow those of the last
-group. Any other group is held until the next line comes, or until no line has come for ``QUIET_S``.
+- No line equals the line before it. So no line was received twice.
+- The values can follow those of the last group.
 
-After such a silence, a held group of a valid length is returned. A shorter group continues to wait,
-because its other lines may be read late. But lines that come almost a period later may belong to
-the next group, if all lines between them were lost. The shorter group is then discarded.
+Any other group is held until the next line comes, or until no line has come for ``QUIET_S``. After
+such a silence, a held group of a valid length is returned. A shorter group continues to wait,
+because its other lines may be read late. It is discarded if the next lines come almost a period
+later, because those lines may belong to the next group.
 
-The command byte 0x12 has two kinds of groups. A group of ticks has 3 lines after the marker. The
-public firmware also sends a group of odometry directly after the ticks, with 6 lines after the
-marker. A count of -1 looks like a marker. The number of lines shows whether a line is a count or a
-marker.
+The command byte 0x12 has two kinds of groups: ticks have 3 lines after the marker, and the odometry
+that the public firmware sends directly after the ticks has 6. A count of -1 looks like a marker.
+The number of lines shows whether such a line is a count or a marker.
 
 Records are assembled in ``record_lines``. This module works on lines and arrival times.
 """

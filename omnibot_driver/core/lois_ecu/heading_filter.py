@@ -36,7 +36,8 @@ class HeadingFilter:
     def forget(self) -> None:
         """Forget all headings.
 
-        The next heading is rejected; the one after it is accepted if both agree.
+        The first heading after that is rejected. The second is accepted if it agrees with the
+        first.
         """
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None

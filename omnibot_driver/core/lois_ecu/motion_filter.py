@@ -206,8 +206,8 @@ class MotionFilter:
 
         ``stddev_m``: standard deviation of the error.
 
-        ``counted``: whether the board counted the wheel's ticks when the error arose. It may have
-        stopped counting since then.
+        ``counted``: whether the board counted the wheel's ticks when the error arose, even if it
+        does not count them now.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)

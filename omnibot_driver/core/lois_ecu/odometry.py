@@ -4,7 +4,7 @@
 
 Counts of ticks are exact, but the public firmware counts only while a wheel is commanded forward.
 At other times, ``motion_filter`` computes from the commands how the wheels should move.
-``comparison`` corrects this by 0x20 (the board's odometry).
+``comparison`` corrects the result by 0x20 (the board's odometry).
 
 The reports do not show wrong wheel sizes or slip. ``size_errors`` estimates how much these change
 the pose.
@@ -169,7 +169,7 @@ class LoisOdometry:
     def stalled(self, wheels: tuple[bool, bool]) -> None:
         """Record which wheels have stalled.
 
-        They are assumed to have rested since their reported speeds last changed.
+        A stalled wheel is assumed to have been at rest since its reported speed last changed.
         """
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
@@ -249,8 +249,8 @@ class LoisOdometry:
     def _after_silence(self, now: float) -> None:
         """Add the errors that arise during a long silence.
 
-        A Stop may not have reached the board, so each wheel may have continued at its speed. The
-        next values of 0x20 (odometry) are compared with the present ones, not with those before the
+        Possibly, a Stop did not reach the board, and each wheel continued at its speed. The next
+        values of 0x20 (odometry) are compared with the present ones, not with those before the
         silence.
         """
         heard_s = max(self._heard_at_s, self._lost_s)

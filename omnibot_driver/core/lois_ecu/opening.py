@@ -3,27 +3,23 @@
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
 All settings are sent in ``ROUNDS`` rounds. The pause between two rounds is longer than the time for
-which the board cannot receive. Writing a gain resets the firmware's controller. So while the robot
-drives, rounds after the first ``ROUNDS`` wait.
-
-Two things confirm the settings: the ticks arrive with the requested period, and a date arrives.
-Each round requests one date, because the board sends no dates after a boot. The rounds continue
-until both things have confirmed the settings.
-
-Later, ``ask_date`` requests the date while the GPS works but the date is unknown. This happens if
-the GPS had no date before, or after midnight.
+which the board cannot receive. Two things together confirm the settings: the ticks arrive with the
+requested period, and a date arrives. Each round requests one date, because the board sends no dates
+after a boot. Further rounds follow until the settings are confirmed. They wait while the robot
+drives, because writing a gain resets the firmware's controller.
 
 A request for one date ends the board's periodic sending of dates. So if the user has set a period
-of the date, the requests end with the first answer. The following rounds restore the period.
+of the date, the requests end with the first answer, and the following rounds restore the period.
+Later, ``ask_date`` requests the date if the GPS works but the date is unknown.
 
-Other commands (``write``) are also sent while the robot drives. They remain queued after a restart
-of the board and after a change of settings. They are sent at least ``AFTER_MOTION_S`` after a
-motion command.
+Other commands (``write``) are also sent while the robot drives, but at least ``AFTER_MOTION_S``
+after a motion command. They remain queued after a restart of the board and after a change of
+settings.
 
 A board in an unexpected terminal mode, or with an unexpected checksum setting, is silent or ignores
-commands. The driver then sends the line that restores the mode, once with and once without a
-checksum. Each write of the terminal mode overwrites the setting "left short correction", so the
-driver writes this setting again afterwards.
+commands. ``recovery`` restores the mode by a line that is sent with and without a checksum. Each
+write of the terminal mode overwrites the setting "left short correction", so the driver writes this
+setting again afterwards.
 """
 
 import math
@@ -55,17 +51,17 @@ LINE_S: Final = 0.02
 AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting.
 
-The board may receive nothing for 13 ms. If it missed the end of a motion command and the beginning
-of the next line, the remaining parts could form another motion command. If the motion command comes
-second, such a mixture is harmless.
+For up to 13 ms, the board may receive nothing. In this time, it could miss the end of a motion
+command and the beginning of the next line. The remaining parts could then form another motion
+command. The opposite order is harmless: the motion command comes second.
 
-The time is shorter than the time between two set-points. So the other command is sent even while
+This constant is shorter than the time between two set-points. So other commands are sent even while
 set-points are sent at the highest rate.
 """
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group to the next round of settings, or to the next request for the date. They
-are used in turn. With a fixed time, the board might be sending another group at each attempt, and
-would then receive nothing."""
+"""Times in s from a group to the next round of settings, or to the next request for the date. The
+times are used in turn. While the board sends a group, it receives nothing. With a fixed time, this
+could happen at each attempt."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest allowed difference between the measured and the requested period of the ticks, as a
 fraction of the requested period. A larger difference does not confirm the settings."""
@@ -179,7 +175,7 @@ class SettingsWriter:
             self._rounds_left, self._round_at_s = 1, now + away_s
 
     def date_came(self) -> None:
-        """Record that a date arrived. It shows that the board obeys requests."""
+        """Record that a date arrived. The date shows that the board obeys requests."""
         if self._rounds and not self._answered:
             self._answered = True
             if self._dates_come_periodically:

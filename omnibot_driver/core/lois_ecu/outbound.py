@@ -2,23 +2,21 @@
 
 """Lines that make the robot move and stop, for a board that loses characters and complete lines.
 
-Damage almost never changes a line into another valid line. The firmware accepts a line if it has 14
-characters (12 without checksum) from its ``:`` to its line feed, and if its checksum is right. It
-counts characters from the last ``:``, and restarts after the fourteenth. So a line that lost
-characters is too short. Two lines become one only if fourteen characters in a row are lost (twelve
-without checksum): the end of the first line and the beginning of the second. A loss of up to two
-characters never makes another valid line. While the board sends a group, it receives nothing for 13
-ms. Set-points are at least 18 ms apart, so such a gap does not remove both the end of a line and
-the beginning of the next.
+Damage almost never changes a line into another valid line. The firmware checks the checksum and the
+number of characters from the last ``:`` to the line feed. So a line that lost characters is too
+short. Two lines become one only if fourteen characters in a row are lost (twelve without checksum):
+the end of the first line and the beginning of the second. While the board sends a group, it
+receives nothing for 13 ms. Set-points are at least 18 ms apart, so such a gap does not remove both
+the end of a line and the beginning of the next.
 
 Stop is duty 0/0. In the firmware, duty 0/0 and RPM 0/0 both remove the power with the controller's
 next step. But duty 0/0 keeps the firmware's RPM target. So after a drive forward, the board
 continues to count ticks while the robot rolls out, and the counts can prove the standstill. RPM 0/0
 ends the counting and clears the measured speed.
 
-RPM 0/0 precedes the first set-points after a Stop. The firmware's controller still uses the last
-measured speed of a wheel at rest. Without RPM 0/0, a slower set-point in the same direction would
-never start the wheel.
+After a Stop, the firmware's controller still uses the last measured speed of a wheel at rest. A
+slower set-point in the same direction would never start the wheel. So RPM 0/0 precedes the first
+set-points after a Stop.
 
 The emergency stop is RPM 0/0. While the emergency stop is latched, RPM 0/0 and Stop are sent in
 turn.

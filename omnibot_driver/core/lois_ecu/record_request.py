@@ -33,7 +33,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
 """Times in s at which the request is sent, counted from the first request. The intervals are longer
-than the time in which the board receives nothing. They are not multiples of its usual periods."""
+than the time in which the board receives nothing. The intervals are not multiples of the board's
+usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Time unit, in s, of the samples of an RPM record. The key is the unit of the board's time in 0x12
 (ticks). In the public firmware, both units differ from those in the manual."""
@@ -86,7 +87,7 @@ class RecordRequest:
         """Return the readings, with the result of the request if it is known now.
 
         The result is the record, or the reason why the record will not come. While the record
-        arrives, the result is a notice of that.
+        arrives, the result is a ``RecordComes``.
 
         ``prevented``: why the board will not send the record, as a sentence. Empty if the record
         may still come.

@@ -36,9 +36,9 @@ board sent something else."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
 """Largest plausible difference between a reported and the expected speed: ``STRAY_RPM``, plus the
-fraction ``STRAY_PART`` of the expected speed. It is for a wheel with a constant set-point and gains
-that the user set. A single larger difference comes from a delayed tick, or from the tick after
-it."""
+fraction ``STRAY_PART`` of the expected speed. The limit applies to a wheel with a constant
+set-point and gains that the user set. A single larger difference comes from a delayed tick, or from
+the tick after it."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks to subtract from the distance of a wheel that has come to rest. The distance
 since its reported speed last changed is subtracted too. The wheel rolls less far than its last

@@ -22,8 +22,8 @@ STEADY_TICKS: Final = 3
 """Smallest count that proves a reset by changing to zero while the wheels are at rest. Backlash of
 the gears can change only smaller counts to zero."""
 UNPROVED_S: Final = 2.5
-"""Longest time in s to wait for a proof. There may never be one, for example if the counts were
-zero before. Meanwhile the reset is repeated."""
+"""Longest time in s to wait for a proof. The reset is repeated until then. Sometimes no proof is
+possible, for example if the counts were zero before the reset."""
 
 
 class ResetProof:

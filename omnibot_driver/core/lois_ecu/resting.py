@@ -3,8 +3,8 @@
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
 For a wheel at rest, the public firmware keeps reporting the speed of the last tick. A wheel slows
-down before it comes to rest, so this speed is usually 5 to 17 RPM. The speed of a wheel that rolls
-steadily is repeated too. But it has not fallen just before.
+down before it comes to rest, so this speed is usually 5 to 17 RPM. The board also repeats the speed
+of a wheel that rolls steadily. But that speed did not fall just before.
 
 This module works on the speeds that the board reports, one for each group, and on the time between
 them.

@@ -45,8 +45,8 @@ class LoisEcuSettings:
 
     ``declination_rad``: declination of magnetic north, east positive.
 
-    ``odom_rate_hz``: rate at which the odometry is published. It is predicted between two groups of
-    ticks.
+    ``odom_rate_hz``: rate at which the odometry is published. Between two groups of ticks, the
+    odometry is predicted.
     """
 
     wheel_radius_m: float = 0.13

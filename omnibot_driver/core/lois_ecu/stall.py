@@ -9,10 +9,10 @@ Ticks show whether a wheel turns forward. For a wheel that should turn backward,
 shows whether it is at rest. While the other wheel is at rest too, the pose in 0x20 does not change.
 While the other wheel turns, 0x20 repeats the same speed for the wheel at rest.
 
-A wheel that rolls steadily also repeats a speed. But this speed is not far above its set-point: far
-above it, the controller gives no power, so the wheel would slow down. There are two exceptions. A
-feed-forward gives power at any speed. A saturated controller may keep full power until RPM 0/0
-restarts it. The wheel is then faster than any wheel that comes to rest.
+The board also repeats the speed of a wheel that rolls steadily. But that speed is not far above the
+set-point: far above the set-point, the controller gives no power, so the wheel would slow down.
+There are two exceptions. A feed-forward gives power at any speed. A saturated controller may keep
+full power until RPM 0/0 restarts it. The wheel is then faster than any wheel that comes to rest.
 
 This module works on set-points, reports and times.
 """
@@ -36,8 +36,8 @@ TOO_FAST_RPM: Final = 3
 speed beyond both limits is the last speed of a wheel at rest. A wheel that rolls backward exceeds
 its set-point by at most 10 % and one RPM."""
 UNLIKE: Final = 1.15
-"""Largest assumed difference between two wheels that roll backward, as a factor. It compares the
-ratio of speed to set-point of one wheel with that of the other."""
+"""Largest assumed difference between two wheels that roll backward, as a factor. For each wheel,
+speed is divided by set-point, and the two results are compared."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 """Smallest number of groups without a sign of motion after which a wheel is regarded as stalled. On
@@ -49,8 +49,8 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``saturated``: for each wheel, whether its controller may give full power. The wheel then rolls,
-    although its reported speed does not change.
+    ``saturated``: for each wheel, whether its controller possibly gives full power. If so, the
+    wheel rolls although its reported speed does not change.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -151,7 +151,7 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether a wheel has no power, as its reported speed reaches its set-point."""
+        """Return whether a wheel has no power, because its reported speed reaches its set-point."""
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 

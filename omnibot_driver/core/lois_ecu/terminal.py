@@ -22,7 +22,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which the driver sends Stop if it cannot see whether the robot is at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after a mode is written, during which reports that the board sent earlier may still
+"""For this time in s after a mode is written, reports that the board sent earlier may still
 arrive."""
 
 

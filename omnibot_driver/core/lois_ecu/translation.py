@@ -47,8 +47,8 @@ RESTARTED_TICKS_PER_S: Final = 60.0
 back between two groups. It is a constant plus a number for each s between the groups. If the counts
 fall towards zero by more, the board has restarted."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which the wheels are assumed to have rolled back if the board's clock does
-not confirm the time since the last ticks. The decoder has then forgotten the unit of this clock."""
+"""If the decoder has forgotten the unit of the board's clock, the clock cannot confirm the time
+since the last ticks. The wheels are then assumed to have rolled back for at most this time in s."""
 
 
 class Translation:

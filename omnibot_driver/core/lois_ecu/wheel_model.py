@@ -2,8 +2,8 @@
 
 """Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
-The public firmware stores an RPM target for each wheel. The sign of the target decides whether
-ticks are counted. The measured speed has the same sign.
+The public firmware stores an RPM target for each wheel. Ticks are counted only while the target is
+positive. The measured speed has the sign of the target.
 
 This module works on set-points and times.
 """

@@ -19,18 +19,19 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A small turn of the robot, by which the driver tests the IMU while the heading is constant.
+"""A small turn of the robot, which tests whether the IMU works.
 
-``WAG_S``: time in s for which the reported heading is constant before the driver makes the turn.
+If the reported heading is constant, the IMU is dead or the robot drives exactly straight. To find
+out which is true, the driver makes a small turn. If the heading then changes, the IMU works.
+
+``WAG_S``: time in s for which the heading must be constant before the driver makes the turn.
 
 ``WAG_UNITS``: units that the driver adds to the left motor and subtracts from the right motor.
-
-A constant heading means that the IMU is dead, or that the robot drives exactly straight. If the
-heading changes after the small turn, the IMU works.
 """
 
 STARTED_M: Final = 0.01
-"""Distance in m that the wheels must roll in a motion to prove that their motors can turn them."""
+"""If the robot moves at least this distance in m in a motion, its motors have enough units to
+turn."""
 
 
 class Adjusting(Moves):
@@ -88,10 +89,9 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add the uncertainty of a time in which only the left wheel may have turned.
+        """Add uncertainty to the pose, because the left wheel may have turned for ``seconds``.
 
-        The encoder is on the right wheel, so it does not show a turning left wheel. ``seconds``:
-        this time, in s.
+        The encoder is on the right wheel, so it does not show a turning left wheel.
         """
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds

@@ -3,9 +3,9 @@
 """Queries that show which motion is in progress after the driver has used the stop port.
 
 The command SL on the stop port ends a drive (RM or B) in such a way that a later SM or SRM hangs
-the server permanently. So the driver sends SM and SRM only in one of two cases:
+the server permanently. So the driver sends SM and SRM only after one of these two signs:
 
-- The server does not refuse RST IMU, the check of the IMU. It refuses this check during a motion.
+- The server accepts RST IMU, the check of the IMU. During a motion, it refuses this check.
 - The encoder shows that the robot moves.
 
 This module knows commands and replies; it does not know why the stop port was used. The caller

@@ -50,7 +50,7 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""Longest time in s without a reading. A reply after this time gives at least NOTHING_MEASURED.
+"""If the last reading is older than this time in s, the next reply gives at least NOTHING_MEASURED.
 
 Measurements of a moving robot come at shorter intervals.
 """
@@ -201,8 +201,8 @@ class MartBoard(Board):
     def wake(self) -> Packets:
         """Return the commands that stop the robot at the beginning of a connection.
 
-        The pilot repeats these commands until the server answers. Only then does it send other
-        requests.
+        The pilot repeats these commands until the server answers. Only then does the pilot send
+        other requests.
         """
         return self.stop()
 
@@ -234,8 +234,9 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server has not run RM since it was started.
 
-        Only then may the driver set the server's clock back. RM integrates the heading over the
-        time since the previous RM. If the clock was set back in that time, the heading is useless.
+        RM integrates the heading over the time since the previous RM. If the server's clock is set
+        back between two RM commands, the heading is useless. So the driver must set the clock back
+        only before the first RM.
         """
         return self._pilot.odometry.heading.is_zero
 

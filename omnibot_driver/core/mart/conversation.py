@@ -7,9 +7,10 @@ checks whether the form of a reply and its failure text fit the pending request.
 the reply does not come sooner than the command allows. A reply that does not fit is regarded as
 late and discarded.
 
-After an unanswered query, the driver sends no query with the same form of reply until the missing
-reply can no longer come. The queries for driving cannot wait that long. The driver marks the
-replies to them as doubtful, and their recipient compares them with the expected values.
+The missing reply to a query may still come late. Until it can no longer come, the driver sends no
+query with the same form of reply. There is one exception: the queries for driving cannot wait that
+long. The driver marks their replies as doubtful, and the receiver of a doubtful reply compares it
+with the expected value.
 
 This module knows requests and replies; it does not know what the requests are for. The caller
 passes the time.
@@ -61,8 +62,8 @@ PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
-The server then refuses the check, or finds no IMU. All other replies to a check take at least
-``least_s``.
+With these texts, the server refuses the check, or reports that it finds no IMU. All other replies
+to a check take at least ``least_s``.
 """
 
 
@@ -146,7 +147,7 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Stop expecting a missing reply of this form, because ``reply`` is the missing reply.
+        """Record that ``reply`` is a late reply; no other late reply of its form is expected then.
 
         Do nothing if ``reply`` is a copy of an earlier reply.
         """
@@ -201,8 +202,9 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The missing reply is recorded, because it may still come late. The reply to a controlled
-        move is not recorded, because the stop of the move waits for that reply.
+        The missing reply is recorded, because it may still come late. There is one exception: the
+        reply to a controlled move is not recorded, because the code that stops the move waits for
+        it.
         """
         if self.pending is None:
             return None
@@ -260,8 +262,9 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether the reply is a duplicate of the reply to another query.
 
-        That is assumed if an identical reply to another query has just come, and the previous reply
-        to ``word`` was different. The true reply to ``word`` is then still to come.
+        It is regarded as a duplicate if two conditions are met. An identical reply to another query
+        has just come, and the previous reply to ``word`` was different. The true reply to ``word``
+        is then still to come.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA

@@ -54,16 +54,16 @@ distance from the centre to the point about which the robot turns.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Ratio of two errors of a turn whose angle is known only from the commands.
+"""Standard deviation of a turn's random error, divided by that of its constant error.
 
-The first error has the same direction in all steps of the turn. The second error is independent in
-each step. Its standard deviation is BEND_WALK times that of the first error.
+The two errors are those of a turn whose angle is known only from the commands. The constant error
+has the same direction in all steps of the turn. The random error is independent in each step.
 """
 ASTRAY: Final = 0.7
-"""Relative error of a driven distance, divided by the variance of the heading in rad².
+"""Factor that converts the variance of the heading (rad²) to a relative error of a driven distance.
 
-The error is equally large along and across the direction of motion. It is at most the distance
-itself.
+An uncertain heading causes this error. The error is equally large along and across the direction of
+motion. It is at most the distance itself.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval of length 1.
@@ -71,7 +71,7 @@ SPREAD: Final = 0.3
 The exact value is 1/√12.
 """
 CLOCK_S: Final = 0.01
-"""Least assumed uncertainty of a reply's time, in s. It is reached on a good network."""
+"""Least assumed uncertainty of a reply's time, in s. A good network has this uncertainty."""
 Errors = list[tuple[float, float, float, float]]
 
 
@@ -101,8 +101,8 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the ratio of left to right wheel speed. It is 0 unless this
-        ratio alone shows the turn.
+        ``bend``: standard deviation of the ratio of left to right wheel speed. Pass it only if the
+        turn is computed from this ratio. If the turn is measured, pass 0.
 
         ``aside_m``: standard deviation in m of the position across the direction of motion. This
         error arises because the heading was not measured at the time of the count.
@@ -138,7 +138,7 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Record that a motion has begun, so that ``heading_told`` can remove its heading error."""
+        """Record that a motion has begun. ``heading_told`` can later remove its heading error."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:

@@ -22,7 +22,7 @@ SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
 """Motor units of controlled moves that are sent without SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After ENOUGH_MOVES moves, the robot need not come nearer to the goal than ENOUGH_M (m).
+"""After ENOUGH_MOVES moves, a distance of ENOUGH_M (m) from the goal is near enough.
 
 To come nearer, the robot would have to turn towards the goal first.
 """
@@ -49,7 +49,7 @@ MOST_MOVES: Final = 9
 
 
 LEAST_LIKE: Final = 0.35
-"""Relative difference between a move and its request, above which the move may have run twice."""
+"""If a move differs from its request by more than this fraction, it may have run twice."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus a time for each degree or inch.
 
@@ -67,7 +67,8 @@ class Done:
 
     ``lasted_s``: duration of the move.
 
-    ``quiet_s``: longest time that a duplicate of the move may have run before the encoder was read.
+    ``quiet_s``: longest possible time from the start of a duplicate of the move to the reading of
+    the encoder.
     """
 
     request: Request

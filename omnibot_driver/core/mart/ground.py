@@ -38,11 +38,10 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Time in s that the driver waits after the server has appeared, before it starts a motion.
+"""Time in s from the server's first reply after an absence until the driver starts a motion.
 
-The time begins with the server's first reply after an absence. The server opens its ports before it
-has started up completely. VOLTS and most motions crash a server that has just started. If RM
-crashes the server, the motors stay on.
+The server opens its ports before it has started up completely. VOLTS and most motions crash a
+server that has just started. If RM crashes the server, the motors stay on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Silence after which the server is regarded as absent.
@@ -111,7 +110,7 @@ class Ground:
         self.conversation.delay_s = settings.network_delay_s
 
     def connect(self) -> None:
-        """Begin a new connection: the server may be moving the robot."""
+        """Begin a new connection. The state is unknown, because the robot may be moving."""
         self.conversation.connect()
         self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
         self.jobs.forget_log()
@@ -187,7 +186,7 @@ class Ground:
         self.heard_s = now
 
     def _appears(self, now: float) -> None:
-        """Record that the server may have been restarted, so that its log may be lost."""
+        """Record that the server may have been restarted, and that its log may be lost."""
         self.appeared_s = now
         self.jobs.log_may_be_lost = self.jobs.logging
         self.jobs.ended = False

@@ -51,7 +51,8 @@ A reading is uncertain if the reply may belong to another query.
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""Time in s for which a failed RM is regarded as the cause if the robot moves without a command."""
+"""If the robot moves without a command within this time in s after a failed RM, RM was the
+cause."""
 
 
 class Health:
@@ -67,8 +68,8 @@ class Health:
 
     ``reference_fails``: number of bare ``fail`` replies to RM in a row.
 
-    ``outlived``: whether the server has ended a motion only after the driver had used the stop
-    port. The stop port or the next motion of such a server may hang.
+    ``outlived``: whether the server has reported the end of a motion only after the driver had used
+    the stop port. If so, a stop of its next motion can fail.
 
     ``status``: the bits of the last accepted MCSTAT, or None.
 
@@ -102,7 +103,7 @@ class Health:
     ) -> list[Reading]:
         """Return the readings from a reply to one of the less frequent queries.
 
-        ``uncertain``: whether the reply may belong to another query. The reading is then returned
+        ``uncertain``: whether the reply may belong to another query. If so, the reading is returned
         only after several equal readings in a row.
         """
         if word is VOLTS:

@@ -19,10 +19,10 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest change of the motors' units that may remain unanswered while the heading is unknown.
+"""Largest change of the motors' units that the server need not answer while the heading is unknown.
 
-The change is the ``part`` of ``SpeedLoop``. After a larger unanswered change, the driver does not
-know whether the robot turns, so it stops the robot.
+Without an answer to a larger change, the driver does not know whether the robot turns, so it stops
+the robot. The size of a change is the ``part`` of ``SpeedLoop``.
 """
 
 
@@ -95,7 +95,7 @@ class Hearing(Measuring):
             self._named_s = self._name_from_s
 
     def _named_in_a_move(self, now: float) -> None:
-        """Stop any motion: the server gives its name, although it should be busy with a move.
+        """Stop any motion, because the server gives its name although a move should keep it busy.
 
         Either the reply that ended the move was lost, or the server was restarted while the motors
         turned.

@@ -23,11 +23,11 @@ from omnibot_driver.core.mart.words import (
 )
 
 PROVED_S: Final = 0.2
-"""Largest age in s of the last successful check of the IMU with which a motion may start."""
+"""A motion starts only if the last successful check of the IMU is at most this old, in s."""
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, the driver regards its result as older, by half of the additional time.
+If a check takes longer, the driver adds half of the additional time to the age of the result.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """Number of failed checks in a row after which the IMU is regarded as dead."""

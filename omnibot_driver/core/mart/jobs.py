@@ -2,11 +2,11 @@
 
 """Jobs: requests to the controller besides motion, one at a time.
 
-The jobs are gyro calibration, docking, setting the clock, and starting and downloading logs. The
-server first sends the name and the size of a file. Then it sends the file in pieces of 512 bytes
-without numbers. The driver detects a lost or duplicated piece by the total size, or by two
-identical pieces. This module knows commands and replies; it does not know when the command port is
-free. The caller passes the time.
+The jobs are gyro calibration, docking, setting the clock, and starting and downloading logs. For a
+download, the server first sends the name and the size of the file. Then it sends the file in pieces
+of 512 bytes. The pieces are not numbered. The driver detects a lost or duplicated piece by the
+total size, or by two identical pieces. This module knows commands and replies; it does not know
+when the command port is free. The caller passes the time.
 """
 
 import math
@@ -128,9 +128,9 @@ class Jobs:
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job.
 
-        A new job replaces one of the driver's own jobs, unless its command was already sent.
-        Raises RequestRefused while another job is in progress. A download of the log is also
-        refused if no log was started, or if the server may have lost it.
+        The new job replaces a job of the driver itself whose request was not sent yet. Raises
+        RequestRefused while another job is in progress. A download of the log is also refused if no
+        log was started, or if the server may have lost it.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -199,7 +199,7 @@ class Jobs:
             self._finish(False, f"the controller did not answer {word.text}; {advice}")
 
     def moved(self, reply: Ok | Fail, now: float) -> None:
-        """End the docking job if the controlled move that has ended was the move of this job.
+        """End the docking job if its controlled move is the one that has just ended.
 
         ``reply``: the server's reply to the move.
         """

@@ -24,8 +24,8 @@ ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 
 ``ROLLS_S``: after a stop.
 
-``ROLLS_AFTER_MOVE_S``: after a controlled move. If the move fails, the server reports the failure
-before the robot is at rest.
+``ROLLS_AFTER_MOVE_S``: after a controlled move. This time is longer, because the server reports the
+failure of a move before the robot is at rest.
 """
 
 
@@ -67,8 +67,8 @@ class Measuring(Starts):
         at the start of each RM, and whenever it changes its sign. So a zero shows a restart only if
         the previous heading was not near zero.
 
-        ``before_rad``: the previous heading, or None. If it is None, a zero shows a restart if the
-        server has been absent since the last start.
+        ``before_rad``: the previous heading, or None if it is unknown. Without it, a zero shows a
+        restart only if the server has been absent since the last motion was started.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False

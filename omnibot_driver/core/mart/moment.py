@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Final
 
 UNCERTAIN_S: Final = 0.1
-"""Time uncertainty of a reply, in s, at and above which the reply is regarded as uncertain."""
+"""A reply whose time uncertainty is at least this long, in s, is regarded as uncertain."""
 
 
 @dataclass(frozen=True, slots=True)

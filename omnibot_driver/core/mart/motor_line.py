@@ -4,8 +4,8 @@
 
 A motor without a regulator needs some units before it turns, so its speed is not proportional to
 its units. With a single factor, learned at a high speed, slow wheels would turn too slowly. A speed
-is given in nominal units: the number of units with which an ideal motor has this speed. This module
-knows units; it does not know wheels or time.
+is given in nominal units. For example, a speed of 10 is that of an ideal motor with 10 units. This
+module knows units; it does not know wheels or time.
 """
 
 import math
@@ -76,7 +76,7 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add these changes to the slope and the offset of the line.
 
-        The other motor's line has just been changed by the same amounts, by a measurement.
+        A measurement has just changed the line of the other motor by the same amounts.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)
@@ -108,5 +108,5 @@ class MotorLine:
         return self.slope * units + self.offset
 
     def units(self, speed: float) -> float:
-        """Return the command units that give a positive speed, in nominal units."""
+        """Return the command units for ``speed``, which is positive and in nominal units."""
         return (speed - self.offset) / self.slope

@@ -2,8 +2,8 @@
 
 """What the driver knows about the two motors: the speed of each for its command units.
 
-Each motor has a ``MotorLine``, whose speeds are in nominal units. A speed in nominal units is the
-number of units with which an ideal motor has this speed. This module knows units, m/s and rad/s; it
+Each motor has a ``MotorLine``, whose speeds are in nominal units. For example, a speed of 10
+nominal units is that of an ideal motor with 10 units. This module knows units, m/s and rad/s; it
 does not know what is commanded.
 """
 

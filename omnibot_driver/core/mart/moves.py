@@ -83,7 +83,7 @@ class Moves(Asking):
         """Learn by how much a move that has ended goes beyond its target.
 
         The wheel does not measure a turn exactly, so the driver first downloads the record of the
-        turn. It does not do so on a network that has just lost or delayed datagrams.
+        turn. On a network that has just lost or delayed datagrams, the driver skips this download.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._unrecorded < UNRECORDED and not self.conversation.disturbed(now):

@@ -47,7 +47,7 @@ This time is a little shorter than STARTS_UP_S, so that the voltage is known bef
 motion.
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s for which unanswered requests delay a VOLTS query."""
+"""Unanswered requests delay VOLTS at most until this time in s after the previous VOLTS."""
 SILENT_S, GREET_AGAIN_S = 0.15, 0.1
 """Times in s after which the driver sends HELLO to a silent server.
 
@@ -68,8 +68,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``.
 
-        A motion command or a stop also cancels the present job. A goal that is only repeated does
-        not cancel the reading of a turn's angle.
+        A motion command or a stop also cancels the present job. There is one exception: if the
+        command repeats the present goal, the job that reads the angle of a turn continues.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -208,8 +208,9 @@ class Pilot(Hearing):
         """The time at which to stop a suspected duplicate of a move; infinite if none is suspected.
 
         A duplicate of a controlled move runs after the move. It blocks the command port, so the
-        server does not answer ENC. The stops SL and SS would hang a server that drives by RM or B.
-        They are safe here, because the last motion was a controlled move.
+        server does not answer ENC. The duplicate is stopped by SL and SS. These commands would hang
+        a server that drives by RM or B. They are safe here, because the last motion was a
+        controlled move.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected:

@@ -40,7 +40,8 @@ ACCELERATION_RADPS2: Final = 3.0
 FRESH_S: Final = 0.2
 """Largest age in s of the last heading with which the measured turn rate is still valid."""
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations of the motion while a connection was lost in a drive, in m and rad."""
+"""Standard deviations, in m and rad, of a motion that is not measured while a connection is
+lost."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 
@@ -213,10 +214,10 @@ class Reckoning:
 
     @property
     def maybe(self) -> tuple[float, float]:
-        """Distance of the right wheel in m, and turn in rad, that may be missing in the pose.
+        """Distance of the right wheel in m, and turn in rad, that the pose may lack.
 
-        They are missing if the last motion has begun. Both are zero if it is certain whether the
-        motion has begun.
+        Some counts do not show whether the last motion has begun. If it has begun, the pose lacks
+        these two values. Both are zero if the counts show whether it has begun.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -252,7 +253,7 @@ class Reckoning:
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct a heading that was computed from commands, once the server reports the turn.
 
-        Return the correction in rad. It is not a motion of the robot.
+        Return the correction in rad. The correction is not a motion of the robot.
         """
         if not self._guessed:
             return 0.0
@@ -274,9 +275,9 @@ class Reckoning:
     def turn_recorded(self, degrees: float) -> bool:
         """Correct the heading after a controlled turn by the angle that the server has recorded.
 
-        ``degrees``: this angle, with the server's sign. Returns False, and corrects nothing, if the
-        angle differs too much from the turn measured at the wheel, or if the turn was not the last
-        motion in this odometry frame.
+        ``degrees``: this angle, with the server's sign. In two cases, it corrects nothing and
+        returns False: the angle differs too much from the turn measured at the wheel, or the turn
+        was not the last motion in this odometry frame.
         """
         told_rad = math.radians(degrees) * self._settings.heading_sign
         wrong_rad = told_rad - self.spun_rad

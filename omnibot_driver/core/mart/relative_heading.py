@@ -17,7 +17,7 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""Difference in rad up to which the first heading after an RM command may still be the old one.
+"""If the first heading after an RM command differs by less than this (rad), it may be the old one.
 
 The old heading is the last one before the command. The server resets the heading only when RM
 begins.

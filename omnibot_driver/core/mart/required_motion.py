@@ -18,10 +18,10 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Largest part of a yaw rate that may still be missing when a turn on the spot begins.
+"""A turn on the spot begins only when its yaw rate is this near to the final value.
 
-An acceleration limit changes the yaw rate in a ramp. The turn begins when the yaw rate differs from
-its final value by at most this fraction of the final value.
+The number is a fraction of the final value. An acceleration limit changes the yaw rate in a ramp,
+so the yaw rate does not have its final value at once.
 """
 
 

@@ -2,11 +2,11 @@
 
 """The control of both motors: which command units give the wanted speed and turn rate.
 
-The server applies changes of the units without controlling the speed, so the effect of a unit
-depends on voltage, motor and floor. For each side the driver learns a ``MotorLine``, from windows
-of steady driving and from turns on the spot. It holds the heading by the integral of the turn
-rate's error. This module knows units, m/s and rad; it does not know commands. The caller passes the
-time.
+The driver sends changes of the motors' command units. The server does not control the speed, so the
+effect of a unit depends on voltage, motor and floor. For each side the driver learns a
+``MotorLine``, from windows of steady driving and from turns on the spot. It holds the heading by
+the integral of the turn rate's error. This module knows units, m/s and rad; it does not know
+commands. The caller passes the time.
 """
 
 import math
@@ -53,7 +53,7 @@ MORE_TIMES: Final = 3
 """If a start does not turn the motors, the units of the next start are larger by this factor."""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
-"""Time in s after a new commanded turn rate in which no heading error is integrated."""
+"""The heading error is not integrated for this time in s after a new commanded turn rate."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Effect of an uncertain change of units on the variance of the ratio of the wheel speeds.
@@ -141,9 +141,10 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        MOST_DEAD units or more turn each motor that is not blocked, so nothing is learned from such
-        units. The line of a motor also stays unchanged if it shows that the motor certainly turns
-        with its present units. Then only the next start uses more units.
+        A motor that has MOST_DEAD units or more and does not turn is blocked, so nothing is learned
+        from it. With fewer units, the next start uses more units, and the line of the motor is
+        changed. There is one exception: the line stays unchanged if it shows that the motor
+        certainly turns with its present units.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

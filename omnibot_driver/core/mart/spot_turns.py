@@ -62,7 +62,7 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 ``SEEN_RAD``: the turn exceeds this angle in rad.
 
 ``TOLD_RAD``: above this angle in rad, the driver uses the angle that the server reports. The server
-reports whole degrees, which are then more precise than the wheel.
+reports whole degrees. For large angles, they are more precise than the wheel.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
@@ -119,9 +119,9 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
 
-        ``rate_radps``: the rate of the turn.
-
         The driver must send SSP before it checks the IMU.
+
+        ``rate_radps``: the rate of the turn.
 
         ``delay_s``: longest delay of a datagram, in s. The next setting waits for this time, so
         that a copy of the older setting cannot arrive after it.
@@ -210,13 +210,14 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the rate to learn: the measured rate, or a minimum in place of a lower rate."""
+        """Return the measured rate, or LEAST_LESSON of the commanded rate if that is more."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
-        """Return whether a number in a reply cannot be the angle of the turn that was stopped.
+        """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        Such a number is a late reply to a query, for example an encoder count.
+        The result is True if the number differs too much from the expected angle of the turn that
+        was stopped. The reply then answers an earlier query, for example that of the encoder.
 
         ``unseen_s``: time from the last count to the stop, in s.
 
@@ -265,9 +266,9 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from a slow turn, if this turn shows that it was hindered.
+        """Forget what was learned from a slow turn, if the next turn shows that it was hindered.
 
-        ``part``: rate of this turn, as a fraction of the commanded rate.
+        ``part``: rate of the next turn, as a fraction of the commanded rate.
 
         From the slow and the fast turn together, the driver would learn a dead zone that the motors
         do not have.

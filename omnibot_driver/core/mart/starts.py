@@ -253,7 +253,7 @@ class Starts(Adjusting):
 
         On some servers the text belongs to the last B. The driver believes a reported obstacle in
         two cases: the front sonar sees an obstacle too, or RM has reported an obstacle twice in a
-        row. It does not rely on any other text.
+        row. The driver does not rely on any other text.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -153,10 +153,10 @@ a second first.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
-"""Commands that do harm if a duplicate arrives late, when another motion has begun.
+"""Commands whose duplicate does harm if it arrives after another motion has begun.
 
-After one of these commands, the driver waits until a duplicate can no longer come. Before that, it
-does not start another motion, nor check the IMU for a start.
+After one of these commands, the driver waits until a duplicate can no longer come. Only then does
+it start another motion, or check the IMU for a start.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

@@ -32,7 +32,7 @@ ANSWERS: Final = {
     Motion.SPIN: (Form.NOTHING, Form.INTEGER),
     Motion.UNKNOWN: (Form.NOTHING, Form.INTEGER),
 }
-"""For each motion, the forms of the ``ok`` with which the server reports its end."""
+"""For each motion, the forms of an ``ok`` reply that reports the end of the motion."""
 ASK_NAME_S: Final = 0.9
 """Time in s from the first stop of a controlled move until the driver asks for the server's name.
 

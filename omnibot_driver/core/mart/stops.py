@@ -30,9 +30,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 3
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S: Final = 0.5
-"""Longest time in s for which the heading may stay constant, plus two exchange durations.
+"""If the heading is constant for this time in s plus two exchange durations, the robot is stopped.
 
-After this time the driver stops the robot, because the IMU is dead or the robot is stuck.
+The IMU is then dead, or the robot is stuck.
 """
 NO_START_S: Final = 1.5
 """Time in s after a start within which the robot must begin to move."""
@@ -134,10 +134,11 @@ class Stops(Ground, ABC):
         """Begin to stop any motion in progress.
 
         ``why``: the reason to report to the user, or empty. With a reason, the driver also discards
-        the user's command. It keeps the command if the direction of the present motion is already
-        refused (see ``_block``).
+        the user's command. There is one exception: if the direction of the present motion is
+        already refused (see ``_block``), the driver keeps the command.
 
-        ``arrived``: whether the start has certainly arrived, so that a stop cannot overtake it.
+        ``arrived``: whether the start has certainly arrived. If so, a stop cannot overtake the
+        start.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
@@ -220,9 +221,10 @@ class Stops(Ground, ABC):
         self._rest(now)
 
     def _may_be_count(self, reply: Reply) -> bool:
-        """Return whether a number in a reply cannot be the angle of the turn that was stopped.
+        """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        Such a number is a late reply to a query, for example an encoder count.
+        The result is True if the number differs too much from the expected angle of the turn that
+        was stopped.
         """
         stopping = self._stopping
         assert stopping is not None

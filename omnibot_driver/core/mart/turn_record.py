@@ -2,10 +2,10 @@
 
 """The angle of a controlled turn, as the server has recorded it (LAST TURN).
 
-The reply to MCR and MCL does not contain the angle. The public server writes it at the beginning of
-a file, as the integral of the gyro until the robot was at rest. The manual does not describe this
-file, so the driver also works without it. This module knows the form of the file; it does not know
-when the file is downloaded.
+The reply to MCR and MCL does not contain the angle. The public server writes the angle at the
+beginning of a file, as the integral of the gyro until the robot was at rest. The manual does not
+describe this file, so the driver also works without it. This module knows the form of the file; it
+does not know when the file is downloaded.
 """
 
 import re

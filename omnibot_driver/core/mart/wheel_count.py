@@ -4,8 +4,9 @@
 
 A reply may answer an earlier query, or contain another number than the count. So the driver
 discards an implausible count. After several implausible counts in a row, it accepts the last of
-them. An impossibly large step to this count then adds no distance. This module knows counts and
-times; it does not know the robot's motion. The caller passes the time and the metres per count.
+them. If the step to this count is impossibly large, the step adds no distance. This module knows
+counts and times; it does not know the robot's motion. The caller passes the time and the metres per
+count.
 """
 
 import math

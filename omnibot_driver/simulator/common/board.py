@@ -20,8 +20,8 @@ class Channel:
     """One connection between a board and the computer.
 
     name: name of the channel on its board; empty if the board has only one channel.
-    parameter: the driver's parameter that names the port of the channel. It is empty if the port
-        follows from another channel's port, because it is the next UDP port.
+    parameter: the driver's parameter that names the port of the channel. It is empty if the channel
+        uses the UDP port after that of the channel before.
     datagrams: True for UDP, False for a serial line.
     """
 

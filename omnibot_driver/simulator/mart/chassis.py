@@ -30,7 +30,7 @@ class Chassis:
     x_m, y_m, yaw_rad: the true pose. The yaw is not wrapped.
     counts: encoder counts of the right wheel since the last reset.
     way_m: total distance; distances forward and backward are added.
-    volts, stuck, motor_status, silent: properties that only ``change`` may set.
+    volts, stuck, motor_status, silent: properties of the motor board. Set them only by ``change``.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -131,7 +131,7 @@ class Chassis:
     def rests(self) -> bool:
         """Whether the robot is at rest and will stay at rest.
 
-        Commands, applied efforts and wheel speeds are then all zero.
+        This is true if commands, applied efforts and wheel speeds are all zero.
         """
         return not (self.powered or self.moving or self._applied_right or self._applied_left)
 

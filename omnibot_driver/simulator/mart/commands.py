@@ -3,7 +3,7 @@
 """The commands of the command port: how they are recognised and checked, and their replies.
 
 The server compares the beginning of a request with its commands, in a fixed order. So the command F
-also matches a request for any later command that begins with F.
+matches every request that begins with F, unless an earlier command matches it.
 
 This module knows command words and numbers; it does not know how a motion proceeds.
 """
@@ -231,7 +231,7 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """Set how near an obstacle in front may be in the next TF, in inches (TFSFC)."""
+    """Set the clearance in front, in inches, below which the next TF stops (TFSFC)."""
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 

@@ -11,9 +11,10 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    alive: whether the IMU is plugged in. The caller can set it at any time. The settings can plan a
-        time in which the IMU fails even if this is true.
-    closed: whether the server has stopped using the IMU. RST IMU or SB ends this.
+    alive: whether the IMU is plugged in. The caller can set ``alive`` at any time. During a failure
+        that the settings have planned, the IMU does not work even if ``alive`` is true.
+    closed: whether the server has stopped using the IMU. After a successful RST IMU or SB, the
+        server uses the IMU again.
     rate_dps: turn rate of the last sample in deg/s, minus the bias that the server knows.
     heading_deg: the relative heading in degrees, left positive.
     """
@@ -64,7 +65,7 @@ class Imu:
     def drift(self, now: float, *, integrates: bool) -> None:
         """Advance to ``now``. The robot has been at rest since the previous sample.
 
-        ``integrates``: whether the unknown part of the bias changes the heading meanwhile.
+        ``integrates``: whether the unknown part of the bias changes the heading during this time.
         """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)

@@ -92,7 +92,7 @@ class Motion:
     def limit(self, inches: int) -> None:
         """Set the time after which the motion stops.
 
-        It follows from a distance and the calibration.
+        The time follows from the distance and the calibration.
         """
         up_s, down_s = RAMPS_S[self.word]
         top_inps = TOP_SPEED_INPS[self.word]

@@ -157,7 +157,8 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    With 0 degrees or less, the command only tests the IMU, unless the quirk ``probe_turns`` is set.
+    With 0 degrees or less, the command only tests the IMU. With the quirk ``probe_turns``, it also
+    runs the motors.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word

@@ -133,7 +133,8 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 def take_bias(server: "MartServer", text: str) -> str | None:
     """Measure the gyro bias (SB).
 
-    If the server has stopped using the IMU, it first opens the IMU again. If it cannot, SB fails.
+    If the server has stopped using the IMU, it first opens the IMU again. If it cannot open the
+    IMU, SB fails.
     """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
@@ -224,7 +225,7 @@ def last_file(which: str) -> Handler:
 
 
 def leave(server: "MartServer", text: str) -> str | None:
-    """End the program (EXIT). If a log is open, send it first."""
+    """End the program (EXIT). If a log is open, send the log first."""
     if server.log is not None:
         content = (
             "\n".join([*server.log, f"{server.date} UDP server shutting down"]) + "\n"
@@ -261,7 +262,7 @@ def set_motors(server: "MartServer", text: str) -> str | None:
 
 
 def stop_motors(server: "MartServer", text: str) -> str | None:
-    """Stop the motors if MCS started them (MSM)."""
+    """Handle the command MSM: stop the motors if the command MCS started them."""
     if server.manual:
         server.manual = False
         server.drive(128, 128)

@@ -16,8 +16,8 @@ class Quirks:
     """Deviations of the public server from its manual: none by default.
 
     stop_port_keeps_motion: SL stops F, B and RM, but the server regards the motion as still in
-        progress. It refuses every later motion with a conflict. SM or SRM then hangs the command
-        port permanently.
+        progress. So the server refuses every later motion with a conflict, and a later SM or SRM
+        hangs the command port permanently.
     spin_stop_ends_drives: SS stops F, B and RM, as SL does.
     early_stop_is_ignored: before the reply to F, B, R, L or RM, a stop on the stop port has no
         effect.
@@ -41,7 +41,7 @@ class Quirks:
     crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR with too few numbers end the server.
     crashes_early: VOLTS and all motions except F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
-    exit_is_silent: EXIT is not answered unless LOG was sent before.
+    exit_is_silent: EXIT is answered only if LOG was sent before.
     log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN, so that these commands
         fail.
     unknown_reset_repeats: the reply to RST with an unknown word is a copy of the previous reply.

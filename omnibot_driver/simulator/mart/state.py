@@ -126,7 +126,10 @@ class ServerState:
 
     @property
     def conflict(self) -> bool:
-        """Whether the server refuses motions, as a motion, a recording or MCS is in progress."""
+        """Whether the server refuses motions.
+
+        The server refuses motions while a motion, a recording or MCS is in progress.
+        """
         return self.manual or self.recording or any(each.running for each in self.motions)
 
     def save(self, note: FileNote) -> None:
@@ -152,7 +155,7 @@ class ServerState:
     def clearance_in(self, *, backward: bool) -> int:
         """Return the last reading, in inches, of the sonar that the present motion uses.
 
-        It is -1 if no wall is in range, or before the first reading.
+        The result is -1 before the first reading, and if no wall is in range.
         """
         since_s = self.sampling_since_s
         if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:
@@ -169,7 +172,7 @@ class ServerState:
 
         With the quirk ``heading_starts_off``, the first sample of RM changes the heading by half
         the turn rate times the time since the last sample of the previous RM. This time is huge if
-        the clock was set back meanwhile.
+        the clock was set back between the two samples.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s
