@@ -283,8 +283,8 @@ class LoisEcuBoard(Board):
     def reset(self) -> Packets:
         """Return Stop and the reset command.
 
-        ``due`` repeats both until the ticks show the reset, until the robot is driven again, or
-        until they were sent ``RESETS`` times.
+        ``due`` repeats both. The repetitions end when the ticks show the reset, when the robot is
+        driven again, or when both were sent ``RESETS`` times.
         """
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own

@@ -69,8 +69,8 @@ SWERVED_M: Final = 0.05
 """Standard deviation, in m, that is added to the position after 1 m at an oscillating speed. The
 position is then uncertain even if the distances of the wheels are known."""
 EQUAL_RPM: Final = 3.0
-"""Assumed standard deviation, in RPM, of the difference between the true speeds of both wheels
-while the board reports equal speeds."""
+"""While the board reports equal speeds of both wheels, the true speeds are assumed to differ. This
+is the standard deviation of their difference, in RPM."""
 
 
 class Comparison:

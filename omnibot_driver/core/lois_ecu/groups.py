@@ -56,8 +56,8 @@ QUIET_S: Final = 0.05
 lines of a group 1.2 ms apart, and a reader usually delivers them within this time."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest allowed pause within a group, as a fraction of the time from the marker of the previous
-group to the marker of this group. This limit is at least ``QUIET_S`` and at most ``LATE_S``."""
+"""Longest allowed pause within a group, as a fraction of the time between the markers of the
+previous group and of this group. The pause limit is at least ``QUIET_S`` and at most ``LATE_S``."""
 
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),

@@ -174,7 +174,7 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """Restore the state at ``then_s``, when the board restarted. Later estimates are discarded.
+        """Restore the state at the time ``then_s`` of a restart. Discard later estimates.
 
         A restarted board does not drive its wheels, so the wheels coast. If ticks count in both
         directions, the counts have restarted at zero and show how far the wheels coasted. Otherwise

@@ -6,7 +6,7 @@ Damage almost never changes a line into another valid line. The firmware checks 
 number of characters from the last ``:`` to the line feed. So a line that lost characters is too
 short. Two lines become one only if fourteen characters in a row are lost (twelve without checksum):
 the end of the first line and the beginning of the second. While the board sends a group, it
-receives nothing for 13 ms. Set-points are at least 18 ms apart, so such a gap does not remove both
+receives nothing for 13 ms. Set-points are at least 18 ms apart, so such a gap cannot remove both
 the end of a line and the beginning of the next.
 
 Stop is duty 0/0. In the firmware, duty 0/0 and RPM 0/0 both remove the power with the controller's

@@ -30,8 +30,8 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time. The clock stops while the
 board sends."""
 SURE_AFTER: Final = 2
-"""Number of comparisons that must confirm the unit of the board's clock, after a first comparison
-has shown it. Each comparison is between two successive groups of ticks."""
+"""A comparison of two successive groups of ticks shows the unit of the board's clock. This number
+of further comparisons must confirm the unit."""
 LEARNT_FROM_S: Final = 0.15
 """Shortest time in s between two groups of ticks that can show the unit of the board's clock. Over
 a shorter time, arrival times are too inexact."""

@@ -48,8 +48,8 @@ SWINGS_PART: Final = 0.4
 """Fraction of the time between two reports for which an unexpected change of speed is assumed to
 have lasted."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a wheel's controller while the reports show no tick of the wheel, as
-a fraction of ``WINDUP_M``."""
+"""While the reports show no tick of a wheel, the integral of its controller is assumed to be at
+most this fraction of ``WINDUP_M``."""
 
 
 class ReportedSpeed:

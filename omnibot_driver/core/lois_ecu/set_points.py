@@ -73,7 +73,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` put RPM 0/0 before the next set-points again."""
+        """Make ``wheels`` again put RPM 0/0 before the next set-points."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

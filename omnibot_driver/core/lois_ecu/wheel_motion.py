@@ -50,8 +50,8 @@ wheel without power."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
-"""Longest assumed time in s for which a wheel rolls on in the old direction after its set-point has
-changed sign."""
+"""After its set-point has changed sign, a wheel is assumed to roll on in the old direction for at
+most this time in s."""
 UNSETTLED_S: Final = (0.27, 0.06)
 """Assumed time in s for which a wheel's speed differed from the model before the wheel was halted.
 The first value is for the board's own gains, with which the speed oscillates. The second value is

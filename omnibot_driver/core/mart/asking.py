@@ -2,8 +2,8 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-The command SL on the stop port ends a drive (RM or B) in such a way that a later SM or SRM hangs
-the server permanently. So the driver sends SM and SRM only after one of these two signs:
+After the command SL on the stop port has ended a drive (RM or B), a later SM or SRM hangs the
+server permanently. So the driver sends SM and SRM only after one of these two signs:
 
 - The server accepts RST IMU, the check of the IMU. During a motion, it refuses this check.
 - The encoder shows that the robot moves.

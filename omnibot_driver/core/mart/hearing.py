@@ -21,8 +21,8 @@ from omnibot_driver.core.mart.words import Form, Kind, Word
 BLIND_PART: Final = 0.15
 """Largest change of the motors' units that the server need not answer while the heading is unknown.
 
-Without an answer to a larger change, the driver does not know whether the robot turns, so it stops
-the robot. The size of a change is the ``part`` of ``SpeedLoop``.
+Without an answer to a larger change, the driver does not know whether the robot turns. So the
+driver stops the robot. The size of a change is the ``part`` of ``SpeedLoop``.
 """
 
 

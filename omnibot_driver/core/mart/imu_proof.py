@@ -30,7 +30,7 @@ PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 If a check takes longer, the driver adds half of the additional time to the age of the result.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
-"""Number of failed checks in a row after which the IMU is regarded as dead."""
+"""After this number of failed checks in a row, the IMU is regarded as dead."""
 REPEAT_S, DEAD_REPEAT_S = 0.1, 1.0
 
 

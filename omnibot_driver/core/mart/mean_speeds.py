@@ -37,7 +37,7 @@ class MeanSpeeds:
         self._track.append((at_s, self._way_m, self._yaw_rad))
 
     def correct(self, turn_rad: float) -> None:
-        """Add a correction of the heading. It counts as a part of the next displacement's turn."""
+        """Add a correction of the heading, as a part of the next displacement's turn."""
         self._yaw_rad += turn_rad
 
     def forget(self) -> None:

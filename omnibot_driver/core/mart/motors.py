@@ -24,7 +24,8 @@ Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Fewest units at which the speeds of the two motors are compared.
 
-At fewer units the motors are slow, so an error of a line would change the ratio of speeds too much.
+At fewer units the motors are slow. An error of a ``MotorLine`` would then change the ratio of
+speeds too much.
 """
 
 

@@ -21,7 +21,7 @@ from omnibot_driver.core.mart.turn_record import recorded_deg
 from omnibot_driver.core.mart.words import Request
 
 UNRECORDED: Final = 2
-"""Number of turns in a row without a usable record after which no more records are downloaded."""
+"""After this number of turns in a row without a usable record, no more records are downloaded."""
 
 
 class Moves(Asking):

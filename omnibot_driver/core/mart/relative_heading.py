@@ -34,7 +34,7 @@ AHEAD_S: Final = 0.3
 The prediction gives the heading at the time of an encoder count.
 """
 ODD_TIMES: Final = 3
-"""Number of implausible headings in a row after which the last of them is accepted."""
+"""After this number of implausible headings in a row, the last of them is accepted."""
 SPREADS: Final = 4
 """Averaging time of the turn rate, as a multiple of a reply's time uncertainty."""
 

@@ -45,7 +45,7 @@ LEARN_TRIPS, LESS_PER_S = 4, 10.0
 takes. The standard deviation is multiplied by 1 + LESS_PER_S * duration.
 """
 SLOWEST_MPS: Final = 0.015
-"""Measured speed in m/s above which a wheel is regarded as turning."""
+"""A wheel whose measured speed in m/s is above this is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
 """Slowest wheel speed in m/s with which a motion starts, so that the server sees the wheel turn."""
 LEAST_UNITS: Final = 4
@@ -56,7 +56,7 @@ HOLD_AFTER_S: Final = 1.0
 """The heading error is not integrated for this time in s after a new commanded turn rate."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Effect of an uncertain change of units on the variance of the ratio of the wheel speeds.
+"""Effect of an uncertain change of units on the variance of the wheels' speed ratio.
 
 ``COPIED``: the variance grows by this factor times ``part`` squared if the change may arrive twice.
 

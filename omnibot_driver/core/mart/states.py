@@ -147,9 +147,9 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server starts the motors but never answers, or it carries out the command only
-when the IMU works again. MCR and MCL notice the dead IMU, but some servers turn the robot for half
-a second first.
+With a dead IMU, the server does one of two things. It starts the motors but never answers, or it
+carries out the command only when the IMU works again. MCR and MCL are exceptions: they notice the
+dead IMU. But some servers turn the robot for half a second before that.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})

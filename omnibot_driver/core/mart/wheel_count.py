@@ -33,7 +33,7 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""Number of counts, equal to the last count before a start, that show that the start is lost."""
+"""If this number of counts equal the last count before a start, the start is lost."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,8 +130,8 @@ class RunningBoard(ABC, Generic[B]):
     def _due(self, due_s: float) -> tuple[int, float]:
         """Return the number of overdue ticks, and the time in s at which the next tick is due.
 
-        The output of all overdue ticks is sent at once, because a real serial line also continues
-        while the computer that reads it is busy.
+        A real serial line continues while the computer that reads it is busy. So the output of all
+        overdue ticks is sent at once.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

@@ -85,7 +85,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _joined(server: "MartServer") -> bool:
-    """Return whether the server refuses L, because a motion, a recording or MCS is in progress."""
+    """Return whether a motion, a recording or MCS in progress makes the server refuse L."""
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
     others = [each for each in server.motions if each.kind is not Kind.REFERENCE]

@@ -50,11 +50,11 @@ class Quirks:
     undocumented_commands: commands that are not in the manual are accepted. Without this quirk, ENC
         is the only undocumented command that is accepted.
     heading_in_reference_moves_only: the heading of RMRA changes during RM only, according to the
-        public source. The server that was run updates it at any time.
-    probe_turns: MCR by 0 runs the motors until the wheel moves, or for 0.5 s if the IMU is dead,
-        according to the public source.
-    heading_starts_off: the first sample of RM changes the heading by half the turn rate times the
-        time since the last sample of the previous RM, according to the public source.
+        public source. But the running server that was observed updates this heading at any time.
+    probe_turns: according to the public source, MCR by 0 runs the motors until the wheel moves. If
+        the IMU is dead, it runs them for 0.5 s.
+    heading_starts_off: according to the public source, the first sample of RM changes the heading.
+        The change is half the turn rate times the time since the last sample of the previous RM.
     """
 
     stop_port_keeps_motion: bool = False

@@ -170,9 +170,9 @@ class ServerState:
     def sample_reference(self, *, first: bool) -> None:
         """Record the time of a sample of RM.
 
-        With the quirk ``heading_starts_off``, the first sample of RM changes the heading by half
-        the turn rate times the time since the last sample of the previous RM. This time is huge if
-        the clock was set back between the two samples.
+        With the quirk ``heading_starts_off``, the first sample of RM changes the heading. The
+        change is half the turn rate times the time since the last sample of the previous RM. This
+        time is huge if the clock was set back between the two samples.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s
