@@ -261,8 +261,8 @@ class LoisConversation:
         The board does not latch an e-stop. So during an e-stop, the driver sends RPM 0/0 and Stop
         in turn.
 
-        In a terminal mode, the public firmware forwards each received character to the sensor, so
-        it reads at most 480 characters a second. So the driver then sends only Stop.
+        In a terminal mode, the driver sends only Stop, because the public firmware then reads
+        slowly: it forwards each received character to the sensor, at most 480 a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 

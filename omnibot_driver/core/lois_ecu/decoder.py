@@ -108,7 +108,7 @@ class LoisDecoder:
     def feed(self, data: bytes, now: float) -> list[Report]:
         """Return the reports that ``data`` completes, in the order in which the board sent them.
 
-        If ``data`` is empty, return the report that was held back, if it has waited long enough.
+        With empty ``data``, return the held report if it has waited long enough.
         """
         if not data:
             return self._untimed(self._assembler.rest(now))

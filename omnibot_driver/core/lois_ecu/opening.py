@@ -53,7 +53,7 @@ AFTER_MOTION_S: Final = 0.015
 
 For up to 13 ms, the board may receive nothing. In this time, it could miss the end of a motion
 command and the beginning of the next line. The remaining parts could then form another motion
-command. The opposite order is harmless: the motion command comes second.
+command. If the motion command comes second, a mixture of both lines is harmless.
 
 This constant is shorter than the time between two set-points. So other commands are sent even while
 set-points are sent at the highest rate.

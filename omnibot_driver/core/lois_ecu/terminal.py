@@ -3,9 +3,9 @@
 """Changes of the terminal mode, and the standstill that is needed before a change of any mode.
 
 In a terminal mode, the board forwards a sensor's lines and sends no messages of its own. It still
-obeys set-points, but does not report motion. The public firmware does not report presses of the
-e-stop button either. So the robot is stopped first, and is not driven until the board's own
-messages arrive again.
+obeys set-points, but does not report motion. In such a mode, the public firmware does not report
+presses of the e-stop button either. So the robot is stopped first, and is not driven until the
+board's own messages arrive again.
 
 A mode is written repeatedly until the received data shows that the board obeys.
 

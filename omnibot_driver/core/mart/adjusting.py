@@ -30,8 +30,7 @@ out which is true, the driver makes a small turn. If the heading then changes, t
 """
 
 STARTED_M: Final = 0.01
-"""If the robot moves at least this distance in m in a motion, its motors have enough units to
-turn."""
+"""If the robot moves at least this far (m) in a motion, its motors have enough units to turn."""
 
 
 class Adjusting(Moves):

@@ -51,7 +51,8 @@ SLOW_S, DISTURBED_S = 0.06, 5.0
 
 ``SLOW_S``: an exchange that takes longer shows a disturbed network.
 
-``DISTURBED_S``: the network is regarded as disturbed for this time afterwards.
+``DISTURBED_S``: after each sign of a disturbance, the network is regarded as disturbed for this
+time.
 
 A network that has delayed, lost or duplicated one datagram may do so again. While the network is
 disturbed, each reply may belong to an earlier query.

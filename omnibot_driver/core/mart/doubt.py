@@ -101,8 +101,8 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the ratio of left to right wheel speed. Pass it only if the
-        turn is computed from this ratio. If the turn is measured, pass 0.
+        ``bend``: standard deviation of the ratio of left to right wheel speed. Pass this value only
+        if the turn is computed from the ratio. If the turn is measured, pass 0.
 
         ``aside_m``: standard deviation in m of the position across the direction of motion. This
         error arises because the heading was not measured at the time of the count.

@@ -27,7 +27,7 @@ ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 To come nearer, the robot would have to turn towards the goal first.
 """
 STRETCH: Final = 1.3
-"""Assumed ratio of driven to requested length of a straight move, before it is measured.
+"""Ratio of driven to requested length of a straight move, assumed until the first measurement.
 
 A request for 12 inches becomes a move of 15.8 inches.
 """

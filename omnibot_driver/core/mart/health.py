@@ -51,8 +51,8 @@ A reading is uncertain if the reply may belong to another query.
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""If the robot moves without a command within this time in s after a failed RM, RM was the
-cause."""
+"""If the robot moves without a command within this time in s after a failed RM, the RM is regarded
+as the cause."""
 
 
 class Health:

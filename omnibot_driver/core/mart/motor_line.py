@@ -3,9 +3,9 @@
 """A straight line, learned by the driver, that gives the speed of a motor for its command units.
 
 A motor without a regulator needs some units before it turns, so its speed is not proportional to
-its units. With a single factor, learned at a high speed, slow wheels would turn too slowly. A speed
-is given in nominal units. For example, a speed of 10 is that of an ideal motor with 10 units. This
-module knows units; it does not know wheels or time.
+its units. If the driver used a single factor, learned at a high speed, slow wheels would turn too
+slowly. A speed is given in nominal units. For example, a speed of 10 is that of an ideal motor with
+10 units. This module knows units; it does not know wheels or time.
 """
 
 import math

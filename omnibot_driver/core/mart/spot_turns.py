@@ -145,7 +145,7 @@ class SpotTurns:
         self._refused = True
 
     def forget_setting(self) -> None:
-        """Record that the server may have been restarted, so that it has lost the setting."""
+        """Record that the server may have been restarted, and may have lost the setting."""
         self._set_units = None
 
     def may_be_forgotten(self, now: float) -> bool:

@@ -34,7 +34,7 @@ from omnibot_driver.core.mart.words import Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 TIMED_OUT_S: Final = 0.5
-"""Shortest time in s after which the server reports that no wheel turns after a start."""
+"""After a start, the server waits at least this time in s before it reports that no wheel turns."""
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06

@@ -2,7 +2,7 @@
 
 """The reasons to stop a motion, and the stop itself.
 
-The driver also stops a motion if it is not certain what the robot does. This module knows the
+The driver also stops a motion if the behaviour of the robot is uncertain. This module knows the
 wanted command, measurements and the stop commands; it does not know how a motion begins. The caller
 passes the time.
 """

@@ -27,7 +27,8 @@ def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
     """Return the angle of a turn in degrees, with the server's sign, from the pieces of its file.
 
     ``request``: the command of the turn. Returns None if the pieces are not from a record of this
-    turn, or have no angle. The angle is in the first piece, so a lost piece behind it does no harm.
+    turn, or have no angle. The angle is in the first piece, so the loss of a later piece does no
+    harm.
     """
     for piece in pieces:
         if head := _HEAD.match(piece):

@@ -46,8 +46,8 @@ class ServedBoard(RunningBoard[B]):
 
     Each serial channel has a pseudo-terminal, and each datagram channel has a UDP port.
 
-    links: paths of symbolic links: one path for each pseudo-terminal, or one path for all. To a
-        path for all, a hyphen and the channel's name are appended.
+    links: paths of symbolic links: one path for each pseudo-terminal, or one path for all. In the
+        second case, a hyphen and the channel's name are appended to the path.
     udp_port: number of the first UDP port, 0 for any free port. The others follow it.
 
     Entering the context raises OSError if a link or a port is unavailable. The text explains why.

@@ -186,7 +186,7 @@ class MartServer(ServerState):
     def post(self, kind: Kind) -> None:
         """Give the first waiter the notice that a motion of this kind has started or ended.
 
-        If none waits for this kind of motion, the notice is kept.
+        If no waiter waits for this kind of motion, the notice is kept.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

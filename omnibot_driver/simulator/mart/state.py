@@ -145,7 +145,7 @@ class ServerState:
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
         """Return the reading of a sonar ``ago_s`` ago, in inches.
 
-        It is -1 if no wall is in range.
+        The result is -1 if no wall is in range.
         """
         seen_m = sight_m(self.chassis, self.front_m, self.rear_m, backward=backward)
         way_m = self.chassis.speed_mps * ago_s

@@ -33,7 +33,7 @@ def obey(server: "MartServer", text: str) -> None:
 
 
 def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
-    """Stop an uncontrolled motion. Return whether the port must wait for the notice of its end."""
+    """Stop an uncontrolled motion. Return whether the port must wait for the notice of the end."""
     if motion.kind is Kind.SPIN:
         if motion.stopping:
             return False
