@@ -79,11 +79,11 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: time that each command loses at its start, in s.
+    ``late_s``: driving time that is lost when the robot starts, in s.
 
     The controller integrates for 0.5 s before a wheel turns. The wheel then takes another 0.5 s to
-    reach its speed. A command of 0.3 m/s for 4 s would be 1.2 m. The robot drives 0.97 m with the
-    "firmware" quirks and 0.96 m with the "documented" ones.
+    reach its speed. Without this loss, 0.3 m/s for 4 s would be 1.2 m. The robot drives 0.97 m with
+    the "firmware" quirks and 0.96 m with the "documented" ones.
     """
 
     late_s = 0.75
@@ -116,7 +116,7 @@ def lois_ecu(firmware: str) -> tuple[Board, Any]:
 
 
 class MartRobot:
-    """The simulated MART controller, which makes five ticks in each tick of the bench."""
+    """The simulated MART controller. It makes five ticks in each tick of the bench."""
 
     def __init__(self, firmware: Any) -> None:
         from omnibot_driver.simulator.mart import QUIRKS, MartSettings, SimulatedMart
@@ -146,7 +146,7 @@ def mart(firmware: str) -> tuple[Board, Any]:
 
 
 class FejemisRobot:
-    """The simulated Fejemis, which makes five ticks in each tick of the bench."""
+    """The simulated Fejemis. It makes five ticks in each tick of the bench."""
 
     def __init__(self, sums: bool) -> None:
         from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
@@ -186,12 +186,12 @@ MAKERS: dict[str, Callable[[], tuple[Board, Any]]] = {
     "two lines": lambda: (line_board.make({}), LineRobot()),
     "requests": lambda: (request_board.make({}), RequestRobot()),
 }
-"""Functions by board name. Each makes a new board and its simulated robot."""
+"""For each board name, a function that makes a new board and its simulated robot."""
 CORE = Path(core.__file__).parent
 BOARDS = [
     name for name in MAKERS if (board := name.split()[0]) not in PROFILES or (CORE / board).is_dir()
 ]
-"""Names of the boards to test, without the boards whose folder has been removed."""
+"""Names of the boards to test. A board is left out if its folder has been removed."""
 
 
 class AnyBench:
@@ -241,7 +241,7 @@ class AnyBench:
             self.settle()
 
     def stall(self, seconds: float) -> None:
-        """Simulate a stall of the process: data waits for ``seconds`` and is then read at once."""
+        """Simulate a stall of the process: data waits for ``seconds`` and is then read together."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

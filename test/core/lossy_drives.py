@@ -14,7 +14,9 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""Largest error of odom, in m and in rad, that the rounding of deltas since the last pose causes.
+"""``ROUNDING_M``, ``ROUNDING_RAD``: largest error of odom that the rounding of deltas causes.
+
+The error grows until the next pose corrects it.
 """
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 

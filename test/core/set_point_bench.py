@@ -26,7 +26,7 @@ TIMEOUT_S = 0.5
 
 
 class Words:
-    """An encoder for orders that are already bytes."""
+    """A substitute for an encoder. Its orders are bytes already, and it returns them unchanged."""
 
     def stop(self) -> Packets:
         return packed(STOP)

@@ -18,7 +18,10 @@ axis_signs = st.tuples(*[st.sampled_from([1, -1])] * 3)
 
 headings = st.floats(-10, 10)
 small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-1.5, 1.5))
-"""Displacements in one period of 40 ms, in body axes. The largest exceed those of real robots."""
+"""Displacements in one period of 40 ms, in body axes.
+
+The largest are too large for a real robot.
+"""
 
 
 def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:

@@ -45,7 +45,10 @@ def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: fl
 
 
 def test_the_first_pose_must_be_confirmed_too() -> None:
-    """The board's first pose is damaged. It sets no heading, because two poses must agree."""
+    """The board's first pose is damaged.
+
+    The odometry does not use the heading of this pose, because two poses must agree.
+    """
     odometry = Odometry(SETTINGS)
     assert odometry.displace(earth(0.0, 0.1), 0.0) == []
     assert odometry.settle(heading(-1.0)) == []
@@ -59,7 +62,7 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
-    """The first displacement after a pause has an unknown duration.
+    """The odometry begins with a displacement of unknown duration, because the board was paused.
 
     The first estimate still has a covariance of zero.
     """
@@ -71,7 +74,7 @@ def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
     """The board sends one pose, and the next pose is lost.
 
-    After a second, the first pose is accepted.
+    After a second, the first pose is accepted without a second one that agrees.
     """
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
@@ -112,7 +115,7 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """A single pose with a wrong heading does not change the heading of the odometry.
+    """The odometry receives one pose with an unexpected heading, and keeps its own heading.
 
     Two such poses that agree show that the board has a new earth frame.
     """

@@ -100,7 +100,10 @@ def test_a_boards_own_odometry_is_passed_on_and_displacements_are_not(bench: Any
 
 
 def test_odometry_that_is_predicted_does_not_count_as_heard(bench: AnyBench) -> None:
-    """The board sends nothing, and the driver only predicts odometry. It refuses commands."""
+    """The board sends nothing, but the driver still predicts odometry.
+
+    Predicted odometry is not data from the board, so the driver refuses commands.
+    """
     bench.drive_on()
     bench.speaks = False
     with pytest.raises(CommandRefused, match=r"no data from the board|connecting"):
@@ -139,7 +142,7 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """The board reports a reset that happened before the driver's request. The driver ignores this.
+    """The board reports a reset that happened before the driver's request. This report is ignored.
 
     The next report shows that the requested reset is done.
     """
@@ -156,7 +159,10 @@ def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
 
 
 def test_a_displacement_that_is_not_measured_proves_no_standstill() -> None:
-    """Displacements that are not measured never prove that a robot is at rest."""
+    """A board reports displacements of zero, but marks them as not measured.
+
+    They do not prove rest.
+    """
     proof = StopProof()
     proof.stopped(0.0)
     for step in range(1, 20):

@@ -37,10 +37,10 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The robot is commanded 0.3 m/s for 4 s.
+    """The user commands 0.3 m/s for 4 s.
 
-    It drives this distance, minus what it loses at the start. The odometry gives the same distance
-    as the robot's true motion.
+    The robot drives 1.2 m, minus what it loses at the start. The odometry gives the distance that
+    the robot has really driven.
     """
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
@@ -76,7 +76,7 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
     """The user commands zero while the robot drives.
 
-    The driver accepts this, and the robot stops.
+    The driver accepts the command, and the robot stops.
     """
     bench.drive_on()
     for _ in range(10):
@@ -106,7 +106,10 @@ def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
 def test_an_estop_stops_the_robot_and_nothing_moves_it_until_a_newer_command(
     bench: AnyBench,
 ) -> None:
-    """While the e-stop is latched, commands are refused. Its release does not move the robot."""
+    """While the e-stop is latched, commands are refused.
+
+    The release of the e-stop does not move the robot.
+    """
     bench.drive_on()
     bench.estop(True)
     with pytest.raises(CommandRefused, match="e-stop"):
@@ -137,7 +140,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 ) -> None:
     """An interruption, such as a stall or an e-stop, comes while the robot drives.
 
-    The command from before has no effect afterwards. A new command moves the robot.
+    The command from before the interruption has no effect any more. A new command moves the robot.
     """
     bench.drive_on()
     event(bench)
@@ -200,9 +203,9 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """At shutdown, the driver sends Stop until the robot is seen at rest, and then its last bytes.
+    """At shutdown, the driver sends Stop until the robot is seen at rest.
 
-    Afterwards the robot stands for good, and commands are refused.
+    It then sends its last bytes. Afterwards the robot stays at rest, and commands are refused.
     """
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)

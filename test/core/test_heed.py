@@ -62,9 +62,9 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """The driver receives data, and then a request, before it processes the data.
+    """The driver receives data, then a request. It has not processed the data yet.
 
-    This data does not answer the request. The next data does.
+    This data does not answer the request. Only data that arrives later does.
     """
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):

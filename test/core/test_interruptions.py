@@ -98,7 +98,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
     """Frames are lost, and the odometry is reset before the next pose arrives.
 
-    Odom begins at zero. The pose no longer corrects it for the motion that was lost.
+    Odom begins at zero. The lost motion came before the reset, so the pose does not add it to odom.
     """
     for seed in range(4):
         on = line(seed)
@@ -112,7 +112,10 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """No data arrives for three seconds while the robot drives. Odom then includes this motion."""
+    """No data arrives for three seconds while the robot drives, and the line is opened again.
+
+    Afterwards odom includes the motion of these seconds.
+    """
     on = line(2)
     on.loses = lambda _data, _now: True
     on.run(3.0)
@@ -164,7 +167,8 @@ def float32(value: float) -> float:
 def test_wheel_counts_go_through_the_kinematics() -> None:
     """All three wheels make −1/8 of a turn, and the robot rotates by 2πr/8L.
 
-    Then wheel B turns forward and wheel A equally far backward, and the robot drives forward.
+    Then wheel B turns forward, and wheel A turns backward by the same angle. The robot drives
+    forward.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -61,7 +61,7 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
     """After a stall of the driver, the board has 2 s again to send data.
 
-    Its earlier data may still wait to be read.
+    The reason is that data from before the stall may still wait to be read.
     """
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
@@ -78,9 +78,9 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """While the robot is driven, the driver wakes after 0.5 s without data to end the command.
+    """A driven robot sends no data for 0.5 s. The driver then wakes up and ends the command.
 
-    Otherwise it wakes after 2 s, when the board counts as silent.
+    If the robot is not driven, the driver wakes after 2 s, when the board counts as silent.
     """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5

@@ -51,7 +51,7 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task goes on while the robot stands from the beginning, and while the robot is driven.
+    """A task begins while the robot is at rest. The task goes on, also when the robot is driven.
 
     It ends when the driven robot is stopped.
     """

@@ -50,8 +50,8 @@ def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
 ) -> None:
     """Another program pauses the board just before the user requests a pause.
 
-    The driver sends P only after data that is newer than the request, so it does not resume the
-    board.
+    The driver sends P only if new data arrives after the request. A paused board sends none. So the
+    driver sends no P, which would resume the board.
     """
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
@@ -80,7 +80,8 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 ) -> None:
     """Another program pauses the board, but old data makes the driver send P, which resumes it.
 
-    The driver does not take the old notice as proof. It sends P again and then reports the pause.
+    The board's notice of the first pause arrives late. The driver does not take this notice as
+    proof. It sends P again and then reports the pause.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

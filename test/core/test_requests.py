@@ -119,7 +119,7 @@ def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench)
 def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Bench) -> None:
     """The driver resets a running board with Stop and R.
 
-    The board counts from zero again, and odom continues from its pose.
+    The board's own pose begins at zero again, but odom continues from its last pose.
     """
     for _ in range(20):
         bench.drive(0.5)
@@ -200,7 +200,7 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
     """The board does not receive R. The state becomes ``connecting`` only once.
 
-    It returns to ``nominal`` when it is certain that the board has not restarted.
+    It returns to ``nominal`` when the driver has found that the board did not restart.
     """
     bench.hears = False
     bench.events.clear()

@@ -55,8 +55,8 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
     """Return the position of a wheel, and the velocity of its centre over the floor, in m/s.
 
-    The wheel's lowest point rests on the floor. So the centre's velocity is opposite to the rim's
-    velocity at that point, relative to the centre.
+    The lowest point of the wheel rests on the floor. Relative to the centre, this point moves with
+    the rim. So the centre moves over the floor with the opposite velocity.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -72,7 +72,10 @@ def test_the_joints_are_those_of_joint_states() -> None:
 
 
 def test_the_frames_are_those_of_the_driver() -> None:
-    """The root is base_link. Its parent is odom, and a frame can have only one parent."""
+    """The root of the description is base_link.
+
+    The driver publishes odom as the parent of base_link, and a frame can have only one parent.
+    """
     assert ROBOT.get_root() == PARAMETERS.by_name["base_frame"].default
     assert {PARAMETERS.by_name["imu_frame"].default, "base_footprint"} < set(ROBOT.link_map)
 
@@ -92,8 +95,8 @@ def test_the_default_geometry_is_the_drivers() -> None:
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
     """The wheels turn at the rates for a twist.
 
-    Each wheel rolls as fast as the body moves at that place. Rollers let a wheel slide along its
-    axle, so only velocities in the rolling direction are compared.
+    Each wheel rolls as fast as the body moves at the wheel's place. Rollers let a wheel slide along
+    its axle, so only velocities in the rolling direction are compared.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]
@@ -109,7 +112,11 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
 
 
 def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
-    """The axles point away from the robot's centre, as the commissioning guide says."""
+    """The axles point away from the robot's centre.
+
+    So a wheel with a positive rate turns counter-clockwise, seen from outside. The commissioning
+    guide says this.
+    """
     for name in WHEELS:
         joint = ROBOT.joint_map[name]
         x, y, _ = joint.origin.xyz

@@ -70,9 +70,9 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """The guide quotes a message of the driver. The code contains each part of it.
+    """The guide quotes a message of the driver, with gaps and colons between its parts.
 
-    Gaps and colons separate the parts.
+    The code contains each part.
     """
     parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)
@@ -131,7 +131,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
     """The form at the end of the guide lists all steps of the guide.
 
-    It names only parameters of the driver.
+    The form names only parameters of the driver.
     """
     text = COMMISSIONING.read_text()
     steps = set(re.findall(r"^## (\d)\. ", text, re.MULTILINE))

@@ -151,7 +151,7 @@ def test_what_pip_brings_is_asked_for_by_an_extra(setup_arguments: dict[str, Any
 def test_only_tools_need_what_an_extra_brings() -> None:
     """Only the tools import libraries of the extras.
 
-    The one exception is the replay with rosbags.
+    There is one exception: a replay imports rosbags.
     """
     optional = {name for names in EXTRAS.values() for name in names}
     needing = {
@@ -167,7 +167,7 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
     """rosdep does not install some libraries.
 
-    The README has a pip command that Ubuntu 24.04 accepts.
+    The README has a pip command for them, which Ubuntu 24.04 accepts.
     """
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()

@@ -42,7 +42,10 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """Each rule gives its adapter the name /dev/omnibot, which only the group dialout may use."""
+    """The file has a rule for each of four adapters. All but one are commented out.
+
+    Each of them makes the link /dev/omnibot, which only the group dialout may use.
+    """
     assert len(OFFERED) == 4
     for rule in OFFERED:
         assert rule["SUBSYSTEM"] == ("==", "tty")
@@ -54,7 +57,10 @@ def test_each_adapter_gets_the_same_name_and_rights() -> None:
 
 
 def test_only_one_adapter_is_taken_for_the_board() -> None:
-    """Only one rule makes the link /dev/omnibot. A second rule might give this name to a lidar."""
+    """Only one rule that is not commented out makes the link /dev/omnibot.
+
+    A second one might give this name to a lidar.
+    """
     assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
 
 

@@ -227,8 +227,8 @@ def board_poses(
     """Return three lists with one item for each delta that the board sent.
 
     The first list has the deltas, as three integers. The second has the board's pose after each
-    delta, which the rounding of at most four deltas makes inaccurate. The third has the index of
-    the last IMU frame before each delta.
+    delta. It is the last pose that the board sent plus the later deltas, at most four, which are
+    rounded. The third has the index of the last IMU frame before each delta.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

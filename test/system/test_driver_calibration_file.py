@@ -24,9 +24,9 @@ def said_of(path: Path, start_driver: Start) -> str:
 def test_a_file_that_gives_nothing_is_told_and_the_driver_starts(
     start_driver: Start, tmp_path: Path, is_there: bool
 ) -> None:
-    """The calibration file is missing or empty. The driver starts and warns of this.
+    """The calibration file is missing or empty.
 
-    The path may be mistyped.
+    The driver starts, and warns of this because the path may be mistyped.
     """
     path = tmp_path / "robt.yaml"
     if is_there:

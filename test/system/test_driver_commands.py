@@ -67,8 +67,8 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 ) -> None:
     """The driver's executor is blocked while a command arrives, so the command waits for 2 s.
 
-    The driver refuses the command by its send time, which the middleware provides. The stamp of a
-    goal has no effect. The driver obeys the next command.
+    The driver refuses the command because of its age since it was sent. The middleware gives the
+    time of sending, so the stamp of a goal has no effect. The driver obeys the next command.
     """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)
@@ -155,7 +155,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 ) -> None:
     """A wheel_cmd has a wrong number of values, or NaN or infinity.
 
-    The driver rejects it with a reason. The driver obeys the next correct one.
+    The driver rejects this command with a reason, and obeys the next correct one.
     """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))
@@ -169,7 +169,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """A Twist has NaN or infinity in an axis, even one that the driver ignores. It is rejected.
+    """A Twist is rejected if any axis has NaN or infinity, even an axis that the driver ignores.
 
     Such a value shows that the sender is faulty.
     """
@@ -235,7 +235,7 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 ) -> None:
     """A stamped command is older than ``cmd_vel_timeout``. The driver refuses it.
 
-    The driver obeys a command whose stamp is zero.
+    A stamp of zero is not a time. The driver obeys a command with this stamp.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)

@@ -182,7 +182,7 @@ def test_diagnostics_come_with_figures(robot: Robot) -> None:
     def keeps_pace() -> bool:
         """Return whether the IMU rate is right.
 
-        After a stall it is first too low, then too high.
+        After a stall of the computer, this rate is first too low, then too high.
         """
         if (status := robot.status("Stream")) is None:
             return False

@@ -205,7 +205,7 @@ def test_a_monitor_that_was_stopped_by_force_still_gives_the_terminal_back(
 ) -> None:
     """SIGSTOP suspends the monitor before it can restore the terminal. Then the monitor resumes.
 
-    The key q ends it, and it restores the terminal.
+    The user presses q. The monitor ends and restores the terminal.
     """
     terminal = monitor_of(driver)
     terminal.wait_for("nominal")

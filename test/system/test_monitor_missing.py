@@ -85,9 +85,9 @@ def test_without_a_driver_one_sentence_says_how_to_start_one(
 def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     fake: Probe, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The user gives a wrong namespace. The message names the running drivers.
+    """The user gives a wrong namespace.
 
-    It also shows the option for the first of them.
+    The message names the running drivers, and the option that selects the first of them.
     """
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
     assert "/elsewhere/omnibot_driver is running, but these are: /fake/omnibot_driver; try" in said

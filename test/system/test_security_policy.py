@@ -123,7 +123,7 @@ def seen(graph: Node, home: str) -> Rules:
 
 @pytest.mark.parametrize("enclave", sorted(set(profiles()) - {"/omnibot/driver"}))
 def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: str) -> None:
-    """Other enclaves may use only the topics and services that the driver has."""
+    """The policy allows other enclaves only topics and services that the driver has."""
     driver, other = allowed(profiles()["/omnibot/driver"]), allowed(profiles()[enclave])
     everywhere = {"/rosout", "/parameter_events", "/clock"}
     assert other["publish"] <= driver["subscribe"] | everywhere
@@ -133,7 +133,10 @@ def test_the_others_are_allowed_nothing_that_the_driver_does_not_have(enclave: s
 
 
 def test_only_named_enclaves_may_move_stop_or_release_the_robot() -> None:
-    """Only the expected enclaves may publish commands. Only the operator may call services."""
+    """Only the expected enclaves are allowed to publish commands.
+
+    Only the operator's enclave is allowed to call services.
+    """
     rules = {path: allowed(profile) for path, profile in profiles().items()}
     who = {
         name: {path for path, rule in rules.items() if name in rule["publish"]}

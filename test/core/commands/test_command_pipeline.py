@@ -25,7 +25,10 @@ GENTLE = SpeedLimits(linear_mps2=1.0, angular_radps2=2.0)
 
 
 def running(**options: object) -> Bench:
-    """Return a bench with a running board at rest, to which the driver no longer sends Stop."""
+    """Return a bench whose robot is at rest.
+
+    Its board runs, and the driver no longer sends Stop.
+    """
     bench = Bench(BoardSettings(running=True), **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
@@ -75,7 +78,8 @@ def notices(bench: Bench) -> list[str]:
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
     """The user commands forward and sideways speed on a base that cannot move sideways.
 
-    The driver sends the forward speed only, and says so once. It refuses NaN in either speed.
+    The driver sends the forward speed only, and says so once. A command with NaN in either speed is
+    refused.
     """
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
@@ -142,7 +146,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """A ramp is as steep at commands every 1 ms as at commands every 18 ms.
+    """Commands arrive every 1 ms or every 18 ms. The ramp of the speed is equally steep.
 
     Each new command continues the ramp of the last one. The driver sends set-points every 18 ms.
     """

@@ -83,7 +83,10 @@ def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_op
 def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_nothing(
     bench: Bench,
 ) -> None:
-    """While the e-stop is latched, commands are refused. Its release does not move the robot."""
+    """While the e-stop is latched, commands are refused.
+
+    The release of the e-stop does not move the robot.
+    """
     estop(bench, True)
     for _ in range(100):
         with pytest.raises(CommandRefused, match="e-stop"):
@@ -129,7 +132,10 @@ def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> N
 
 
 def test_who_latched_the_estop_and_who_released_it_is_told_once(bench: Bench) -> None:
-    """Two users latch the e-stop, and two release it. Only the first of each is reported."""
+    """Two users latch the e-stop, and later two users release it.
+
+    Only the first latch and the first release are reported.
+    """
     for active, by in ((True, "a topic"), (True, "a service"), (False, "Ann"), (False, "Bob")):
         bench.session.estop(active, bench.now, by=by)
         bench.settle()

@@ -27,7 +27,7 @@ ULPS = 1 + 1e-11
 def same_direction(a: tuple[float, ...], b: list[float]) -> bool:
     """Return whether two vectors have the same direction, to nine digits.
 
-    Zero has any direction.
+    A vector of zeros fits any direction.
     """
     largest_a, largest_b = max(map(abs, a)), max(map(abs, b))
     if largest_a < 1e-290 or largest_b < 1e-290:
@@ -69,7 +69,7 @@ def test_a_vector_within_the_limit_is_left_as_it_is(vector: list[float], limit: 
 def test_slowed_wheels_keep_their_ratio_and_the_limit(values: list[float], limit: float) -> None:
     """If a wheel is too fast, all wheels are slowed by one factor.
 
-    The fastest is then at the limit.
+    The fastest wheel is then at the limit.
     """
     slowed = slow(values, limit)
     assert max(map(abs, slowed)) <= limit * ULPS
@@ -90,7 +90,10 @@ def test_a_limited_twist_is_within_every_limit_and_points_the_same_way(twist: Bo
 
 @given(any_twists)
 def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
-    """A twist that ``allow`` accepts is returned unchanged. Any other twist exceeds a limit."""
+    """If ``allow`` accepts a twist, limiting does not change it.
+
+    Any other twist exceeds a limit.
+    """
     limits = SpeedLimits(linear_mps=0.5, angular_radps=0.7)
     if limits.allow(twist):
         limited = limits.twist(twist)
@@ -103,7 +106,7 @@ def test_what_is_allowed_is_not_changed(twist: BodyTwist) -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
-    """A twist with infinity or NaN is rejected even if all limits are off."""
+    """A twist with infinity or NaN is rejected, even if the limits are infinite."""
     values = [0.0, 0.1, -0.1]
     values[place] = bad
     none = SpeedLimits(linear_mps=math.inf, angular_radps=math.inf)
@@ -154,9 +157,10 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity approaches the wanted one in a straight line, within the acceleration.
+    """The linear velocity changes in a straight line towards the wanted one.
 
-    The yaw rate approaches the wanted one within its own acceleration.
+    Its change is at most the acceleration limit times the duration. The yaw rate also changes
+    towards the wanted one, and has a limit of its own.
     """
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
@@ -195,7 +199,7 @@ def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
 ) -> None:
     """The driver refuses a command because of its stamp. The refusal states the age of the stamp.
 
-    It also says that the clocks must agree.
+    The refusal also says that the clocks must agree.
     """
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

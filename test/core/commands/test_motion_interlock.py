@@ -49,9 +49,9 @@ def test_a_zero_command_ends_the_refusal() -> None:
 
 
 def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
-    """The monitor trips twice within a minute. Motion is refused until ~/start, at any later time.
+    """The monitor trips twice within a minute. Motion is then refused until ~/start is called.
 
-    Zero commands are still accepted.
+    Waiting does not help. Zero commands are still accepted.
     """
     interlock = MotionInterlock()
     interlock.trip(0.0)
@@ -66,9 +66,9 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """After over a minute without a trip, the next trip counts as the first one.
+    """A trip counts as the first one if the last trip was over a minute ago.
 
-    So it does after ~/start.
+    It also counts as the first one after ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):

@@ -2,7 +2,7 @@
 
 """Tests of the motion rule: only a fresh command moves the robot.
 
-The board must send data as well.
+The board must also send data at that time.
 """
 
 import contextlib
@@ -48,7 +48,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 ) -> None:
     """An interruption, such as a pause, a reset or an e-stop, comes while the robot drives.
 
-    The command from before never moves the robot again. A new command does.
+    The command from before the interruption never moves the robot again. A new command does.
     """
     bench.drive(0.4)
     event(bench)
@@ -105,7 +105,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """The user requests a pause or a reset, but the board receives nothing and drives on.
+    """The user requests a pause or a reset. The board receives nothing, so the robot drives on.
 
     The driver sends no motion frame after the request.
     """
@@ -153,7 +153,7 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
     """The board's data is lost while the robot drives, but the board still receives.
 
-    The driver sends Stop and refuses commands. After a while it shows ``connecting``.
+    The driver sends Stop and refuses commands. After a while, the state is ``connecting``.
     """
     bench.drive(0.5)
     bench.run(0.1)

@@ -63,7 +63,7 @@ def test_a_goal_is_on_the_wire_at_once_in_the_boards_frame_and_is_repeated(bench
 def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
     heading: float, signs: tuple[int, int, int]
 ) -> None:
-    """The robot reaches its goals for any first pose of the board and any signs of its axes."""
+    """The robot reaches its goals for any first pose of the board, and any signs of its axes."""
     bench = at_position_control(BoardPose(5000.0, -3000.0, heading), axis_signs=signs)
     bench.go_to(0.8, 0.4, 0.9)
     bench.run(8.0)
@@ -188,9 +188,10 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """An event, such as a reset, discards the goal to which the robot drives. The robot rests.
+    """The robot drives to a goal.
 
-    A newer goal is reached, even if the board has a new frame.
+    An event, such as a reset, discards the goal, and the robot rests. Then a new goal is sent and
+    reached, even if the board has a new frame.
     """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)

@@ -17,7 +17,7 @@ def stream() -> Stream:
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
     """The port is opened while the e-stop is latched. The driver sends the e-stop twice at once.
 
-    It does so even if it has just sent an e-stop on the old connection.
+    An e-stop that it has just sent on the old connection makes no difference.
     """
     stream.latch(1.0)
     stream.write(1.0)
@@ -26,9 +26,9 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """A change of authority makes a Stop and a command due, and then the e-stop is latched.
+    """The authority changes, so a Stop and a command are due. Then the e-stop is latched.
 
-    Neither of the two is sent, only the e-stop.
+    The driver sends only the e-stop, neither the Stop nor the command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -55,7 +55,10 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stre
 def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
     stream: Stream,
 ) -> None:
-    """Letters are written at 50 Hz while the e-stop is latched. It is still repeated at 20 Hz."""
+    """The e-stop is latched, and letters are written at 50 Hz.
+
+    The e-stop is still repeated at 20 Hz.
+    """
     stream.latch(1.0)
     written = 0
     for step in range(1000):

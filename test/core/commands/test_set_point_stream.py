@@ -46,7 +46,7 @@ def stream() -> Stream:
 
 
 def test_a_command_goes_out_at_once_when_the_line_has_rested(stream: Stream) -> None:
-    """The driver has sent nothing for a while. It sends a command at once."""
+    """The driver has sent nothing for a while. It sends a new command at once."""
     order(stream, GO, 1.0)
     assert stream.write(1.0) == GO
 
@@ -77,7 +77,7 @@ def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
 ) -> None:
     """After the timeout, the driver sends Stop at 20 Hz, even if the command rate is lower.
 
-    It does so for 1 s if the robot is seen at rest, and otherwise for 5 s.
+    It repeats Stop for 1 s if the robot is seen at rest, and otherwise for 5 s.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
@@ -124,8 +124,8 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 ) -> None:
     """The driver writes a letter while the robot drives, with zeros before the letter.
 
-    The zeros may turn an incomplete frame into a wrong command, so the driver repeats the current
-    one.
+    The zeros may turn an incomplete frame into a wrong command. So the driver then repeats the
+    right command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -175,7 +175,8 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 ) -> None:
     """Commands of three authorities arrive at almost the same time.
 
-    The driver sends one Stop and then the newest command. It never writes the one in between.
+    The driver sends the first command, one Stop, and the newest command. It never sends the second
+    one.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -244,7 +245,11 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """Random events never break the rules for frames that the driver writes."""
+    """Events come in random order, such as commands, latches and releases of the e-stop.
+
+    The driver sends a motion frame only if the command is fresh and the e-stop is not latched. It
+    keeps the pace, and sends Stop between two authorities.
+    """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:

@@ -50,7 +50,7 @@ def test_a_shutdown_while_a_pause_is_in_flight_still_ends_paused(bench: Bench) -
 
 
 def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
-    """A paused board receives S just before the shutdown. The shutdown pauses it again."""
+    """A paused board receives S just before the shutdown. The shutdown pauses the board again."""
     bench = paused()
     bench.session.request(Request.START, object(), bench.now)
     bench.settle()
@@ -77,8 +77,8 @@ def left(bench: Bench) -> None:
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
     """At shutdown, the driver stops the robot, then checks that it rests.
 
-    It writes nothing meanwhile. A damaged line could turn any frame into a motion, so the check
-    needs silence.
+    During the check the driver writes nothing, because a damaged line could turn any frame into a
+    motion.
     """
     bench = driving()
     left(bench)

@@ -64,10 +64,7 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
-    """One displacement after Stop does not prove rest, even if it covers 0.1 s.
-
-    A second one does.
-    """
+    """One displacement after Stop does not prove rest, even if it covers 0.1 s. Two together do."""
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved
@@ -99,10 +96,7 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """A robot was driven, so rest must be proved.
-
-    A new connection or a Stop does not replace the proof.
-    """
+    """A robot was driven, so rest must be proved. A new connection or a Stop does not prove it."""
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -117,10 +111,7 @@ def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProo
 def test_a_robot_that_moves_is_not_proved_to_stand(
     proof: StopProof, moving: DisplacementReading
 ) -> None:
-    """Rest is proved, and then a displacement is larger than a robot at rest can have.
-
-    Rest is not proved any more.
-    """
+    """Rest is proved. Then a displacement is too large for a robot at rest, and ends the proof."""
     assert shown(proof, 0.0, 0.0, 0.0)
     proof.look(moving, 11.0)
     assert not proof.proved
@@ -148,9 +139,9 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """The robot moves in any way and then rests.
+    """The robot moves in any way.
 
-    Four displacements of a resting robot prove rest.
+    Four displacements in a row that are close to zero then prove rest.
     """
     proof = StopProof()
     proof.stopped(10.0)

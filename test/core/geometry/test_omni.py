@@ -40,9 +40,9 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The twist comes from the manual's matrix with 1/(2 cos 30°).
+    """The twist comes from the manual's matrix with the factor 1/(2 cos 30°).
 
-    The expanded matrix in the manual is wrong by 4/3.
+    The manual also has an expanded matrix, which is wrong by a factor of 4/3.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
@@ -56,7 +56,7 @@ def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
 
 @given(twists, st.floats(0.001, 1.0), st.floats(0.01, 2.0))
 def test_wheels_and_back_is_the_same_twist(twist: BodyTwist, radius: float, base: float) -> None:
-    """A twist is converted to wheel rates and back, for any size of robot. It is the same twist."""
+    """A twist is converted to wheel rates and back, for any size of robot. Nothing is lost."""
     kinematics = OmniKinematics(wheel_radius_m=radius, base_radius_m=base)
     back = kinematics.body_twist(kinematics.wheel_rates(twist))
     assert as_tuple(back) == close(as_tuple(twist), rel=1e-9)

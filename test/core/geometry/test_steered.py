@@ -68,9 +68,9 @@ def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: B
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """The twist is computed from the angle and the signed speed of the steered wheel.
+    """A twist gives the angle and the signed speed of the steered wheel.
 
-    It is the same.
+    The twist that is computed back from these two is the original one.
     """
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)

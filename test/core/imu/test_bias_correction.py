@@ -86,7 +86,7 @@ def test_nobody_calibrates_a_robot_that_is_commanded_to_move() -> None:
 
 
 def test_a_robot_that_rolls_by_itself_is_not_calibrated() -> None:
-    """The wheels turn during a calibration, as when the robot rolls out. The calibration fails."""
+    """The robot rolls out during a calibration, so its wheels turn. The calibration fails."""
     bench = running()
     bench.session.command_twist(BodyTwist(0.0, 0.0, 0.5), bench.now)
     bench.run(0.4)
@@ -144,7 +144,7 @@ def test_a_calibration_is_answered_in_time_whatever_happens(how: str) -> None:
 def test_a_silent_board_that_nobody_is_to_start_is_woken_up_for_the_answer() -> None:
     """The board becomes silent during a calibration, and the driver has nothing to send.
 
-    It still wakes up in time to answer the calibration.
+    The driver still wakes up in time to answer the calibration.
     """
     bench = Bench(BoardSettings(running=True), run=False)
     bench.open()
@@ -176,9 +176,9 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, 15 s at rest find half of the gyro bias.
+    """With ``auto_gyro_bias``, the driver finds half of the gyro bias within 15 s at rest.
 
-    Motion does not change it.
+    While the robot moves, the bias stays as it is. Without ``auto_gyro_bias``, it stays zero.
     """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
@@ -214,7 +214,7 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 def test_the_figures_count_what_happened() -> None:
     """The figures count lost frames, restarts and limited commands.
 
-    They also count equal readings of a stuck sensor.
+    They also count how often a sensor repeats the same values, which shows that it is stuck.
     """
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)

@@ -155,7 +155,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
     """A gap in the readings restarts a calibration. After several gaps, its time is over.
 
-    It fails and leaves the bias as it was.
+    The calibration fails and leaves the bias as it was.
     """
     calibration = GyroCalibration((0.1, 0.2, 0.3), refine=False)
     calibration.measure("token", 50.0)
@@ -215,9 +215,9 @@ def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_sta
 def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
     rates: list[Vector3], measure: bool
 ) -> None:
-    """The gyro sends any readings.
+    """For any readings of the gyro, the bias is finite.
 
-    The bias is finite and never larger than that of a real sensor.
+    It is never larger than that of a real sensor.
     """
     calibration = GyroCalibration(NONE, refine=True)
     if measure:
@@ -227,7 +227,10 @@ def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
 
 
 def test_gravity_is_measured_at_rest_alone() -> None:
-    """Gravity is unknown before the robot first rests. It is measured again only at rest."""
+    """Gravity is unknown before the robot first rests.
+
+    Later measurements are also made only at rest.
+    """
     calibration = GyroCalibration(NONE, refine=False)
     assert calibration.gravity_mps2 is None
     stand(calibration, noisy(NONE, NOISE_RADPS), 1.1, force=(0.0, 6.0, -8.0))

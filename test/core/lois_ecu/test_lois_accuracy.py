@@ -79,9 +79,10 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """One byte in a hundred is lost, and with it 60 % of the groups of lines.
+    """One byte in a hundred is lost. This damages 60 % of the groups of lines.
 
-    The counters in the other groups include the missed ticks, so the odometry is hardly worse.
+    The tick counters in the other groups also count the ticks of the damaged groups. So the
+    odometry is hardly worse.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)

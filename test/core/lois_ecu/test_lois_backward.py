@@ -21,10 +21,10 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """The robot drives backward. The public firmware counts no ticks then and reports integer RPM.
+    """The robot drives backward. The public firmware then counts no ticks and reports integer RPM.
 
-    So the estimated heading drifts. In eight drives the mean error of the position is 4.9 % of the
-    way. The worst of them has 13 %.
+    So the estimated heading drifts. In eight drives, the error of the position is 4.9 % of the way
+    on average, and 13 % at most.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -38,10 +38,11 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the boot gains, the right wheel oscillates, comes to rest, and keeps its last speed.
+    """With the boot gains, the right wheel oscillates and comes to rest.
 
-    If the covariance is right, the normalised squared error of half of all drives is below 2.4. A
-    few drives with the boot gains are far above.
+    The board then still reports the wheel's last speed. If the covariance is right, the normalised
+    squared error of half of all drives is below 2.4. A few drives with the boot gains are far
+    above.
     """
     seeds = range(1000, 1005)
     drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
@@ -66,7 +67,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """A wheel is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
 
-    The wheel is at rest. If it rolled, it would become slower.
+    The wheel is at rest, because a rolling wheel would become slower.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -90,7 +91,8 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
     """Too much feed-forward makes the wheels too fast backward.
 
-    Report 0x20 shows it, but no ticks do. The estimated distance is still right within 3 %.
+    Report 0x20 shows the true speed, but the firmware counts no ticks. The estimated distance is
+    still right within 3 %.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
@@ -102,7 +104,7 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 62 RPM some ticks follow each other so soon that the firmware loses their speed.
 
-    So the yaw variance grows, which it does not at 32 RPM.
+    The filter therefore adds to the yaw variance. At 32 RPM it adds nothing.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

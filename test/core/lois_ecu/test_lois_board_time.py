@@ -15,7 +15,7 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 def test_a_read_that_is_late_is_told(lost: float) -> None:
     """One read is 40 ms late.
 
-    The estimate shows it, even if the board's clock stops during sending.
+    The estimate shows this delay, even if the board's clock stops during sending.
     """
     board = BoardTime()
     found = []
@@ -30,9 +30,9 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """Several groups are read at once.
+    """Several groups are read together.
 
-    Their times are in the order in which the board sent them.
+    The estimated times of the groups are in the order in which the board sent them.
     """
     board = BoardTime()
     taken_s = []
@@ -55,9 +55,9 @@ def test_its_error_is_that_of_the_reads() -> None:
 
 
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
-    """The delay is 0 before the clock's unit is known.
+    """The estimated delay is 0 until the unit of the board's clock is known.
 
-    After a restart it is 0 with a sigma of 12 ms.
+    After a restart of the board, the estimate is 0 again, with a sigma of 12 ms.
     """
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
@@ -68,7 +68,10 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """The host stalls, and twenty groups come in one read. Later delays are still right."""
+    """The host stalls, and twenty groups come in one read.
+
+    Later estimates of the delay are right.
+    """
     board = BoardTime()
     found = []
     for step in range(90):

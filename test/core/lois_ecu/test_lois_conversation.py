@@ -33,9 +33,9 @@ RPM = math.tau / 60
 
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
-    """After the opening, low pass, periods and the user's gains arrive at the board.
+    """After the port is opened, the driver writes low pass, periods and gains to the board.
 
-    The robot drives.
+    The robot can then be driven.
     """
     rig = Rig(nominal(firmware), LoisEcuSettings(written={Setting.LEFT_KP: 0.5}))
     assert rig.driver.mode is Mode.UNKNOWN
@@ -74,7 +74,7 @@ def test_a_restarted_board_is_configured_again() -> None:
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
     """The board restarts within a moment, without a silence.
 
-    The driver notices it because the tick counters begin at zero, and configures the board again.
+    The tick counters begin at zero, which shows the restart. The driver configures the board again.
     """
     rig = Rig(LoisSettings(quirks=replace(FIRMWARE, slow_boot=False)))
     rig.run(5.0)
@@ -155,8 +155,8 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
     """The robot is stopped and started again at several speeds.
 
-    It starts each time, because the driver clears the old speed that the firmware keeps for a wheel
-    at rest.
+    The firmware keeps the last measured speed of a wheel at rest, so the wheel might not start. The
+    driver clears this speed, and the robot starts each time.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -169,9 +169,9 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """A robot on the public firmware was stopped, and RPM 0/0 is not sent after the Stop.
+    """A robot on the public firmware drives at 30 RPM and is stopped. No RPM 0/0 follows the Stop.
 
-    Without feed-forward, its wheels then do not start at a lower speed.
+    If feed-forward is off, 8 RPM in the same direction then do not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

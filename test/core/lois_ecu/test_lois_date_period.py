@@ -48,9 +48,9 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The settings restart the date period, so only requested dates can confirm the settings.
+    """The driver confirms the settings by a date that it requests. A request ends the date period.
 
-    The driver confirms the settings and leaves the right period.
+    At the end, the settings are confirmed, and the board has the right date period.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

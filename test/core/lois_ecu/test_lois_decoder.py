@@ -58,7 +58,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """The decoder returns a plausible group with the group's last byte.
+    """The decoder returns a plausible group as soon as it receives the group's last byte.
 
     Only the first group of each kind has to wait.
     """
@@ -103,8 +103,9 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
     """One line of a group is damaged. The decoder discards this group and returns the next one.
 
-    If the last line of a group arrives twice, the group is returned. A GPS fix is discarded even
-    then, because it waits for the next line.
+    There is one exception: if the last line of a group arrives twice, the group is returned. The
+    exception does not apply to a GPS fix, because the decoder returns a fix only after the next
+    line.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -148,9 +149,9 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """A group of odometry lines follows a group of tick lines. One line is lost.
+    """A group of odometry lines follows a group of tick lines, and one line is lost.
 
-    The group with all its lines is still decoded.
+    The group that is still complete is decoded.
     """
     decoder = LoisDecoder()
     found: list[Report] = []
@@ -211,7 +212,10 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """A single group of ticks that jumps is an error. Two such groups that agree show a restart."""
+    """The tick counts of one group jump. The decoder takes this for an error and drops the group.
+
+    If the next group continues from the new counts, the board has restarted.
+    """
     decoder = LoisDecoder()
     said = [
         Ticks(400, 1000, 1001),
@@ -267,7 +271,7 @@ def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
 def test_a_line_that_lost_its_end_costs_no_other() -> None:
     """A line has lost its line end.
 
-    The colon of the next line ends it, and the next line is decoded.
+    The colon of the next line ends the line. So the next line is decoded.
     """
     heading = encode_report(Heading(5))
     decoder = LoisDecoder()

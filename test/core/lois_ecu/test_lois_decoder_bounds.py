@@ -32,9 +32,9 @@ codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
 def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
     chunks: list[bytes], terminal: bool
 ) -> None:
-    """Any bytes arrive in any chunks. The decoder raises no error and gives the same reports.
+    """Any bytes arrive in any chunks. The decoder raises no error.
 
-    It holds fewer than 256 bytes between calls.
+    The reports do not depend on the chunks. Between calls, the decoder holds fewer than 256 bytes.
     """
     data = b"".join(chunks)
     results = []

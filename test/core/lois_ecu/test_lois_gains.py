@@ -27,9 +27,9 @@ def told(bench: AnyBench) -> list[str]:
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """The user has set no gains.
+    """The user has set no gains. One notice says so.
 
-    One notice says so, and the diagnostics name them until they are set.
+    The diagnostics name the missing gains until the user has set them.
     """
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)

@@ -198,7 +198,7 @@ def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> Non
 def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
     """A record of headings ends with two values of 362°.
 
-    If the number of values would be odd, it ends with three.
+    It ends with three such values if this makes the number of values even.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.HEADING, 3)

@@ -176,7 +176,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """The user changes the wheel radius. Only later distances are scaled with it."""
+    """The user changes the wheel radius. Only distances after the change are scaled with it."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -256,7 +256,7 @@ def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
 def test_duty_backward_is_known_by_commands_alone() -> None:
     """The robot drives backward by duty, so only the commands are known.
 
-    The sigma of the distance exceeds 20 % of it.
+    The sigma of the distance is more than 20 % of the distance.
     """
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)

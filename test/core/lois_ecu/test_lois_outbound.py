@@ -61,7 +61,7 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 ) -> None:
     """Up to two characters of the driver's lines are lost. The firmware rejects the damaged lines.
 
-    It accepts only lines that were sent, in their order.
+    It accepts only lines that the driver sent, in the order of sending.
     """
     data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
     said = heard(data, with_sum=with_sum, lenient=lenient)
@@ -75,9 +75,9 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """A run of characters shorter than a line is lost.
+    """Some characters in a row are lost, but fewer than a line has.
 
-    Two lines never join to another valid line.
+    The rest of two lines never forms another valid line.
     """
     length = 14 if with_sum else 12
     for talk in TALKS.values():

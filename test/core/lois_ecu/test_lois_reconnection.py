@@ -90,8 +90,8 @@ def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
 ) -> None:
     """After a silence of 12 s, the tick counters are at zero instead of 500.
 
-    Either the board has restarted, or the wheels have rolled back. The ticks alone do not show
-    which. Only the clock of a board that restarted does not fit the length of the silence.
+    Either the board has restarted, or the wheels have rolled back. The board's clock shows which.
+    If the board has restarted, the clock does not fit the length of the silence.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

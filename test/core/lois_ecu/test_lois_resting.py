@@ -28,9 +28,10 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 
 
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
-    """The reported speed falls from 41 to 20 RPM, which is fast.
+    """The reported speed falls from 41 to 20 RPM and stays there.
 
-    Only the third repetition of 20 RPM shows that the wheel is at rest.
+    Few wheels come to rest from as much as 20 RPM. So only the third repetition of 20 RPM shows
+    that the wheel is at rest.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0

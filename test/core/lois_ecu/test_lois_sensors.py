@@ -68,7 +68,7 @@ def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
     """After midnight the date is still the old one, so the time would be a day too early.
 
-    It is unknown until a new date arrives.
+    The time is unknown until a new date arrives.
     """
     ecu = LoisConversation(LoisEcuSettings())
     said = [GpsDate(26, 11, 22), GpsTime(23, 59, 59), GpsTime(0, 0, 1), GpsDate(26, 11, 23)]
@@ -110,10 +110,10 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """The odometry is reset, and later headings are compared with the new yaw.
+    """The robot has turned by 120° to the right when the odometry is reset to yaw 0.
 
-    The firmware may send a wrong heading of 120° at north. After a turn of 120°, all headings would
-    otherwise be refused for good.
+    The firmware may send a wrong heading of 120° when the robot faces north. The driver must not
+    take the true headings of 120° after the reset for such errors.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

@@ -66,8 +66,8 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
     """The user resets the board after a drive.
 
-    The tick counters jump to zero, which proves the reset. A drive of 1.2 s is long enough for
-    this.
+    The tick counters jump to zero, which proves the reset. Even after a drive of only 1.2 s, the
+    counters are high enough for this proof.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
@@ -120,7 +120,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
     """A first reset sets the tick counters to zero, and a second reset is lost.
 
-    Counters of zero do not prove the second one, so it is unconfirmed.
+    The counters were zero before the second reset, so they do not prove it. It is unconfirmed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, 6.0)
@@ -186,8 +186,8 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     """The driver writes the settings in five rounds, each in a different order.
 
-    A round can take as long as the time between two groups. In a fixed order, the board would be
-    deaf for the same line in every round.
+    The board is deaf for a moment in each group that it sends. A round can take as long as the time
+    between two groups. In a fixed order, the same line would then be lost in every round.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -221,7 +221,7 @@ def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> No
 def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
     """The driver repeats its settings after a connection, and then the shutdown begins.
 
-    It sends only Stop from then on.
+    During the shutdown, the driver sends only Stop.
     """
     bench = Bench(firmware)
     bench.close()

@@ -89,7 +89,7 @@ def encode_command_duty(left: int, right: int) -> bytes:
 def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
     """After a Stop, RPM 0/0 is sent before each of the first three set-points.
 
-    Without it, a wheel at rest might never start.
+    Without RPM 0/0, a wheel at rest might never start.
     """
     ecu = started()
     drive = b":020014001438\n"
@@ -122,7 +122,7 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
     """The driver sends the request for a record three times, because one may be lost.
 
-    It does so quickly, because each request restarts the record.
+    The three requests follow quickly, because each of them restarts the record.
     """
     ecu = started()
     ecu.record(kind, samples)

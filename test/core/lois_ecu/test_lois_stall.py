@@ -73,7 +73,7 @@ def looks_stalled(
     resting: tuple[bool, bool] = (False, False),
     settings: LoisEcuSettings | None = None,
 ) -> bool:
-    """Return whether a wheel looks stalled with these reported speeds, one pair every 0.2 s."""
+    """Return whether a wheel looks stalled. ``rpm``: reported speeds, one pair every 0.2 s."""
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
     found = False
@@ -90,10 +90,10 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The left wheel's reported speed never changes, while the other wheel ticks.
+    """The left wheel's reported speed never changes, although the other wheel ticks.
 
-    So the left wheel is at rest. The reported pose still moves, because the firmware computes it
-    from the last speed.
+    So the left wheel is at rest. The reported pose moves, because the firmware computes it from the
+    last reported speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
@@ -109,9 +109,9 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a wheel gets power even above its set-point. Its speed may be constant.
+    """With feed-forward, a wheel gets power even above its set-point. It can roll steadily there.
 
-    A constant speed shows a wheel at rest only if the other wheel's speed changes.
+    So a constant speed shows a wheel at rest only if the other wheel's speed changes.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -119,25 +119,25 @@ def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> 
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """Backward, a wheel is up to 10 % too fast, and its integer speeds repeat.
+    """The left wheel rolls backward, at its set-point or 10 % too fast. Its integer speed repeats.
 
-    It is not stalled.
+    No wheel looks stalled.
     """
     assert not looks_stalled([(-9, 9)] * 14)
     assert not looks_stalled([(-10, 9)] * 14)
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """Both wheels roll backward steadily at 1.3 times their set-points. They are not stalled.
+    """Both wheels roll backward steadily at 1.3 times their set-points. They do not look stalled.
 
-    If only one of them is so fast, a wheel looks stalled.
+    A wheel looks stalled if only one of the two is so fast.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """By the odometry, a wheel is at rest whose reported speed is near its set-point.
+    """A wheel's reported speed is near its set-point, but the odometry finds that the wheel rests.
 
     Such a wheel gets no power, so it looks stalled.
     """
@@ -147,9 +147,9 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """A wheel at rest has a reported speed below its set-point.
+    """A wheel is at rest, and its reported speed is below its set-point. It does not look stalled.
 
-    It gets power and starts by itself.
+    The controller gives it power, so it starts by itself.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -162,18 +162,19 @@ def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """Below 2 RPM a wheel may be at rest. Duty commands bypass the speed controllers.
+    """A stall is not reported for set-points below 2 RPM, at which a wheel need not turn.
 
-    In both cases, no stall is reported.
+    It is not reported for duty commands either, because they bypass the speed controllers.
     """
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
 
 
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
-    """A saturated controller keeps a wheel at −68 RPM instead of −31. The driver sends RPM 0/0.
+    """The controller of a wheel is saturated and keeps it at −68 RPM instead of −31.
 
-    The odometry keeps the motion of the wheel before that.
+    The driver sends RPM 0/0. The odometry does not take back the distance that the wheel has rolled
+    before this command.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

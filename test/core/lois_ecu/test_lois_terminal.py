@@ -126,7 +126,8 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 def test_another_drive_mode_stops_first(firmware: str) -> None:
     """The user sets another drive mode while the robot drives.
 
-    Motion is refused until it is at rest. Then the new drive mode is used.
+    The driver stops the robot and refuses motion until the robot is at rest. It then uses the new
+    drive mode.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The GPS has no date. Its position is then not a fix, and the driver requests the date."""
+"""The GPS has no date. The position is then not a fix, and the driver requests the date."""
 
 from dataclasses import replace
 from functools import partial
@@ -94,7 +94,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 
 @WORKS
 def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Quirks) -> None:
-    """The driver requests the date until it is known. A date of zeros does not end this."""
+    """The driver requests the date until it is known. A date of zeros does not end the requests."""
     rig = GpsRig(quirks)
     rig.run(5.0)
     rig.sent.clear()
@@ -152,7 +152,7 @@ def test_no_date_is_requested_from_a_board_that_ignores_its_gps() -> None:
 def test_no_date_is_requested_where_dates_come_periodically() -> None:
     """The user has set a period for dates.
 
-    The driver requests no date, as this would end the period.
+    The driver requests no date, because a request would end the period.
     """
     rig = GpsRig(DOCUMENTED)
     rig.driver.settings = LoisEcuSettings(

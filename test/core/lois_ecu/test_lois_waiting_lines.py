@@ -45,9 +45,10 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No date confirms the settings, so they wait until the robot is not driven.
+    """No date confirms the settings.
 
-    Meanwhile, the session's next wake-up is always in the future.
+    The driver wants to repeat them, but waits while the robot drives. Meanwhile, the session's next
+    wake-up is always in the future.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)

@@ -30,7 +30,7 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
 class Drive:
     """A drive in curves in which one bit of one frame is changed.
 
-    It begins away from the origin.
+    The drive begins away from the origin.
     """
 
     def __init__(self, frame: str = "earth") -> None:

@@ -129,9 +129,9 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """The robot is commanded a curve to the left. Odom shows this curve for any axis signs.
+    """The user commands a curve to the left. Odom shows this curve.
 
-    The board's heading at the start does not matter either.
+    Neither the signs of the board's axes nor the board's heading at the start make a difference.
     """
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
@@ -149,7 +149,10 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 
 
 def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
-    """The cable is unplugged for 3 s while the robot drives on. Odom then includes this motion."""
+    """The cable is unplugged for 3 s while the robot drives on, and plugged in again.
+
+    Afterwards odom includes the motion of these seconds.
+    """
     bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
     bench.open()
     bench.run(1.0)

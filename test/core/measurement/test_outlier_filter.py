@@ -122,7 +122,10 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 
 
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
-    """A knock saturates the sensor, so a reading is at the end of the 2 g scale. It is released."""
+    """A knock saturates the sensor, so a reading is at the end of the 2 g scale.
+
+    The reading is released.
+    """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
     assert [len(found) for found in admitted(readings, through)] == [1] * 60
@@ -132,7 +135,7 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
     """A jump of the size of a changed bit is rejected.
 
-    ``full_scale_mps2`` determines these sizes.
+    This size is larger if ``full_scale_mps2`` is larger.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -170,7 +173,7 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement is faster than 2 m/s or 8 rad/s.
 
-    It is rejected, and the next one counts it as lost.
+    It is rejected. The next displacement reports it as lost.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -189,9 +192,9 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """The speed jumps from 0.25 to 1.5 m/s for one displacement, which is rejected.
+    """The speed jumps from 0.25 to 1.5 m/s for one displacement, and is then low again.
 
-    A pose after it waits until the next displacement shows this.
+    The displacement is rejected. A pose after it waits until the low speed shows the error.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
@@ -219,9 +222,9 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """A rejected displacement shows a restart or an unknown duration.
+    """A displacement with a restart or an unknown duration is rejected.
 
-    The next one then shows it.
+    The next displacement is released with this restart or this unknown duration.
     """
     first = replace(ahead(9.0), duration_s=None, restarted=True)
     came = admitted([ahead(), first, ahead(), ahead()], gate())

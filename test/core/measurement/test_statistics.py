@@ -18,8 +18,8 @@ def lost(bench: Bench) -> tuple[int, int]:
 def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
     """The line is silent for a while.
 
-    A counter in the frames shows how many displacements are lost. IMU frames have no counter, so
-    four of them count as lost with each displacement.
+    A counter in the delta frames shows how many displacements are lost. IMU frames have no counter.
+    So for each lost displacement, four IMU readings count as lost.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

@@ -19,9 +19,9 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """The user switches the motion monitor off to drive a robot with wrong settings. It drives.
+    """The settings are wrong. The user switches the motion monitor off, and the robot drives.
 
-    When the monitor is on again, it trips.
+    When the monitor is switched on again, it trips.
     """
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
@@ -36,7 +36,7 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
     """A motion limit is too low while the motion monitor is off, so displacements are rejected.
 
-    The limit is then corrected and the monitor switched on. It does not trip.
+    The limit is then corrected, and the monitor is switched on. The monitor does not trip.
     """
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):

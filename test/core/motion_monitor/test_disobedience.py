@@ -78,9 +78,9 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
 def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
     board: dict[str, object], command: Triple
 ) -> None:
-    """The board sends a displacement only every 0.1 s. Three that deviate show the fault.
+    """The board sends a displacement only every 0.1 s.
 
-    So the robot is still stopped within 0.3 s.
+    Three displacements that deviate are a fault. So the robot is still stopped within 0.3 s.
     """
     for phase in range(0, 10, 3):
         bench = started(BoardSettings(running=True, delta_period_s=0.1, **board))  # type: ignore[arg-type]
@@ -128,7 +128,7 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 
 @pytest.mark.parametrize("board", [FAST, A_AND_B])
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
-    """The user commands wheel rates. The monitor compares the twist that they give together."""
+    """The user commands wheel rates. The monitor compares the resulting twist with the motion."""
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
 
@@ -198,7 +198,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
     """The robot drives away from its goal. The motion monitor trips and refuses motion.
 
-    Without this, a node that repeats its goal could restart the robot again and again.
+    Without the refusal, a node that repeats its goal could restart the robot again and again.
     """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)

@@ -94,7 +94,10 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """A set-point lasts for a single tick between two displacements. It is still considered."""
+    """A set-point lasts for a single tick between two displacements.
+
+    The envelope still contains it.
+    """
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -156,9 +159,9 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """In one long displacement of zero, the robot may have turned round.
+    """One long displacement is zero. The robot may be held, or it may have reversed in this time.
 
-    Only two show that it is held.
+    Only two such displacements in a row show that it is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)

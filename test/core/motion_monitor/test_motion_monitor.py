@@ -217,7 +217,8 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
     """A robot is held for 1 s at 0.4 m/s, and its wheel controllers integrate the error.
 
-    It may then be faster until it has caught up 0.4 m.
+    When it is released, the robot is too fast until it has caught up 0.4 m. The monitor finds no
+    fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
@@ -231,7 +232,7 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
     """A robot at rest is pushed, and its controllers wind up.
 
-    At the next command it may move back.
+    At the next command the robot moves back for a moment. The monitor finds no fault.
     """
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -241,9 +242,9 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot at rest is pushed for long. It has already received Stop.
+    """A robot at rest is pushed for long. It has already obeyed Stop, so more Stops do not help.
 
-    So the faults, and with them the Stops, become rarer.
+    So the faults, each of which causes a Stop, become rarer.
     """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
@@ -251,9 +252,9 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot has missed Stop and goes on, but may receive a later Stop.
+    """A driven robot has missed Stop and goes on, but it may receive a later Stop.
 
-    So the faults, and with them the Stops, do not become rarer.
+    So the faults, each of which causes a Stop, do not become rarer.
     """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
@@ -267,9 +268,9 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
-    """The robot moves the wrong way and is stopped.
+    """The robot moves the wrong way, so the driver sends Stop.
 
-    It moves until Stop arrives, and then rolls out. The monitor finds no second fault.
+    The robot moves on until Stop arrives, and then rolls out. The monitor finds no second fault.
     """
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)

@@ -93,7 +93,7 @@ def test_over_a_gap_the_angles_are_those_of_the_encoders(
 ) -> None:
     """Frames are lost for up to 0.4 s. The wheel angles are then right within 0.12 rad.
 
-    After 2 s in curves the error is larger, because only the shortest path is known.
+    After a loss of 2 s in curves, the error is larger. The driver then assumes the shortest path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

@@ -37,7 +37,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     held_s: float, gains: WheelGains
 ) -> None:
-    """A held robot is released. It may leap, because its wheel controllers have wound up.
+    """A held robot is released. It can leap, because its wheel controllers have wound up.
 
     The motion monitor does not trip.
     """
@@ -71,7 +71,7 @@ def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
 def test_a_slow_command_and_a_command_to_stand_prove_nothing(bench: Bench) -> None:
     """The user sends commands that are within the noise, then zero commands. No notice appears.
 
-    Neither shows whether a robot obeys.
+    Neither kind of command can show whether a robot obeys.
     """
     for _ in range(40):
         bench.drive(0.001, 0.0, 0.01)
@@ -152,7 +152,7 @@ def test_the_stops_for_a_robot_that_moves_without_a_command_do_not_hinder_the_ne
 ) -> None:
     """The driver repeats Stop for a robot that moves without a command.
 
-    A new command replaces it.
+    A new command ends the repetition, and the robot obeys it.
     """
     bench.hears = False
     bench.run(4.0)

@@ -54,9 +54,9 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """The robot has two wheels, and each has a size that is uncertain by 1 %.
+    """The robot has two wheels. The size of each wheel is uncertain by 1 %.
 
-    After a metre straight ahead, each adds an uncertainty of 0.025 rad and 5 mm.
+    After a metre straight ahead, each wheel adds an uncertainty of 0.025 rad and 5 mm.
     """
     noise = OdometryNoise(
         wheel_drift=0.0,
@@ -128,9 +128,9 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """Wheel sizes are uncertain. The deviation of the yaw grows tenfold from 1 m to 10 m.
+    """Wheel sizes are uncertain. The standard deviation of the yaw grows tenfold from 1 m to 10 m.
 
-    It is zero when the robot has driven back.
+    When the robot has driven back, the standard deviation is zero.
     """
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
@@ -183,9 +183,9 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board computes its pose from its wheels.
+    """The board computes its pose from its wheels, so the pose has the same drift as the deltas.
 
-    So the pose does not reduce the wheels' drift.
+    A pose therefore does not reduce the covariance of this drift.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

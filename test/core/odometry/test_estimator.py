@@ -77,7 +77,7 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
     """The board sends deltas in the body's axes.
 
-    They need no pose, so each is published at once.
+    Such deltas need no pose, so each is published at once.
     """
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:

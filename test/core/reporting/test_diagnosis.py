@@ -167,7 +167,7 @@ HAPPENINGS = [FAULTS[number] for number in (0, 3, 4, 5, 6, 7, 13, 14)]
 def test_what_happened_is_told_for_a_while_and_then_forgotten(
     fault: Change, name: str, level: Level, said: str
 ) -> None:
-    """An event is reported for some time. Then its status is OK again."""
+    """An event changes a status for some time. Then the status is OK again."""
     robot = Robot()
     fault(robot)
     robot.seconds(round(RECENT_S) - 1)
@@ -208,7 +208,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     """The skew of the clock is larger than a crystal can have. It is reported after more than 70 s.
 
-    A busy computer may show such a skew for a minute, which must not be reported.
+    A busy computer may cause such a skew for up to a minute. This must not be reported.
     """
     robot = Robot()
     robot.set(skew_ppm=-119.0)
@@ -275,7 +275,7 @@ def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
 def test_the_one_who_commands_is_named_with_the_age_of_the_command() -> None:
     """The user commands the robot. The status names the source and the age of the command.
 
-    It is OK even if commands are limited.
+    The status is OK even if commands are limited.
     """
     robot = Robot()
     robot.command(source="cmd_vel", age_s=0.05)

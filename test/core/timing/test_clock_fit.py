@@ -57,7 +57,10 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """One read in twenty is late, so its lower bound is too high. It does not lift the line."""
+    """One read in twenty is late, so its lower bound is too high.
+
+    This bound does not lift the line.
+    """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(
             0.0,

@@ -81,8 +81,8 @@ surprises = st.tuples(
 )
 """Unusual reads, each as a tuple of five values.
 
-These are the readings, the ticks since the reading before, the delay in s, the boundary, and the
-number of normal reads after it.
+The values are the readings, the ticks since the reading before, the delay in s, the
+``SampleBoundary``, and the number of normal reads that follow.
 """
 
 

@@ -11,7 +11,7 @@ from omnibot_driver.core.requests import Request
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
     """The board is paused at first and sends only notices, which have no sampling time.
 
-    They add no delay.
+    The notices add no delay.
     """
     bench = Bench()
     bench.open()

@@ -197,7 +197,7 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
 
 
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
-    """Samples are lost on a line that delivers at once, without displacements.
+    """Samples are lost on a line that delivers without delay. The board sends no displacements.
 
     Each 10 ms of silence then counts as one missing tick.
     """
@@ -262,9 +262,9 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
 
 
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
-    """An adapter may cut the stream between a displacement and its sample.
+    """An adapter may cut the stream between a displacement and the IMU sample of the same tick.
 
-    They have the same stamp.
+    Both still have the same stamp.
     """
     for chunker in (ftdi(restarted_by_data=True), bursts, singles):
         stamped = run(Board(seconds=10), chunker, 0)
@@ -274,7 +274,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """A false restart comes between two true displacements. It does not move the stamps."""
+    """Between two true displacements, a false one shows a restart. The stamps do not move."""
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
@@ -306,7 +306,7 @@ reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, m
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],
 ) -> None:
-    """Counters and boundaries may be wrong.
+    """Reads have any counters and any ``SampleBoundary``, even wrong ones.
 
     Stamps never decrease and never exceed arrival times.
     """

@@ -60,7 +60,7 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """One command writes several parameters, and the user gives only some of them. This is refused.
+    """One command writes several parameters. If the user gives only some of them, this is refused.
 
     The driver cannot guess the missing values.
     """
@@ -75,7 +75,7 @@ def test_a_track_alone_is_refused() -> None:
 
 
 def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
-    """One port cannot serve both boards, not even under two names. This is refused."""
+    """The user gives the same port for both boards, perhaps under two names. This is refused."""
     link = tmp_path / "front"
     link.symlink_to("/dev/ttyACM0")
     for front in ("/dev/ttyACM0", str(link)):

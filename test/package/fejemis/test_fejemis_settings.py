@@ -33,8 +33,8 @@ def load(name: str) -> Any:
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
     """The filter fuses only velocities and the yaw rate of the gyro.
 
-    It fuses no poses and no accelerations. It does not fuse the board's yaw, because the board
-    computes it from the gyro.
+    It fuses no poses and no accelerations. The board's yaw is not fused, because the board computes
+    this yaw from the same gyro.
     """
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {
@@ -51,7 +51,7 @@ def test_the_filter_fuses_velocities_and_the_gyro() -> None:
 def test_nav2_plans_and_follows_curves_forward() -> None:
     """Nav2's planner and controller have the same turning radius.
 
-    Their speed limits are the driver's.
+    Their speed limits are those of the driver.
     """
     file = load("nav2_fejemis.yaml")
     mppi = file["controller_server"]["ros__parameters"]["FollowPath"]

@@ -61,7 +61,7 @@ def test_nav2_keeps_to_the_drivers_limits_and_does_not_move_sideways() -> None:
 
 
 def test_nav2_has_the_footprint_of_the_description() -> None:
-    """Both costmaps of Nav2 have the same footprint. For this board it is not round."""
+    """Both costmaps of Nav2 have the same footprint, which is not round. It encloses the wheels."""
     file = load("nav2_lois_ecu.yaml")
     maps = [file[name][name]["ros__parameters"] for name in ("local_costmap", "global_costmap")]
     assert maps[0]["footprint"] == maps[1]["footprint"]

@@ -90,7 +90,8 @@ def test_its_sensors_are_published(
 def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: Probe) -> None:
     """A user sets the parameter ``tof_maximum`` to 2, which ``ros2 param set`` sends as an integer.
 
-    The driver accepts it for this real number, and publishes the new maximum.
+    The parameter is a real number, but the driver accepts the integer. It publishes the new
+    maximum.
     """
     ranges = probe.listen(Range, "range/tof")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=2)

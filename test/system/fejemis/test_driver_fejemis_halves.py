@@ -102,8 +102,8 @@ def test_it_drives_without_sums(
 ) -> None:
     """The firmware uses no checksums.
 
-    The driver learns this from the heartbeats and omits them, too. The firmware then accepts every
-    line from the driver.
+    The driver learns this from the heartbeats and sends lines without checksums. The firmware
+    accepts every line.
     """
     robot = robot_of(stack, tmp_path, firmware=Firmware(sums=False))
     probe: Probe = probe_of(started(robot, start_driver))

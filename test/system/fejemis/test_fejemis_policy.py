@@ -49,9 +49,9 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
-    """The other enclaves may use only topics and services that the driver has.
+    """The policy allows other enclaves only topics and services that the driver has.
 
-    Only the operator's enclave may call services and publish lift commands.
+    Only the operator's enclave is allowed to call services and to publish lift commands.
     """
     every = rules()
     driver = every.pop("/omnibot/driver")

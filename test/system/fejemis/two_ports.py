@@ -57,7 +57,7 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
     def plug(self, channel: int) -> None:
         """Open a new terminal and let the channel's link point to it.
 
-        Its name is usually another one.
+        The new terminal usually has another name than the last one.
         """
         with self._plugging:
             self.heard[channel] = bytearray()

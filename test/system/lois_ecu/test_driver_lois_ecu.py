@@ -205,7 +205,7 @@ def test_it_runs_inside_the_driver_too(firmware: str, start_driver: Start, probe
 def test_a_record_is_a_file_and_an_estop_ends_one(
     start_driver: Start, probe_of: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """A user calls a record service. Its answer is the path of the record's file.
+    """A user calls a record service. The answer is the path of the record's file.
 
     If the e-stop interrupts a record, no file is written.
     """

@@ -98,7 +98,7 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 ) -> None:
     """A duty arrives while the driver is suspended. The driver refuses it when it runs again.
 
-    It is the sender's first message, so the driver does not know the sender's clock yet. The
+    The duty is the sender's first message, so the driver does not know the sender's clock yet. The
     refusal does not depend on this clock.
     """
     ecu = ecu_of("firmware", stack)
