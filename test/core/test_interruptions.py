@@ -112,7 +112,7 @@ def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
 
 
 def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
-    """No data arrives for three seconds while the robot drives, and the line is opened again.
+    """No data arrives for three seconds while the robot drives. Then the line is opened again.
 
     Afterwards odom includes the motion of these seconds.
     """

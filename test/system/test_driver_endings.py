@@ -186,9 +186,9 @@ def test_the_board_can_be_left_paused_or_reset(
 
 
 def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
-    """The driver's output is not read. Command timeout, e-stop and SIGTERM still work.
+    """The driver's output is not read, for example because ctrl-S has stopped the terminal.
 
-    This happens, for example, if ctrl-S has stopped the terminal, or if the reader of a pipe hangs.
+    A pipe whose reader hangs has the same effect. Command timeout, e-stop and SIGTERM still work.
     """
     board = start_board(running=True)
     reading, writing = os.pipe()

@@ -120,7 +120,8 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
     """A first reset sets the tick counters to zero, and a second reset is lost.
 
-    The counters were zero before the second reset, so they do not prove it. It is unconfirmed.
+    The counters were zero before the second reset, so they do not prove it. The second reset is
+    unconfirmed.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, 6.0)

@@ -131,7 +131,7 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 ) -> None:
     """The user commands a curve to the left. Odom shows this curve.
 
-    Neither the signs of the board's axes nor the board's heading at the start make a difference.
+    It does so for any signs of the board's axes and for any heading of the board at the start.
     """
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
@@ -149,7 +149,7 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 
 
 def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
-    """The cable is unplugged for 3 s while the robot drives on, and plugged in again.
+    """The cable is unplugged for 3 s while the robot drives on. Then it is plugged in again.
 
     Afterwards odom includes the motion of these seconds.
     """
