@@ -32,7 +32,7 @@ SECONDS = 120.0
 SETTLED = 400
 """Number of ticks before a measurement begins."""
 OTHERS_BYTES = 24 << 20
-"""Number of bytes to overwrite before a measurement, so that the caches lose all else."""
+"""Number of bytes to overwrite before a measurement, so that the caches contain nothing else."""
 FAULTY = "1 byte in 100 lost"
 STREAMS = (("clean", ""), (FAULTY, FAULTY))
 GOALS = {"clean": 1.5, FAULTY: 4.0}
@@ -144,7 +144,10 @@ def cold(ticks: int) -> str:
 
 
 def memory(hours: float = 1.0) -> str:
-    """Play a long stream to a session as fast as possible, and return its memory as a sentence."""
+    """Play a long stream to a session as fast as possible.
+
+    Return the memory in use as a sentence.
+    """
     session = _session()
     data, now, events = stream(SECONDS), 0.0, 0
     resident_mb = []

@@ -22,7 +22,7 @@ PORT: Final = "11811"
 WINDOW_S: Final = 30.0
 """Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Time in s for the drivers to start, and then for the traffic of the observer to end.
+"""Time in s to wait for the start of the drivers, and later for the end of the observer's traffic.
 
 It is a fixed time, because no event reports the last packet.
 """

@@ -132,7 +132,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return an empty list, because nothing here has a floor, and the rows of a table."""
+    """Return an empty list of figures, and the rows of a table. Nothing here has a floor."""
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

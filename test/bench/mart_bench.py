@@ -5,8 +5,8 @@
 There are two simulated controllers on UDP. One is for the driver, and one is for the floor, the
 smallest program that sends as many queries.
 
-The driver sends a new speed only after the reply to the current query, and computes it from the
-encoder's count. A stop does not wait.
+The driver computes a new speed from the encoder's count. It sends the speed only after the reply to
+the current query. A stop does not wait for this reply.
 """
 
 import time
@@ -108,7 +108,9 @@ def _latencies(
 ) -> list[float]:
     """Return how long each command took to reach the controller, in µs.
 
-    Only commands to a moving robot are measured: stops if ``stops``, else changes of speed.
+    Only commands to a moving robot are measured.
+
+    ``stops``: whether to measure stops. If false, changes of speed are measured.
     """
     found = []
     for (_, before), (at, speed) in pairwise(sent):

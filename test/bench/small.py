@@ -61,7 +61,7 @@ class Group:
     def joined(self) -> Iterator[None]:
         """Move this process into the group during the context.
 
-        Processes that it starts join, too.
+        Processes that this process starts join the group, too.
         """
         self._members.write_text(str(os.getpid()))
         try:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays of growing size. Each step adds one task to the floor, up to those of a correct relay.
+"""Relays of growing size between the floor and a correct relay. Each step adds one task.
 
 The arguments are the step, which is a key of STEPS, the port and the namespace. The relay publishes
 serialized messages and writes nothing to the port.

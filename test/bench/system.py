@@ -38,7 +38,7 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios of driver to floor, for each adapter. None is without a limit.
+"""Largest allowed ratios of driver to floor, for each adapter. None means that there is no limit.
 
 The four ratios are of the median latency of measurements, its 99th percentile, the processor time,
 and the latency of cmd_vel.
@@ -270,7 +270,7 @@ def latencies(
 def command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return the time from each command to the first read of the board with its frame, in µs."""
+    """Return how long each command took until the board's first read with its frame, in µs."""
     found = []
     frames = [
         (at, struct.unpack_from(">h", data, begin + 3)[0])

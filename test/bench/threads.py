@@ -16,7 +16,7 @@ LEAST_MS: Final = 0.05
 """Processor time in ms per second. A thread with less than that has no row of its own."""
 
 Counts = dict[str, tuple[float, int]]
-"""By the name of a thread, its processor time in s and its number of wake-ups."""
+"""For each name of a thread, the processor time in s and the number of wake-ups."""
 
 
 def table(seconds: float) -> list[str]:

@@ -23,11 +23,11 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""If the simulated board paused for this time or longer, in s, the driver may report silence."""
+"""If the simulated board pauses for this time or longer, in s, the driver may blame the cable."""
 TRANSIT: Final = 200
-"""Number of frames that may still be on their way when the comparison of messages begins."""
+"""Number of frames that are possibly still on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""A message is compared with this number of the frames that were sent next.
+"""A message is compared with the frames after that of the previous message, up to this distance.
 
 If none of these frames equals the message, the message is wrong.
 """

@@ -206,10 +206,11 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Test stops on a line that loses bytes to the board.
+        """Test stops on a line that loses bytes to the board, until the last stop has been judged.
 
-        Each of ``numbers`` gets a new driver. ``number_of_life`` is the index of the group of stops
-        in LIVES. The line loses bytes until the last stop has been judged.
+        ``number_of_life``: the index of the group of stops in LIVES.
+
+        ``numbers``: for each of these numbers, a new driver performs the group.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
@@ -317,9 +318,9 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 
 
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
-    """Run the pieces that apply to the board in parallel, in this order.
+    """Run those of the pieces that apply to the board, in parallel.
 
-    Return the sum of their results.
+    Return the sum of their results. The results are added in the order of ``wanted``.
     """
     total, without = Outcome(), load(board).without
     wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]

@@ -33,7 +33,7 @@ DAMAGED_S: Final = 1.1
 A grace time is added.
 """
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
-"""Pattern of the log lines that a driver should print if the board does not receive its stops."""
+"""Pattern of the log lines that a driver should print if the board does not receive Stop."""
 NEXT_ATTEMPT_S: Final = 2.0
 """Longest time in s until the driver tries again to open a lost port."""
 SILENCE_S: Final = 1.5
@@ -98,7 +98,10 @@ def flood_of_commands(rig: Rig) -> None:
 
 
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
-    """Damage bytes while the robot drives for ``seconds``, and then until it must be at rest."""
+    """Damage the bytes on the line while the robot drives for ``seconds``.
+
+    Then the commands end. The damage continues until the robot must be at rest.
+    """
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
     rig.line.from_board = from_board or rig.line.from_board
@@ -152,7 +155,7 @@ def board_reboots(rig: Rig) -> None:
 def board_reboots_while_somebody_drives_on(rig: Rig) -> None:
     """Reboot the board while commands continue.
 
-    They must move the robot again only after the boot.
+    After the boot, these commands must move the robot again.
     """
     rig.drive()
     rig.reboot_board()
@@ -193,9 +196,10 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 
 
 def estop(rig: Rig) -> None:
-    """Latch the e-stop. Then the board reboots and the cable is pulled, while commands continue.
+    """Latch the e-stop. While commands continue, the board reboots and the cable is pulled.
 
-    After the release of the e-stop, the old command must not move the robot.
+    The robot must stay at rest. When the commands have ended and the e-stop is released, the last
+    command must not move the robot.
     """
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)
@@ -247,9 +251,9 @@ def service_discards_the_command(service: str, rig: Rig) -> None:
 
 
 def random_lines(seed: int) -> dict[str, Case[Rig]]:
-    """Return the cases that damage bytes at random.
+    """Return the cases that damage bytes at random. The keys are the names of the cases.
 
-    The keys are their names, and ``seed`` selects the damage.
+    ``seed``: selects the damage.
     """
     random = Random(f"lines {seed}")
     return {
@@ -306,7 +310,10 @@ def driver_hangs(rig: Rig) -> None:
 
 
 def second_driver(rig: Rig) -> None:
-    """Start a second driver on the same port. It must be refused, and the first must drive on."""
+    """Start a second driver on the same port. This driver must be refused.
+
+    The first driver must continue to drive the robot.
+    """
     rig.drive()
     with Driver(**rig.ports, **rig.kind.parameters) as other:
         said = other.wait_for_line("is in use")

@@ -79,6 +79,6 @@ class Navigator:
         self._goals.publish(goal)
 
     def leave(self) -> None:
-        """Latch and release the e-stop, which discards the goal. A goal has no timeout."""
+        """Discard the goal, which has no timeout. For this, latch and release the e-stop."""
         for data in (True, False):
             self._probe.call(SetBool, "estop", data=data)

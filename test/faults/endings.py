@@ -57,7 +57,7 @@ class Ending:
 
     ``end``: ends the driver of a rig.
 
-    ``exit_codes``: the exit codes that the driver may have.
+    ``exit_codes``: the allowed exit codes of the driver.
 
     ``before``: Python code that runs in the driver's process before the driver.
 
@@ -118,7 +118,10 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_topic(rig: Rig) -> None:
-    """Publish on ``estop``. Code that ends the driver has replaced the callback of this topic."""
+    """Publish on the topic ``estop``, whose callback ends the driver.
+
+    The Python code of ``Ending.before`` has replaced the usual callback.
+    """
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))
 
@@ -133,7 +136,7 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
     """Unplug the cable and plug it in again. Send SIGINT before the driver has opened the port.
 
-    The robot still follows its last command.
+    At this time, the robot still follows its last command.
     """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")

@@ -87,8 +87,10 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy has the fault ``what``.
 
-    Until the Teensy works again, commands must have no effect. ``allowed_s``: how long the robot
-    may still drive, in s. If it is 0, the robot may drive on until the Teensy works again.
+    Until the Teensy works again, commands must have no effect.
+
+    ``allowed_s``: how long the robot may still drive, in s. 0 means no limit: the robot may drive
+    on until the Teensy works again.
     """
 
     def case(rig: Rig) -> None:

@@ -21,7 +21,7 @@ BURST: Final = 10
 HELD: Final = 0.99
 """The least share of the board's readings that the driver must publish during the random input.
 
-The 2 s after the input belong to this time.
+The readings in the 2 s after the input are included.
 """
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 

@@ -38,7 +38,7 @@ def two_commanders(rig: Rig) -> None:
 def other_type(rig: Rig) -> None:
     """Publish TwistStamped on cmd_vel, whose type is Twist.
 
-    This must have no effect, and the driver must report it.
+    The messages must have no effect, and the driver must report the wrong type.
     """
     context = rclpy.Context()
     context.init()
@@ -135,8 +135,8 @@ def nonsense_for_parameters(rig: Rig) -> None:
 def limit_lowered(rig: Rig) -> None:
     """Lower the speed limit to zero while commands continue. The robot must stop at once.
 
-    It must be at rest when the service answers. How long the call takes does not matter, because
-    the call first has to find the service.
+    It must be at rest when the service answers. The duration of the call is not judged, because it
+    includes the search for the service.
     """
 
     def limit(mps: float) -> None:

@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes to the board, from before a stop until the stop is judged.
+"""Stops on a line that loses bytes to the board.
 
-Process and pseudo-terminal are real. The rate of failures cannot be measured here. It is measured
-in simulated time, in test/integrity/outbound.py. The board of each driver has a different receiver.
+The loss begins before a stop, and lasts until the stop is judged. Process and pseudo-terminal are
+real, so each stop takes real time. Too few stops are possible to measure the rate of failures.
+test/integrity/outbound.py measures this rate in simulated time. The board of each driver has a
+different receiver.
 """
 
 import signal
@@ -28,7 +30,10 @@ GUARD_S: Final = 1.5
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
-    """Return a rig with a new driver and the board of this number. Its line is still undamaged."""
+    """Return a rig with a new driver. Its line is still undamaged.
+
+    ``number``: selects the settings of the board, for example its receiver.
+    """
     return Rig(folder, kind, settings=kind.lossy(number), **more)
 
 

@@ -33,7 +33,7 @@ LOST_STOP_S: Final = 1.2
 BLIND_S: Final = 2.0
 """Longest time in s until a robot must stop if its driver gets no replies.
 
-This includes slow exchanges.
+The time of slow exchanges is included.
 """
 NETWORK_S: Final = 90.0
 """Longest wait for a start on a bad network, in s. The driver must first see that the IMU works."""
@@ -54,9 +54,9 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty, because the driver still polls after its last stop.
+        """Always empty, so that the last bytes are not compared with a stop.
 
-        So the last bytes cannot be compared with a stop.
+        After its last stop, the driver still polls.
         """
         return b""
 
@@ -140,7 +140,10 @@ def replies_are_cut(rig: Rig) -> None:
 
 
 def network_is_away(seconds: float, rig: Rig) -> None:
-    """Cut the network both ways. The robot drives on until a stop reaches the controller again."""
+    """Cut the network in both directions.
+
+    The robot drives on until the controller receives a stop.
+    """
     rig.drive()
     rig.line.from_board = rig.line.to_board = cut
     rig.wait_ticks(round(seconds / TICK_S))

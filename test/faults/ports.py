@@ -34,7 +34,7 @@ DROP_ALL = struct.pack("HBBI", 0x06, 0, 0, 0)
 class Terminal(PtyBoard):
     """A pseudo-terminal with a board.
 
-    ``deaf``: whether the adapter does not read the kernel's buffer. It still sends.
+    ``deaf``: if true, the adapter does not read the kernel's buffer, but it still sends.
     """
 
     deaf = False

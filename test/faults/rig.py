@@ -55,7 +55,7 @@ class Findings:
 
     complaints: list[str] = field(default_factory=list)
     stood_after_s: list[float] = field(default_factory=list)
-    """Time in s of the board's clock from each stop until the robot was at rest."""
+    """For each stop, the time until the robot was at rest, in s of the board's clock."""
     published: int = 0
     wrong: int = 0
 
@@ -257,7 +257,10 @@ class Rig:
         )
 
     def expect_obeys_again(self) -> None:
-        """Expect a fresh command to move the robot. Expect it to stop when the commands end."""
+        """Expect a fresh command to move the robot.
+
+        When the commands end, expect the robot to stop.
+        """
         self.probe.wait_for_state("nominal")
         self.drive()
         self.hand.leave()

@@ -18,9 +18,9 @@ LOST: Final = "lost .*retrying"
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
     """Drive while the adapter is stuck for ``seconds``.
 
-    Then it delivers everything that it has kept.
+    Then the adapter delivers all that it has kept.
 
-    ``mute``: whether it also keeps the data from the board.
+    ``mute``: whether the adapter also keeps the data from the board.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -51,9 +51,10 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full for long. The driver opens it again and again, and reports this once.
+    """Keep the port full for long.
 
-    When the port accepts data, the robot must stop.
+    The driver opens it again and again, but must report this only once. When the port accepts data,
+    the robot must stop.
     """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
@@ -106,7 +107,7 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
     """Let the server keep data back and later deliver everything at once.
 
-    ``mute``: whether it also keeps the data from the board.
+    ``mute``: whether the server also keeps the data from the board.
     """
     rig.drive()
     rig.server.deaf, rig.server.mute = True, mute
@@ -118,9 +119,9 @@ def server_holds(rig: NetworkRig, *, mute: bool) -> None:
 
 
 def server_closes_one_direction(rig: NetworkRig) -> None:
-    """Close one direction of the connection.
+    """Close the direction of the connection from the board to the driver.
 
-    The driver must notice this and send Stop in the other one.
+    The driver must notice this and send Stop in the other direction.
     """
     rig.drive()
     since, mark = rig.line.tick, len(rig.driver.lines)

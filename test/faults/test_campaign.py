@@ -51,7 +51,9 @@ def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
 
 
 def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
-    """Some faults occur in random order and at once. The robot rests in time and then obeys.
+    """Faults occur in random order, several at the same time.
+
+    The robot rests in time and then obeys.
 
     ``make faults`` and ``make soak`` run long random walks.
     """

@@ -11,9 +11,10 @@ from rig_board import load
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """Every board has faults. The faults that it leaves out exist.
+    """Every board has faults.
 
-    A misspelt name would leave out no fault.
+    The names of the faults that it leaves out are names of existing faults. A misspelt name would
+    leave out no fault.
     """
     kind = load(board)
     own = (kind.cases or survivable)(0)

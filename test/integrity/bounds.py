@@ -51,7 +51,10 @@ class Bound:
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 
     def holds(self, chunker: str, score: Score) -> bool:
-        """Return whether a score is within the limits. A chunking without limits always is."""
+        """Return whether a score is within the limits.
+
+        For a chunking without limits, return True.
+        """
         if chunker not in self.chunkers:
             return True
         one_in = self.one_wrong_in(chunker)

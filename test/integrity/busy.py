@@ -16,7 +16,7 @@ from truth import BYTE_S
 LATE_SHARE, LATE_S = 0.02, (0.002, 0.030)
 """Share of late reads, and the range of their delay in s.
 
-A navigation stack runs beside the driver.
+The values are for a navigation stack that runs beside the driver.
 """
 STALL_SHARE, STALL_S = 0.002, (0.001, 0.300)
 JITTER_S = 60e-6
@@ -176,4 +176,7 @@ READERS: dict[str, Chunker] = {
     "all mixed": mixed,
 }
 BUSY_LOOPS: dict[str, Chunker] = {"4 bytes, busy loops beside": hogged}
-"""Chunkings in which both adapter and reader are late. Their times say nearly nothing."""
+"""Chunkings in which both adapter and reader are late.
+
+The times of their reads hardly show when the bytes arrived.
+"""

@@ -2,12 +2,12 @@
 
 """Reaction times of the motion monitor in board time: a table for internals/motion_monitor.md.
 
-PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
+    PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
 The velocity of a robot that obeys is between rest and its command. A reaction time begins with the
 first tick in which the velocity is 0.05 m/s or 0.15 rad/s outside this range. It ends when the
-driver sends Stop. The first displacement may follow sooner or later. The table has the shortest and
-the longest time over all these phases of the displacements.
+driver sends Stop. The reaction time depends on how soon the next displacement follows. The table
+has the shortest and the longest time over all phases of the displacements.
 """
 
 from collections.abc import Callable

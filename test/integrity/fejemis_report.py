@@ -174,9 +174,9 @@ def score(truth: list[Event], found: list[Event]) -> Score:
 
 
 def one(seconds: float, job: tuple[bool, int]) -> dict[tuple[str, bool], Score]:
-    """Play one stream with each fault.
+    """Play one stream with each fault, and return the scores.
 
-    Return the scores by fault and by whether checksums are used.
+    The keys are the fault, and whether the lines have checksums.
     """
     sums, seed = job
     stream = drive(sums, seed, seconds)

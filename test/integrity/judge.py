@@ -20,7 +20,7 @@ a true frame that is sent much later. So a match that skips many frames needs a 
 next decoded frame must match shortly behind it.
 """
 REACH_BYTES = 600
-"""The judge searches for a decoded frame from this number of bytes before the current read on."""
+"""The search for a decoded frame begins this number of bytes before the current read."""
 
 
 @dataclass(slots=True)

@@ -24,7 +24,10 @@ TICK_S: Final = 0.01
 STEER_EVERY: Final = 100
 """Number of the board's ticks between two commands."""
 LEAST_DELIVERED: Final = {"1 byte in 1,000 lost": 0.9, "1 byte in 100 lost": 0.5}
-"""For each fault, the least share of the true reports that must be decoded. None may be wrong."""
+"""For each fault, the least share of the true reports that must be decoded.
+
+No decoded report may be wrong.
+"""
 
 Stream = list[bytes]
 """The bytes of each tick."""
@@ -32,11 +35,12 @@ Stream = list[bytes]
 
 @dataclass(slots=True)
 class Score:
-    """Counts of decoded lines and reports. Scores can be added.
+    """Counts of decoded lines of text and of reports. Scores can be added.
 
-    ``sent``: number of reports on the undamaged line.
+    ``sent``: number of reports in the undamaged stream.
 
-    ``lines``: number of valid lines on the undamaged line. ``lines_out``: on the damaged one.
+    ``lines``, ``lines_out``: number of valid lines of text in the undamaged and in the damaged
+    stream.
     """
 
     lines: int = 0

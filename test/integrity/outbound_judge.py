@@ -91,7 +91,10 @@ class Judge:
         return self._uncommanded_from_s is None and self._stray_from_s is None
 
     def branch(self, score: Score) -> "Judge":
-        """Return a judge that continues from here in a further trial. It adds to this score."""
+        """Return a judge that continues from here in a further trial.
+
+        The new judge adds its counts to ``score``.
+        """
         other = copy(self)
         other.score = score
         score.trials += 1

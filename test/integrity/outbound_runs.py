@@ -24,8 +24,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Number of trials for each receiver and each loss.
 
-The scenes that end a drive share this number. With 1 byte in 100 lost, each scene in ``HURRIES``
-has the whole number.
+The scenes that end a drive share this number. There is one exception: with 1 byte in 100 lost, each
+scene in ``HURRIES`` has this number of trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"

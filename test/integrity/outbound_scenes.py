@@ -257,7 +257,10 @@ def goal(random: Random) -> Scene:
 
 
 def leave(random: Random) -> Scene:
-    """Make a scene in which the driver ends while commands arrive. The e-stop may be latched."""
+    """Make a scene in which the driver ends while commands arrive.
+
+    Sometimes the e-stop is latched.
+    """
     exits_s = FROM_S + random.uniform(0.1, 0.3)
     wishes = driving(random, FROM_S, exits_s, by_wheels=_wheels(random))
     if random.random() < 0.2:

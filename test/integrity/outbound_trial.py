@@ -77,8 +77,8 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    The beginning without faults is played only once. Each ``run`` continues from its end. Trials
-    with the same kind of receiver may share a ``memo``.
+    The beginning without faults is played only once. Each ``run`` continues from the end of this
+    beginning. Trials with the same kind of receiver may share a ``memo``.
     """
 
     def __init__(self, course: Course, board: BoardKind, memo: Memo) -> None:

@@ -23,7 +23,7 @@ SECONDS, SEEDS = 11.0, 2
 def scores() -> Scores:
     """Return the scores of every scenario, fault and chunking.
 
-    Each bound has about 16,000 frames.
+    Each limit is tested with about 16,000 frames.
     """
     jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
     total: Scores = {}

@@ -222,7 +222,7 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
     """Draw the clear solids over the colours behind them, from the lowest solid to the highest.
 
-    A face covers more of the colour behind it where it is seen at a flat angle.
+    A face that is seen at a flat angle covers more of the colour behind it.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

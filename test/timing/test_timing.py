@@ -59,9 +59,9 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
     """The clocks of the board and of an FTDI adapter run equally fast.
 
-    So the adapter's timer keeps its phase relative to the ticks. It may then never cut a frame in
-    two, which would show this phase. The driver knows the phase only to within 2 ms minus the
-    duration of 13 bytes.
+    So the adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
+    would show this phase. With some phases, the timer never cuts a frame. Then the driver knows the
+    phase only to within 2 ms minus the duration of 13 bytes.
 
     Nevertheless, all stamps are late by the duration of a frame, within 0.5 ms. The first 2 s of
     each stream are left out.

@@ -43,8 +43,8 @@ def test_the_whole_walk_finds_what_was_planted(
 ) -> None:
     """The robot has reversed axes, another delta frame and a turned IMU.
 
-    The tool finds all of these. The user's first answer is impossible, so the tool explains this
-    and asks again. At the end, a driver loads the written file.
+    The tool finds all of these. The user's first answer is impossible, so the tool says why and
+    asks again. At the end, a driver loads the written file.
     """
     with rig(
         tmp_path,
@@ -114,9 +114,10 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """One axis is reversed. The tool finds this, and notes that such signs mirror the robot.
+    """One axis is reversed, and the tool finds the signs of the axes.
 
-    The answer "r" repeats the motion, and an invalid answer repeats the question.
+    A note says that these signs mirror the robot. The answer "r" repeats the motion, and an invalid
+    answer repeats the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

@@ -40,8 +40,8 @@ def arguments(*words: str) -> argparse.Namespace:
 def paths() -> list[tuple[str, Column, bool]]:
     """Return all drives of the calibration, each with its odometry path.
 
-    Each item is the name of the drive, the path, and whether the user measures the heading at its
-    end. The odometry goes exactly through the places of the drive.
+    Each item is the name of the drive, the path, and whether the user measures the heading at the
+    end of the drive. The path goes exactly through the planned places of the drive.
     """
     found = []
     for drive in geometry.plan(1.0, 3, squares=True):
@@ -57,9 +57,9 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """Return noisy tape readings of a robot with slip, whose sizes are ``factors`` and ``base``.
+    """Return noisy tape readings of a robot with slip.
 
-    The sizes are relative to the sizes that the tool assumes.
+    ``factors``, ``base``: the robot's true sizes, relative to the sizes that the tool assumes.
     """
     made = []
     for name, path, heading in paths():
@@ -82,7 +82,7 @@ unlike = st.floats(-0.01, 0.01)
 def test_any_geometry_is_found_within_what_is_claimed(
     wheels: float, base: float, a: float, b: float, seed: int
 ) -> None:
-    """The robot has any sizes of wheels and base. The fit finds them within five claimed sigmas."""
+    """Whatever the sizes of wheels and base, the fit finds them within five claimed sigmas."""
     factors = wheels * (1 + np.array([a, b, -a - b]))
     found = fit(readings(factors, base, np.random.default_rng(seed)), BASE_M, DRIFT)
     wheels_sigma, base_sigma = np.sqrt(np.diag(found.covariance))[:2]
@@ -109,9 +109,10 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """``rolled`` gets the sizes that the tool assumes.
+    """``rolled`` computes the path of a robot with given sizes.
 
-    It returns the path itself, relative to its start.
+    Here the sizes are those that the tool assumes. The result is the given path, relative to its
+    first pose.
     """
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)

@@ -29,7 +29,7 @@ UPSIDE_DOWN = np.array([0.0, 0.0, -9.80665])
 def sensor(seconds: float, seed: int = 0, force: np.ndarray = UPSIDE_DOWN, lost: int = 0) -> Imu:
     """Return IMU readings with bias, force and white noise.
 
-    ``lost`` readings are missing in the middle.
+    ``lost``: the number of readings that are missing in the middle.
     """
     random = np.random.default_rng(seed)
     count = round(seconds / PERIOD_S)
@@ -68,7 +68,10 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 def test_level_is_the_turn_that_makes_gravity_point_up(
     roll: float, pitch: float, mounting: float
 ) -> None:
-    """A tilted sensor rests. The roll and pitch that are found agree with its rotation matrix."""
+    """A tilted sensor rests.
+
+    The roll and pitch that are found agree with the sensor's rotation matrix.
+    """
     roll += mounting
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     to_body = np.array([[cp, sp * sr, sp * cr], [0, cr, -sr], [-sp, cp * sr, cp * cr]])
@@ -97,7 +100,7 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
 def test_a_bias_that_walks_is_known_less_well() -> None:
     """The bias drifts during a rest of ten minutes.
 
-    The claimed uncertainty covers its last value.
+    The claimed uncertainty covers the bias at the end of the rest.
     """
     scores = []
     for seed in range(12):
@@ -111,9 +114,9 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 
 
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
-    """The picture of a long rest is smaller than 170 kB, because it shows only some of the points.
+    """A picture of noise does not compress well. So the picture of a long rest omits many points.
 
-    A picture of noise does not compress well.
+    The file is smaller than 170 kB.
     """
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
@@ -142,7 +145,7 @@ def test_readings_that_say_nothing_are_turned_away() -> None:
 
 
 def test_a_robot_that_moves_is_not_at_rest() -> None:
-    """The robot should rest, but the odometry moves, or the gyro's rate exceeds any bias.
+    """The robot should rest, but its wheels turn, or its gyro shows too high a rate for a bias.
 
     The tool rejects such a rest.
     """

@@ -136,7 +136,8 @@ def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
 ) -> None:
     """The driver has measured the balance of the motors. The tool writes it to the file.
 
-    Before a drive forward, the balance is unknown and is not written.
+    As long as the robot has not driven forward, the driver does not know the balance. Then the tool
+    does not write it.
     """
     robot = Encoder(motor_balance=1.0)
     robot.diagnosed = {"Motor balance": shown}.__getitem__
@@ -149,7 +150,10 @@ def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
 
 
 def test_a_line_that_was_misread_is_told() -> None:
-    """The user misreads the tape on one line. A note says that two equal lines differ too much."""
+    """The user measures two lines of equal length, and misreads the tape on one of them.
+
+    A note says by how much the two results differ.
+    """
     robot = TwoWheels()
     found = geometry.run(robot, answers(robot, misread_mm=100.0), arguments("geometry"))
     (note,) = found.notes

@@ -78,7 +78,10 @@ def test_a_command_changes_no_faster_than_allowed(
     "command", [(0.31, 0.0, 0.0), (0.25, 0.25, 0.0), (0.0, 0.0, -0.6), (math.nan, 0.0, 0.0)]
 )
 def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, float]) -> None:
-    """A command above a bound or with NaN is refused. For the bound, x and y are one vector."""
+    """A command above a bound or with NaN is refused.
+
+    The bound limits the length of the vector (x, y).
+    """
     with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
         BOUNDS.require_allowed("cmd_vel", command)
     wheels = Bounds(speed=5.0, way=1.0, seconds=1.0)
@@ -119,7 +122,10 @@ def test_a_robot_obeys_slowly_and_roughly_but_it_obeys() -> None:
 
 
 def test_stairs_are_climbed_one_by_one() -> None:
-    """``stairs`` gives each command for its time. Then it gives None, which ends the motion."""
+    """``stairs`` returns each command until the time of the command is over.
+
+    After the last command, it returns None, which ends the motion.
+    """
     law = stairs([(1.0, (1.0, 0.0, 0.0)), (2.0, HALT), (1.0, (0.0, 1.0, 0.0))])
     assert [law(t, Pose()) for t in (0.0, 0.99, 1.0, 2.9, 3.5)] == [
         (1.0, 0.0, 0.0), (1.0, 0.0, 0.0), HALT, HALT, (0.0, 1.0, 0.0),
@@ -215,7 +221,7 @@ def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
 
 
 def test_everything_that_may_be_written_is_a_parameter() -> None:
-    """A calibration may write axis_signs, gyro_bias and linear_scale."""
+    """A calibration is allowed to write axis_signs, gyro_bias and linear_scale."""
     assert {"axis_signs", "gyro_bias", "linear_scale"} < set(PARAMETERS.calibrated)
 
 
@@ -253,7 +259,7 @@ def test_wrong_usage_is_exit_code_2(words: list[str], capsys: pytest.CaptureFixt
 def test_what_the_board_cannot_do_is_refused_in_one_sentence(what: str, thing: str) -> None:
     """The board lacks what a calibration needs. The calibration is refused in one sentence.
 
-    The OmniBot has what every calibration needs.
+    The OmniBot has everything that the calibrations need, so none is refused.
     """
     for subcommand in SUBCOMMANDS:
         require_able(subcommand, PARAMETERS.by_name)

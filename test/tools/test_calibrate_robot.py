@@ -46,7 +46,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` at each of its calls after ``AFTER_S`` seconds."""
+    """Return a callback. Each of its calls later than ``AFTER_S`` seconds calls ``action``."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -150,10 +150,9 @@ def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> Non
 
 
 def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
-    """The tool has switched the driver's motion monitor off for a motion, and ctrl-C interrupts it.
+    """Ctrl-C interrupts a motion for which the tool has switched the driver's motion monitor off.
 
-    The tool switches the monitor on again. It switches the monitor off only for a motion that the
-    monitor would stop.
+    The tool switches the monitor on again.
     """
     seen = []
 
@@ -211,7 +210,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 ) -> None:
     """The robot does not come to rest after Stop. The error says to cut the robot's power.
 
-    This advice is added to the original error, if there is one.
+    If another error ended the motion, the advice is added to that error.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
@@ -244,7 +243,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A topic is silent after 0.3 s without data.
+    """After 0.3 s without data, a topic counts as silent.
 
     Only the topics that a motion needs are checked.
     """

@@ -23,7 +23,9 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """Return the log of a robot whose board has ``true`` scales. The tool assumes ``ASSUMED``.
+    """Return the log of a drive in which the commands are planned with the scales ``ASSUMED``.
+
+    ``true``: the scales that the board really has.
 
     ``gyro``: a factor on the rate that the robot's gyro measures.
     """
@@ -56,7 +58,7 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """The board has any scale. Odometry and gyro each give it within five claimed sigmas."""
+    """Whatever the scale, odometry and gyro each give it within five claimed sigmas."""
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
     assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)
@@ -74,7 +76,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 ) -> None:
     """Planned commands are whole counts of the board, and are not above ``top``.
 
-    If ``top`` is less than one count, they may be one count.
+    There is one exception: if ``top`` is less than one count, commands of one count are allowed.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -83,9 +85,9 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """The commands pause during a speed, and the tool does not measure this speed.
+    """While one speed is measured, the commands pause.
 
-    The driver may have stopped the robot during the pause.
+    The driver may have stopped the robot meanwhile. So the tool does not use this speed.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
@@ -112,7 +114,10 @@ def test_axes_that_disagree_are_told() -> None:
 
 
 def test_what_cannot_be_measured_is_an_error() -> None:
-    """The log has no steady speed, or the robot drives against its commands. This is an error."""
+    """A log has no steady speed. In another log, the robot drives against its commands.
+
+    Each of them is an error.
+    """
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
     with pytest.raises(ToolError, match="axis_signs"):
@@ -124,7 +129,7 @@ def test_planted_scales_are_found_and_applied(
 ) -> None:
     """A board has other scales than usual. ``calibrate scale`` finds them through a real driver.
 
-    ``--apply`` sets them in the driver, which takes stamped commands here.
+    ``--apply`` sets them in the driver. In this test, the driver takes stamped commands.
     """
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:

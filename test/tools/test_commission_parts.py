@@ -50,7 +50,8 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
     """Return the direction "up" for three postures of the robot, as the mounted sensor measures it.
 
-    In the postures the robot is level, its nose is up, and its left side is up.
+    In the first posture the robot is level. In the second its nose is raised, and in the third its
+    left side.
     """
     bodies = (
         (0.0, 0.0, 1.0),
@@ -88,7 +89,7 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """One wheel is commanded. It may turn forward or backward, and the other wheels must rest.
+    """One wheel is commanded. A pattern is valid if only this wheel turns, forward or backward.
 
     All other patterns of the 27 are contradictions.
     """
@@ -122,7 +123,7 @@ def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
 def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
     """If one axis is reversed, the signs mirror the robot.
 
-    If x and y are reversed, they turn it by 180°.
+    If x and y are both reversed, the signs turn the robot by 180°.
     """
     assert not mirrored((1, 1, 1))
     assert not mirrored((-1, -1, 1))
@@ -136,9 +137,9 @@ def test_one_reversed_axis_is_a_mirror_image_two_are_a_turn() -> None:
 def test_any_mounting_is_found_from_three_postures(
     roll: float, pitch: float, yaw: float, nose_rad: float, left_rad: float
 ) -> None:
-    """The sensor has any mounting.
+    """Whatever the mounting of the sensor, it is found exactly.
 
-    It is found exactly, whatever the angles of the two tilts are.
+    The angles of the two tilts do not matter.
     """
     planted = rotation(roll, pitch, yaw)
     found = mounting(*postures(planted, nose_rad, left_rad))
@@ -148,7 +149,7 @@ def test_any_mounting_is_found_from_three_postures(
 
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_angles_are_those_of_a_description(roll: float, pitch: float, yaw: float) -> None:
-    """Roll, pitch and yaw are computed from a rotation. They give the same rotation again."""
+    """Roll, pitch and yaw are computed from a rotation matrix. They give the same matrix again."""
     made = rotation(roll, pitch, yaw)
     assert rotation(*rpy(made)) == pytest.approx(made, abs=1e-9)
 
@@ -173,7 +174,7 @@ def test_a_clumsy_hand_still_finds_right_angles(
 ) -> None:
     """The user's tilts are askew by up to 5°.
 
-    The right one of the 24 right-angled mountings is still found.
+    The tool still finds which of the 24 right-angled mountings the sensor has.
     """
     planted = rotation(mounted[0], mounted[1], mounted[2] * math.pi / 2)
     level = postures(planted, 0.5, 0.6)[0]
@@ -193,9 +194,9 @@ def test_a_sensor_mounted_askew_stays_so() -> None:
 def test_a_side_lowered_instead_of_raised_is_a_contradiction(
     nose_rad: float, left_rad: float
 ) -> None:
-    """The user lowers the nose or the left side instead of raising it. This is a contradiction.
+    """The user lowers the nose or the left side instead of raising it.
 
-    The measured axes would be left-handed.
+    The measured axes would be left-handed, so this is a contradiction.
     """
     level, nose_up, left_up = postures(rotation(math.pi, 0, 0), nose_rad, left_rad)
     with pytest.raises(Contradiction, match="repeat both tilts"):
@@ -279,7 +280,7 @@ def test_velocities_are_held_and_doubled(scale: float, direction_rad: float) -> 
 def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     """The robot stops at a goal, or drives equally fast with both commands.
 
-    The tool recognises positional control.
+    In both cases, the tool recognises positional control.
     """
     assert control_method(slow, fast, 0.06) == "position"
 
@@ -295,7 +296,7 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
     """The motion fits neither control method, so the tool finds none.
 
-    For example, a command came late, so the robot becomes faster during it.
+    For example, a command came late, so the robot becomes faster during the measurement.
     """
     assert control_method(slow, fast, 0.06) is None
 

@@ -24,7 +24,7 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
     """Messages arrive at a constant rate.
 
-    The measured rate is right within one message per window.
+    The measured rate differs from it by at most one message per window.
     """
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
@@ -95,7 +95,10 @@ def test_a_reset_of_the_odometry_begins_a_new_way() -> None:
 
 
 def test_a_pose_that_is_none_is_shown_but_not_followed() -> None:
-    """A pose has NaN or infinity. The view shows and names it, but the path omits it."""
+    """A pose has NaN or infinity.
+
+    The view shows the pose and names the value, but the path omits it.
+    """
     model = Model("/omnibot_driver", 0.0)
     for number, x_m in enumerate((0.0, math.nan, math.inf, 0.1)):
         model.odom(Pose(x_m, 0.0), BodyTwist(x_m, 0.0, 0.0), 0.1 * number)
@@ -150,7 +153,7 @@ def test_what_was_measured_once_is_not_what_is_measured() -> None:
     ],
 )
 def test_a_topic_is_missing_where_the_state_promises_it(state: str, missing: list[str]) -> None:
-    """The view reports a missing topic only in a state in which the board should send its data."""
+    """A topic without messages is missing only if the board should send its data in this state."""
     assert view(state=state, imu=NOTHING, odom=NOTHING).missing(diagnostics=True) == missing
 
 

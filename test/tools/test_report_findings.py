@@ -136,7 +136,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """Every second reading of a log is missing. The report says that the rate is wrong.
+    """Every other reading of a log is missing. The report says that the rate is wrong.
 
     It does not report gaps.
     """
@@ -211,9 +211,9 @@ def test_nothing_but_nan_is_told(drive: Drive) -> None:
 
 
 def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
-    """The driver refuses commands because of the e-stop. The report omits its warnings of these.
+    """The driver refuses commands because of the e-stop, and warns of this.
 
-    It shows the warnings of other refusals.
+    The report omits the warning. It shows the driver's warnings of other refusals.
     """
     why = "motion command refused: the e-stop is latched; release it with the service ~/estop"
     drive.statuses.append((9.5, "omnibot_driver: Commands", 1, why, {}))
@@ -223,9 +223,9 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 
 
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
-    """For each status of the diagnostics, the report gives the worst level and its message.
+    """For each status of the diagnostics, the report gives the worst level and the message.
 
-    It also says how often this was reported.
+    It also says how often the driver reported this level.
     """
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))

@@ -106,7 +106,10 @@ def test_without_odometry_an_even_turn_is_not_taken_for_rest(drive: Drive) -> No
 
 
 def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
-    """The gyro's sign shows that the sensor stands upright. The advice names ``imu_rpy``."""
+    """The description has the sensor upside down, but the sign of the gyro's rate shows it upright.
+
+    The advice names ``imu_rpy``.
+    """
     drive.imu.values[:, 2] *= -1.0
     assert "imu_rpy" in said(drive, "IMU", "upright").advice
 

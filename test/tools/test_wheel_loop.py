@@ -63,7 +63,7 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 
 
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
-    """A delay of 1.4 ticks gives a rise between those with delays of 1 and 2 ticks."""
+    """With a delay of 1.4 ticks, the response lies between those with delays of 1 and 2 ticks."""
     sooner, between, later = (
         answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
     )
@@ -166,7 +166,10 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
 
 
 def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
-    """The tool proposes one set of gains for three motors. It keeps the limits with each motor."""
+    """The tool proposes one set of gains for three motors.
+
+    With these gains, each motor keeps the limits.
+    """
     motors = [Motor(46.0, 6.0, 0.0), Motor(35.0, 10.0, 1.0), Motor(60.0, 4.0, 3.0)]
     gains = better_gains(motors)
     for motor in motors:
@@ -178,7 +181,7 @@ def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:
 def test_what_is_predicted_comes_about() -> None:
     """The simulated board runs with the proposed gains.
 
-    Its overshoot and error are the predicted ones.
+    The overshoot and the error of its response agree with the predicted ones.
     """
     motor = Motor(46.0, 6.0, 2.0)
     gains = better_gains([motor])

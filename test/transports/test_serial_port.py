@@ -38,7 +38,7 @@ def test_every_way_a_port_can_refuse_says_what_to_do(
 ) -> None:
     """A port cannot be opened. For each error, the message has advice.
 
-    A substitute for pyserial raises the errors, because root is never refused.
+    A substitute for pyserial raises the errors, because the kernel does not refuse access to root.
     """
 
     def refuse(*_: object, **__: object) -> None:
@@ -65,7 +65,7 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
     """A second program opens a port that is in use.
 
-    The error names the owner, from the kernel's locks.
+    The error names the owner. It is found in the kernel's list of locks.
     """
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
@@ -104,9 +104,10 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A real terminal is exclusive, also for programs that use no locks.
+    """A port makes a real terminal exclusive. So programs that use no locks are refused, too.
 
-    A pseudo-terminal is not.
+    When the port is closed, the terminal is no longer exclusive. A pseudo-terminal is never made
+    exclusive.
     """
 
     def exclusive() -> bool:

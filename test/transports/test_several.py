@@ -161,7 +161,10 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A full line is not given to the guard. The guard's lock would prevent a new opening."""
+    """A full line is not given to the guard.
+
+    The guard's lock would prevent the driver from opening this line again.
+    """
     os.set_blocking(ends.near[0], False)
     fill(ends.near[0])
     monkeypatch.setattr("omnibot_driver.transports.several.WRITE_TIMEOUT_S", 0.0)

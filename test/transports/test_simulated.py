@@ -110,7 +110,7 @@ def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
 def test_channels_are_told_apart_in_the_order_of_the_board(stack: ExitStack) -> None:
     """A read returns bytes of one channel only.
 
-    Reads have the order in which the board has sent.
+    Successive reads return the bytes in the order in which the board has sent them.
     """
     transport = stack.enter_context(closing(SimulatedTransport("sim://", TOY)))
     transport.write([(toy_lines.FRONT, b"angle 30\n"), (toy_lines.DRIVE, b"go 0.5 0\n")])

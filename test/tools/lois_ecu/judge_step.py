@@ -6,8 +6,9 @@ Run this by hand, with the number of robots and optionally the seed of the first
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-The program needs about two minutes for each robot. It prints the overshoot of the true wheel speed.
-For this, the robot has the gains that were found, and evenly spaced marks.
+The program needs about two minutes for each robot. After the calibration, each robot makes a step
+with the gains that were found. In this step, its marks are evenly spaced. The program prints the
+overshoot of the true wheel speeds.
 """
 
 import contextlib

@@ -239,10 +239,10 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
 def test_a_step_is_predicted_as_the_simulated_board_makes_it(
     firmware: Firmware, gains: PiGains
 ) -> None:
-    """The tool predicts a step.
+    """The tool predicts a step. The step of the simulated board agrees with the prediction.
 
-    The simulated board, which is a separate program, makes the same step. The controller runs 11 or
-    5 times a second, depending on the firmware.
+    The simulated board is a separate program. Its controller runs 11 or 5 times a second, depending
+    on the firmware.
     """
     motor = MotorSettings(
         rpm_per_percent=0.66,
@@ -290,7 +290,7 @@ def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> No
     """The times of a record have overflowed. The tool refuses the record.
 
     The manual gives 100 ns as the unit of these times. In this unit, the time between two ticks of
-    a usual wheel is too large for a record.
+    a usual wheel exceeds the largest number that a record can hold.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
@@ -312,8 +312,8 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
 
-    ``calibrate step`` finds corrections, plants and gains, and sets them in the driver. The
-    driver's calibration file may contain each of these parameters.
+    ``calibrate step`` finds corrections, plants and gains, and sets them in the driver. All these
+    parameters are allowed in the driver's calibration file.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
