@@ -2,8 +2,8 @@
 
 """Write the kernel's number and the name of each thread to a file.
 
-The variable NAMES has the name of the file. This code runs in the driver's process, before the
-driver.
+The variable NAMES has the name of the file. This code runs in the driver's process before the
+driver starts.
 """
 
 import os

@@ -2,7 +2,7 @@
 
 """A busy computer: busy loops on every core, and an adapter that delivers four bytes at a time.
 
-The line is undamaged. So the driver must publish exactly what the board sent, and no message may
+The line is undamaged. So the driver must publish exactly what the board sent, and its log must not
 name the cable as a cause.
 """
 

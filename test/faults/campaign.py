@@ -3,9 +3,9 @@
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
 The campaign has all scripted faults, random input, and random walks through the faults. With
-``--minutes`` it is only a long random walk. Drivers wait for real time, so the pieces of the
-campaign run in parallel. Each piece has its own drivers, boards and ROS domain. The exit code is 1
-when anything was wrong.
+``--minutes`` it is only a long random walk. Drivers run in real time, so the pieces of the campaign
+run in parallel. Each piece has its own drivers, boards and ROS domain. The exit code is 1 when
+anything was wrong.
 """
 
 import argparse

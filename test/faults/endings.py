@@ -2,8 +2,8 @@
 
 """Ways in which a driver ends while the robot drives: on request, by a defect, or by force.
 
-An ending may have Python code that runs in the driver's process before the driver. After an ending,
-the rig has no driver.
+An ending may have Python code that runs in the driver's process before the driver starts. After an
+ending, the rig has no driver.
 """
 
 import os
@@ -59,7 +59,7 @@ class Ending:
 
     ``exit_codes``: the allowed exit codes of the driver.
 
-    ``before``: Python code that runs in the driver's process before the driver.
+    ``before``: Python code that runs in the driver's process before the driver starts.
 
     ``allowed_s``: how long the robot may still drive after the ending, in s.
 

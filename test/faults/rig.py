@@ -76,7 +76,7 @@ class Rig:
 
     ``kind``: the kind of board, which is made with ``settings``.
 
-    ``before``: Python code that runs in the driver's process before the driver.
+    ``before``: Python code that runs in the driver's process before the driver starts.
 
     ``grace_s``: additional time that the robot may take to come to rest, in s.
 
@@ -205,7 +205,7 @@ class Rig:
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
         """Expect the motors to go off soon after ``since_tick``, and to stay off.
 
-        They may still be on for ``allowed_s`` plus the grace time. Then they must be off for
+        The motors may still be on for ``allowed_s`` plus the grace time. Then they must be off for
         ``REST_TICKS``.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
@@ -242,7 +242,7 @@ class Rig:
     def expect_ended(self, *exit_codes: int, late_s: float = 0.0) -> None:
         """Expect the driver to end in time with one of these exit codes.
 
-        ``late_s``: additional time that it may take, in s.
+        ``late_s``: additional time that the driver may take to end, in s.
         """
         begin_s = time.monotonic()
         try:

@@ -53,8 +53,8 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 def full_for_long(rig: Rig) -> None:
     """Keep the port full for long.
 
-    The driver opens it again and again, but must report this only once. When the port accepts data,
-    the robot must stop.
+    The driver opens the port again and again, but must report this only once. When the port accepts
+    data, the robot must stop.
     """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
@@ -70,7 +70,7 @@ def full_for_long(rig: Rig) -> None:
 def estop_into_a_full_port(rig: Rig) -> None:
     """Latch the e-stop while the port is full. The reply must contain a warning.
 
-    When the port accepts data again, no new motion command may come before the e-stop.
+    When the port accepts data again, the board must get no new motion command before the e-stop.
     """
     rig.drive()
     rig.hand.leave()

@@ -62,9 +62,9 @@ def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """The other tests have caused many faults. The driver has published nothing false meanwhile.
+    """The other tests have caused many faults. Meanwhile, the driver has published nothing false.
 
-    It has published no message that the board did not send, and no jump of odometry.
+    The board has sent every published message, and the odometry has not jumped.
     """
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()

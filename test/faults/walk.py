@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Faults in random order, several of them at once, under random commands.
+"""Faults in random order, several of them at the same time, under random commands.
 
 Every few steps the commander leaves. Then the robot must come to rest in time, and the driver must
 be in its usual state. The robot must then obey a fresh command. All faults of the line end when the

@@ -138,7 +138,7 @@ def damaged(stream: Stream, fault: Fault, random: Random) -> Stream:
 def value_of(event: Event) -> str | None:
     """Return the value of an event as text, without its timestamp.
 
-    Return None for events that are not judged in this way.
+    Return None for events that are not compared as text.
     """
     if isinstance(event, ImuEstimate):
         return f"imu {event.specific_force} {event.angular_velocity}"

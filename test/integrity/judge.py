@@ -15,9 +15,9 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """A match that skips more intact frames than this needs a confirmation.
 
-The judge searches for a decoded frame among the frames that were sent next. A false frame may equal
-a true frame that is sent much later. So a match that skips many frames needs a second match: the
-next decoded frame must match shortly behind it.
+The judge searches for a decoded frame among the frames that were sent after the previous match. A
+false frame may equal a true frame that was sent much later. So a match that skips many frames needs
+a second match: the next decoded frame must match shortly behind it.
 """
 REACH_BYTES = 600
 """The search for a decoded frame begins this number of bytes before the current read."""

@@ -24,8 +24,9 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes that arrive before the next fault. For a write of at most ``whole``
-    bytes, the caller only subtracts its length. All other writes go through ``carry``.
+    ``whole``: number of bytes that arrive before the next fault. If a write has at most this number
+    of bytes, the caller only subtracts their number from ``whole``. All other writes go through
+    ``carry``.
     """
 
     whole: int

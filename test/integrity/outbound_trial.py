@@ -2,9 +2,9 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board is only a mode and a set-point, without motors. It shows that the robot moves while the
-driver drives, and afterwards while the set-point is a motion. A change of its state is visible
-after one or two ticks. A shorter change is not visible.
+The board is only a mode and a set-point, without motors. As long as the driver drives, the board
+shows a moving robot. Afterwards, it shows one as long as the set-point is a motion. A change of the
+board's state is visible after one or two ticks. A shorter change is not visible.
 """
 
 import math

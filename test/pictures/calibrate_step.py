@@ -2,7 +2,7 @@
 
 """Pictures of ``calibrate step`` and ``calibrate commission``, made with robots of known errors.
 
-docs/tools/calibrate.md has these errors, and those that the calibration finds.
+docs/tools/calibrate.md lists these errors, and the errors that the calibration finds.
 """
 
 import math

@@ -52,7 +52,8 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """The places where rays enter and leave a solid, with the normals of its surface there.
+    """The places where rays enter and leave a solid, and the normals of its surface at these
+    places.
 
     All arrays have one element for each ray that meets the solid.
 

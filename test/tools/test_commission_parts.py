@@ -307,8 +307,8 @@ def test_the_wrong_frame_turns_with_the_robot(
 ) -> None:
     """The robot drives in one direction of the room before and after a turn.
 
-    With the right delta frame, the odometry shows the same direction. With the wrong frame, the
-    direction changes by the angle of the turn. Any other change is an error.
+    With the right delta frame, the odometry shows the same direction in both drives. With the wrong
+    frame, the direction changes by the angle of the turn. Any other change is an error.
     """
 
     def heading(rad: float) -> Drift:

@@ -100,7 +100,7 @@ def test_stop_is_at_once() -> None:
 def test_who_has_not_steered_commands_nothing() -> None:
     """Before the first steering key, the monitor publishes no commands, not even zeros.
 
-    Another node may be driving the robot.
+    Zeros would disturb another node that drives the robot.
     """
     dead_man = DeadMan()
     assert not dead_man.press("x", 0.0)

@@ -36,7 +36,7 @@ def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
     ["tools.calibrate", "tools.calibrate step", "tools.report", "tools.monitor", "demo"],
 )
 def test_help_needs_no_library(words: str) -> None:
-    """Python has no other libraries here, and therefore no ROS.
+    """Python has only its standard library here, so it has no ROS.
 
     The help of each tool still works.
     """

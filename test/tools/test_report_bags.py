@@ -146,7 +146,10 @@ def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 def test_a_bag_of_something_else_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A bag has no topics of a driver, except /odom with a wrong type. It is rejected."""
+    """A bag has no topics of a driver, except /odom with a wrong type.
+
+    The report rejects the bag.
+    """
     with Writer(tmp_path / "bag", version=9) as writer:
         kind = "std_msgs/msg/String"
         data = TYPES.serialize_cdr(TYPES.types[kind]("hello"), kind)

@@ -30,7 +30,10 @@ def test_a_healthy_drive_is_called_healthy(drive: Drive) -> None:
 
 
 def test_a_gap_is_told_with_its_place_and_what_is_missing(drive: Drive) -> None:
-    """Messages are missing for a while. The report gives the time of this gap and their number."""
+    """Messages are missing for a while.
+
+    The report gives the time of this gap, and how many are missing.
+    """
     drive.imu.drop(6.0, 6.15)
     (gap,) = troubles(drive)
     assert gap.level is Level.WARN
@@ -69,9 +72,10 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """The board is lost for a while. The report names this once, by the driver's state.
+    """The board is lost for a while.
 
-    It does not report the gaps in the board's data as well.
+    The driver's state shows this, and the report names the loss once. It does not also report the
+    gaps in the board's data.
     """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
