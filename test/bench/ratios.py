@@ -73,5 +73,8 @@ def alternate(
 
 
 def short(value: float) -> str:
-    """Return a number as text with three digits. A large one has all digits before the point."""
+    """Return a number as text with three digits.
+
+    From 100 on, all digits before the point are shown.
+    """
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

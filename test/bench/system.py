@@ -169,7 +169,7 @@ def commands(adapter: str, windows: int) -> Figure:
 
 
 def imports(times: int) -> Figure:
-    """Measure the time to import the driver, and that of the packages that any such node needs."""
+    """Measure the time to import the driver, and the time to import what any similar node needs."""
     floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
 
     def seconds(names: str) -> float:

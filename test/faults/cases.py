@@ -297,7 +297,8 @@ SERVICES: Final[dict[str, Case[Rig]]] = {
 def driver_hangs(rig: Rig) -> None:
     """Suspend the driver's process while commands continue and wait in queues.
 
-    The guard must stop the robot. When the driver runs again, the old commands must not move it.
+    The guard must stop the robot. When the driver runs again, the old commands must not move the
+    robot.
     """
     rig.drive()
     since = rig.line.tick

@@ -20,5 +20,8 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return time limits that even a busy machine keeps. ``make faults`` requires 0.1 s and 2 s."""
+    """Return time limits that even a busy machine keeps.
+
+    ``make faults`` uses 0.1 s and 2 s instead.
+    """
     return {"grace_s": 30.0, "ends_within_s": 60.0}

@@ -193,7 +193,7 @@ def another_client(said: bytes, rig: Rig) -> None:
 
 
 def imu_dies(rig: Rig) -> None:
-    """Let the IMU die while the robot drives by RM.
+    """Let the IMU die while the robot drives by the command RM.
 
     The stop then hangs the server, which is restarted.
     """

@@ -58,7 +58,7 @@ FRONT_M, VOLTS = 5.0, 23.4
 STAY_M: Final = 1.5
 """If the robot is farther than this from its start, in m, only turns are commanded.
 
-Otherwise it might reach the wall.
+Otherwise the robot might reach the wall.
 """
 
 

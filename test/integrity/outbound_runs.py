@@ -101,8 +101,8 @@ def add(total: Scores, more: Scores) -> None:
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
     """Return the sum of the scores of one fault.
 
-    If ``receiver`` is empty, the sum is over all receivers. If ``scene`` is empty, it is over all
-    scenes that end a drive.
+    If ``receiver`` is empty, the sum is over all receivers. If ``scene`` is empty, the sum is over
+    all scenes that end a drive.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():

@@ -18,7 +18,10 @@ Job = TypeVar("Job")
 
 
 def damaged(pieces: Sequence[bytes], fault: Fault, random: Random) -> list[bytes]:
-    """Damage a line. Return its pieces without the lost bytes, and with the added ones."""
+    """Damage the bytes of a line.
+
+    Return the pieces without the lost bytes, and with the added ones.
+    """
     whole = b"".join(pieces)
     ends, at = [], 0
     for piece in pieces:

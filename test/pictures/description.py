@@ -52,8 +52,7 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """The places where rays enter and leave a solid, and the normals of its surface at these
-    places.
+    """The places where rays enter and leave a solid, and the normals of its surface at the places.
 
     All arrays have one element for each ray that meets the solid.
 

@@ -5,14 +5,11 @@
 from omnibot_driver.simulator.omnibot import PtyBoard
 
 LOOKED_AT = 150
-"""Number of control ticks that the user looks at.
-
-They contain the end of a motion and the halt after it.
-"""
+"""Number of control ticks that the user looks at: the end of a motion and the halt after it."""
 
 
 class User:
-    """A user who answers the tool's questions. The first answers are those in ``wrong``.
+    """A user who answers the tool's questions. The first answers are those in the list ``wrong``.
 
     All later answers describe how the wheels really turned.
     """

@@ -207,9 +207,9 @@ def test_what_the_driver_would_refuse_is_not_written(tmp_path: Path) -> None:
 
 
 def test_folders_are_made_where_there_are_none(tmp_path: Path) -> None:
-    """The folders of the files are missing.
+    """The folders of the calibration file and of the picture are missing.
 
-    The tool accepts the paths and makes the folders later.
+    The tool accepts both paths, and makes the folders when it saves the files.
     """
     path, picture = tmp_path / "a" / "b" / "robot.yaml", tmp_path / "c" / "d" / "picture.png"
     assert output_file(str(path), "", PARAMETERS) == path

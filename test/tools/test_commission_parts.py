@@ -106,9 +106,10 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """One axis is commanded. The wheels may turn in the expected pattern or in its reverse.
+    """One axis is commanded.
 
-    All other patterns of the 27 are contradictions.
+    A pattern of the wheels is valid if it is the expected one or its reverse. All other patterns of
+    the 27 are contradictions.
     """
     expected = wanted(axis)
     if pattern == expected:

@@ -125,7 +125,7 @@ def test_space_stops_even_while_a_question_stands() -> None:
 
 @pytest.mark.parametrize("keys", [["q"], ["ctrl+c"], ["ctrl+q"]])
 def test_q_and_what_people_try_instead_leave_the_dashboard(keys: list[str]) -> None:
-    """The keys q, ctrl-C and ctrl-Q end the dashboard. Its last line names only q."""
+    """The keys q, ctrl-C and ctrl-Q end the dashboard. The last line of the screen names only q."""
     robot = FakeRobot()
 
     async def steps(pilot: Pilot[Any], app: Monitor) -> None:

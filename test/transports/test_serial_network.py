@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
 
 def connected(server: socket.socket) -> tuple[SerialPort, socket.socket]:
-    """Return a port that is connected to this server, and the server's socket for it."""
+    """Return a port that is connected to this server, and the server's socket of the connection."""
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     return port, server.accept()[0]
 

@@ -91,7 +91,10 @@ def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Te
 
 
 def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
-    """A port is closed. DTR stays as it was, because a board that is wired to DTR would restart."""
+    """A port is closed. DTR stays as it was.
+
+    Otherwise, a board that is wired to DTR would restart.
+    """
     near = os.open(terminal.path, os.O_RDWR | os.O_NOCTTY)
     attributes = termios.tcgetattr(near)
     attributes[2] |= termios.HUPCL

@@ -113,9 +113,9 @@ def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
 
 
 def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
-    """Some ticks are missed or late. This hardly changes the fit.
+    """While the public firmware sends, it misses some ticks and times others late.
 
-    The public firmware misses ticks, or times them late, while it sends.
+    This hardly changes the fit.
     """
     records = starts(PLANT, 8)
     for number, record in enumerate(records):
