@@ -102,7 +102,8 @@ class Board(Protocol):
     """Capabilities of this kind of board."""
 
     settings: Any
-    """Settings of this board that its data does not show. They may be replaced at any time."""
+    """Settings of this board that its data does not show. The driver can replace them at any time.
+    """
 
     clock: ReadingClock | None = None
     """Clock for readings that carry the board's time. None if the readings do not carry a time. The
@@ -114,9 +115,10 @@ class Board(Protocol):
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read of the port ended in the stream of IMU samples; for ``clock``.
+        """Position in the stream of IMU samples at which the last read of the port ended.
 
-        None while the framing is uncertain, or if the read shows nothing new about this position.
+        ``clock`` needs this position. None while the framing is uncertain, or if the last read
+        shows nothing new about the position.
         """
         return None
 
@@ -165,8 +167,8 @@ class Board(Protocol):
     def stalled(self) -> None:
         """Record that this process stalled, so the guard may have sent the stop commands.
 
-        The guard is the process that sends ``last_words`` when this process hangs. These
-        commands may also switch off motors that do not drive wheels, such as a brush motor.
+        The guard is the process that sends ``last_words`` when this process hangs. The stop
+        commands can also switch off motors that do not drive wheels, such as a brush motor.
         """
         return
 
@@ -178,8 +180,8 @@ class Board(Protocol):
     def due(self, now: float) -> Packets:
         """Return the packets other than commands that are due.
 
-        They are subscriptions, polls and relayed values. The driver calls this method at
-        ``wake_at`` and writes the packets. So the board may regard them as written.
+        The packets are subscriptions, polls and relayed values. The driver calls this method at
+        ``wake_at`` and always writes the packets, so the board can regard them as written.
         """
         return NO_PACKETS
 
@@ -192,7 +194,7 @@ class Board(Protocol):
         return []
 
     def leave(self) -> None:
-        """Prepare for the driver's exit: ``due`` then returns only packets that a stop needs."""
+        """Prepare for the driver's exit: from now on, ``due`` returns only what a stop needs."""
         return
 
     def reset_odometry(self) -> None:
@@ -206,7 +208,7 @@ class Board(Protocol):
     def actuator(self, proof: StopProof) -> Actuator:
         """Return the actuator, which encodes motion orders. The driver calls this method once.
 
-        The actuator reports to ``proof`` each stop and each motion that it sends.
+        When the actuator sends a stop or a motion, it also reports this to ``proof``.
         """
 
     def wake(self) -> Packets:
@@ -216,9 +218,10 @@ class Board(Protocol):
         """
 
     def start_requested(self) -> None:
-        """Record that the user has requested a start. Called before ``start``.
+        """Record that the user has requested a start. The driver calls ``start`` next.
 
-        The driver also calls ``start`` by itself, for example after a reconnect.
+        If the driver starts the board by itself, for example after a reconnect, it calls only
+        ``start``.
         """
         return
 
@@ -249,15 +252,16 @@ class Board(Protocol):
         return NO_PACKETS
 
     def switch_off(self) -> Packets:
-        """Return the packets, sent after Stop, that switch off devices other than the wheels."""
+        """Return the packets that switch off devices other than the wheels. Sent after Stop."""
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return what the guard sends if this process hangs: without, and with a latched e-stop.
+        """Return two sets of packets. The guard sends one of them if this process hangs.
 
-        The first item is Stop. The second item is the emergency stop and then Stop. This method is
-        called after each input and before each output, because the right packets may depend on the
-        board's state.
+        The first set is Stop. It is sent if the e-stop is not latched. The second set is the
+        emergency stop and then Stop. It is sent if the e-stop is latched. The right packets can
+        depend on the board's state, so this method is called after each input and before each
+        output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

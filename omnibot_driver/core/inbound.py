@@ -48,8 +48,8 @@ class Inbound:
         A motion command that arrives between the two calls is handled as if it had arrived before
         the bytes. This would be wrong if the bytes change the board's mode. In this case ``hear``
         calls ``process`` itself, puts the estimates among the events, and returns an empty list.
-        The caller's own call of ``process`` then returns True. Requests call ``process`` before
-        they begin, so that they come after the bytes.
+        The caller's own call of ``process`` then returns True. A request calls ``process`` before
+        it begins, so a request is handled after the bytes.
         """
         self._liveness.came_at = now
         before = self._board.mode

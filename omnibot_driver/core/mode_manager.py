@@ -3,10 +3,10 @@
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
 A single-letter command (S, P, R) may be lost. P toggles between pause and run. A board that boots
-drops what it receives first. So each request is a short exchange: the driver sends the command,
-waits for data that shows the result, and repeats the command after a while. At a deadline the
-request fails, with the reason as a sentence. Only one request is in progress at a time. This module
-does not know bytes, and reads no clock.
+drops the first bytes that it receives. So each request is a short exchange: the driver sends the
+command, waits for data that shows the result, and repeats the command after a while. At a deadline
+the request fails, with the reason as a sentence. Only one request is in progress at a time. This
+module does not know bytes, and reads no clock.
 """
 
 import math
@@ -24,14 +24,14 @@ PAUSE_RETRY_S: Final = 1.5
 sends a notice every second, so data without a notice for this time shows that the command was
 lost."""
 FLOWING_S: Final = 0.1
-"""Longest time between two receptions, in s, that counts in full as uninterrupted data. Of a longer
-time only this part counts. A running board sends every 10 ms."""
+"""Largest time, in s, that one pause between two receptions adds to the time of uninterrupted data.
+A running board sends every 10 ms, so its pauses are shorter and are added in full."""
 IN_FLIGHT_S: Final = 0.1
-"""Longest time, in s, that a command, or the notice of a paused board, takes to arrive. A notice
-that arrives sooner than this after a command may have been sent before the board obeyed. If data
+"""Longest time, in s, that a command, or the notice of a paused board, takes to arrive. If a notice
+arrives sooner than this after a command, the board may have sent it before it obeyed. If data
 follows a notice within this time, the notice does not show that the board is paused."""
 LAST_STOPS: Final = 3
-"""Number of copies of Stop sent at once before the port is closed, since one may be lost."""
+"""Number of copies of Stop sent at once before the port is closed, because one can be lost."""
 ANSWER_WITHIN_S: Final = 4.5
 RESET_WITHIN_S: Final = 9.5
 

@@ -34,8 +34,8 @@ class DisplacementReading:
     * ``duration_s``: duration of the motion, in s. None if unknown. The first displacement after a
       pause has no known duration, because it includes all motion during the pause.
     * ``lost``: number of displacements that are missing before this one.
-    * ``restarted``: whether the board's counters seem to start again with this displacement. Its
-      earth frame then starts again too.
+    * ``restarted``: whether the board's counters seem to start again with this displacement. If
+      they do, the board's earth frame starts again too.
     * ``measured``: False if the values are not a measurement of the motion. A board that cannot
       measure motion reports the commanded values instead.
     """
@@ -60,8 +60,8 @@ class PoseReading:
 
     * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
       does not count these losses again.
-    * ``restarted``: whether the counter of the poses starts again with this pose. The counter of
-      the displacements has then restarted earlier.
+    * ``restarted``: whether the counter of the poses starts again with this pose. If it does, the
+      counter of the displacements has started again before.
     """
 
     x_m: float
@@ -153,16 +153,17 @@ Reading = (
 
 @value(frozen=True, slots=True)
 class SampleBoundary:
-    """Where a read of the port ended in the stream of IMU samples, for the clock that stamps them.
+    """Where a read of the port ended in the stream of IMU samples.
 
-    The last byte of a sample may come late, so the first bytes of a sample show its time better.
+    The clock that stamps the samples needs this position. The last byte of a sample can come late,
+    so the first bytes of a sample show its time better.
 
     * ``ahead``: number of samples (0 or 1) of which at least a part came after the last ImuReading.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
     * ``latest_s``: longest time, in s, from the read until the last sample is complete; 0 if it is
       complete already.
-    * ``earliest_s``: shortest time, in s, from the read until another sample can be complete. If a
-      sample is incomplete, it is this one.
+    * ``earliest_s``: shortest time, in s, from the read until the next sample can be complete. A
+      sample that is incomplete is this next sample.
     """
 
     ahead: int

@@ -284,7 +284,7 @@ class Session:
 
     @property
     def board(self) -> Board:
-        """Board of this session, for the ROS interfaces that only this kind of board has."""
+        """Board of this session. The ROS interfaces of this kind of board use it directly."""
         return self._board
 
     # Outputs

@@ -29,10 +29,10 @@ class Traits:
     * ``unproved_s``: longest time, in s, for which Stop is repeated while the standstill is not
       shown.
     * ``baudrate``: whether the line has a baud rate to set.
-    * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself. Its profile then
-      offers ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest time, in s, until the board obeys a stop. It is set if the board
-      acknowledges stops.
+    * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself. If it does, the
+      board's profile offers ``~/calibrate_gyro``.
+    * ``stops_within_s``: longest time, in s, until a board that acknowledges stops obeys one. 0 for
+      a board that does not acknowledge stops.
     * ``slack_mps``, ``slack_radps``: additional tolerance of the motion monitor for the difference
       between measured and commanded velocity, in m/s and rad/s. A board needs it if its
       displacements are coarse, or if its wheels lag while they speed up.

@@ -3,9 +3,9 @@
 """The interface between the command policy and a board's encoding of motion.
 
 The policy decides what the robot should do, and for how long. An actuator makes the packets that
-carry out this decision. Some actuators repeat set-points (`set_point_stream.py`), others run an
-exchange that only their board has. An actuator reports to the stop proof each stop and each motion
-that it sends. It reads no clock, and never refuses an order of the policy.
+carry out this decision. Some actuators repeat set-points (`set_point_stream.py`). Other actuators
+run an exchange that only their board has. When an actuator sends a stop or a motion, it also
+reports this to the stop proof. An actuator reads no clock, and never refuses the policy's orders.
 """
 
 from typing import Protocol

@@ -49,8 +49,8 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     * ``proof``: receives a report of each stop and each motion that the stream sends.
-    * ``heard``: is called, if given, with all packets that are written and with the time. These
-      include the packets of requests.
+    * ``heard``: function to call after each write, with the packets and the time. It is also called
+      for the packets of requests. None if no function needs them.
     """
 
     def __init__(
@@ -98,9 +98,9 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        Packets that begin with Stop on every channel count as a Stop. After any other packets, the
-        stream repeats the set-point at once. If the last motion frame lost bytes, the board may
-        have completed it with the first bytes of these packets.
+        Packets that begin with Stop on every channel count as a Stop. Other packets can do harm: if
+        the last motion frame lost bytes, the board completes it with the first bytes of these
+        packets. So after other packets, the stream repeats the set-point at once.
         """
         if self._heard is not None:
             self._heard(packets, now)

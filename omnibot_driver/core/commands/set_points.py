@@ -23,9 +23,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: limits for how much farther from a goal the robot may get than it
-was before, in m and rad. No controller overshoots that far, so beyond these limits the robot is
-driving away from the goal."""
+"""``LEAVING_M``, ``LEAVING_RAD``: distances in m and rad that show that the robot leaves its goal.
+If the robot is this much farther from the goal than before, it drives away from the goal. No
+controller overshoots that far."""
 
 
 class Authority(Enum):
@@ -49,7 +49,7 @@ class Setpoint(Protocol):
 
     @property
     def settled(self) -> bool:
-        """Whether all later orders are the same as the present one."""
+        """Whether ``order`` will return the same order at all later times."""
 
     @property
     def final(self) -> Order:
@@ -65,7 +65,8 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * ``is_zero``: as an argument, the method ``Actuator.is_zero``, which may raise CommandRefused.
+    * ``is_zero``: the argument is the method ``Actuator.is_zero``, which may raise CommandRefused.
+      The attribute is the result of this method for the commanded velocity.
     * ``before``: the previous set-point. If it is a BaseSetpoint, a ramp starts at its velocity,
       otherwise at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
@@ -116,7 +117,8 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    ``is_zero``: as an argument, the method ``Actuator.is_zero``, which may raise CommandRefused.
+    ``is_zero``: the argument is the method ``Actuator.is_zero``, which may raise CommandRefused.
+    The attribute is the result of this method for the order.
     """
 
     settled: Final = True

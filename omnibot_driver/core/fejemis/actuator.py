@@ -4,8 +4,8 @@
 
 ``Encoder`` limits the drive board's speed while the front wheel has not reached its angle. Each new
 angle of the wheel may allow more speed. So while the speed is limited, this module sends the motion
-lines again after each new angle, in addition to the usual repetition. It also does so while lines
-have no checksums, to replace damaged lines soon.
+lines again after each new angle, in addition to the usual repetition. Lines without checksums are
+also sent again after each new angle, so that a damaged line is soon replaced.
 
 The module knows when a line is due; it does not know what the line contains.
 """

@@ -28,10 +28,10 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit, in degrees, of an angle to the left that a board may read after undetected damage.
+"""Largest angle to the left, in degrees, that undetected damage to a line is allowed to produce.
 
-A text is avoided if undetected damage could give a larger angle to the left. It is also avoided if
-the damage could give an angle to the right.
+A text is avoided if undetected damage could produce a larger angle to the left, or an angle to the
+right.
 """
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 

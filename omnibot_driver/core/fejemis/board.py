@@ -177,8 +177,8 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The guard process may already have done so during the stall. The driver did not read during
-        the stall. So this time is not regarded as silence of the boards.
+        The guard process may already have switched them off during the stall. The driver did not
+        read during the stall, so this time is not regarded as silence of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
@@ -187,7 +187,7 @@ class FejemisBoard(Board):
     def leave(self) -> None:
         """Switch brush and lift off at once, because the driver ends.
 
-        The driver may stop the wheels later.
+        This method does not wait until the wheels have stopped.
         """
         self._upkeep.machine.off()
 
@@ -232,7 +232,7 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Receive a new order: an e-stop is latched, and any other order releases the e-stop."""
+        """Receive a new order. Only an emergency stop latches the e-stop; others release it."""
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:

@@ -3,9 +3,9 @@
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
 **Writing.** After a write, the driver reads the values back. It repeats the write until the board
-reports the wanted values, at most ``TRIES`` times. Even if the board already reports the wanted
-values, the driver writes them once to each new or restarted board, and once after each change by
-the user. The board may report rounded numbers, and rounding could hide a small difference.
+reports the wanted values, at most ``TRIES`` times. The board may round the numbers that it reports,
+and rounding could hide a small difference. So the driver writes all values once to each new or
+restarted board, and changed values once after a change by the user.
 
 **Reading.** A number is accepted after two equal readings in a row. A single reading is not enough,
 because 1 in 99 damaged lines has a correct checksum. The driver computes the robot's geometry from
@@ -62,12 +62,11 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers of the last reading, by keyword. They may still lack the second, equal reading.
-        """
+        """Numbers of the last reading, by keyword. Some may still lack the second, equal reading."""
         self.turned = False
         """Whether the board's ``confs`` line begins with the track.
 
-        By the help text, the track comes last.
+        According to the board's help text, the track comes last.
         """
         self.written = written
         self.begin()
@@ -156,8 +155,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        The user's values are returned unless the board has reported different ones. They are exact,
-        and the board's numbers are rounded.
+        The board rounds the numbers that it reports. So if the reported numbers agree with the
+        user's values, or are not known yet, the exact values of the user are returned.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

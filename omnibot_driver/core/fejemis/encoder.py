@@ -2,8 +2,9 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-The caller passes all packets that it sends to ``meaning``. From them the encoder notes which angle
-the front wheel must reach, and whether the drive board's speed is limited.
+Whenever the caller sends packets, it also passes them to ``meaning``. From these packets, the
+encoder learns which angle the front wheel must reach, and whether the drive board's speed is
+limited.
 
 The module knows geometry and lines; it does not know when lines are sent.
 """

@@ -16,9 +16,8 @@ VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
 """``VARIES``, ``VARIES_WITHOUT_SUM``: how many lines in another form end the check of their kind.
 
-The lines are counted among ``OF`` lines of this kind. ``VARIES`` is for lines with a correct
-checksum. Such lines are rarely damaged, so fewer of them show that the board itself varies the
-form.
+The count begins again after every ``OF`` lines of the kind. ``VARIES`` is for lines with a correct
+checksum. Such lines are rarely damaged, so fewer of them prove that the board varies the form.
 """
 OF: Final = 24
 

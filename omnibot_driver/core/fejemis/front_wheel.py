@@ -80,8 +80,8 @@ class FrontWheel:
     def drives_by_rad(self) -> float:
         """Angle in rad that is relayed to the drive board, limited to ±90°.
 
-        Beyond 90°, by the manual's equations, the drive board would drive its inner wheel faster
-        than the outer one.
+        According to the manual's equations, the drive board would drive its inner wheel faster than
+        the outer one if the angle were larger.
         """
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 

@@ -2,8 +2,8 @@
 
 """One of the two Teensy boards, called a half: its identity, its data streams and its silence.
 
-The driver subscribes to the board's streams. It subscribes again if a stream does not arrive,
-because the subscription may be lost, and a board that restarts forgets all subscriptions.
+The driver subscribes to the board's streams. If a stream does not arrive, the driver subscribes
+again: either the subscription was lost, or the board has restarted and forgotten it.
 
 The module knows lines and times; it does not know what a message is used for.
 """
@@ -36,8 +36,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-``confs`` is a stream, although its numbers rarely change. It is not requested with ``confsi``: if
-this line loses its last letter, the board reads it as a command that sets the geometry to zero.
+``confs`` is a stream, although its numbers rarely change. The request ``confsi`` would be
+dangerous: without its last letter, it is a command that sets the geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
@@ -83,7 +83,7 @@ class Half:
         self.begin(line_sums)
 
     def begin(self, line_sums: LineSums) -> None:
-        """Begin a new connection. The role stays until a heartbeat contradicts it."""
+        """Begin a new connection. The half keeps its role until a heartbeat shows another one."""
         self.decoder = FejemisDecoder(line_sums)
         self.decoder.statistics = self.statistics
         self.unknown_words.clear()

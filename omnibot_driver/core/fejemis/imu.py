@@ -26,8 +26,8 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Interval between the arrivals of two late samples, in periods, above which a sample was lost.
 
-Late means a period or more after the sample's time. If both samples waited for a stalled host, they
-arrive together. If they arrive one after the other, an earlier sample was lost.
+A sample is late if it arrives a period or more after its time. Late samples that waited for a
+stalled host arrive together. If they arrive one after the other, an earlier sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s in which the board sends all lines of one control cycle."""

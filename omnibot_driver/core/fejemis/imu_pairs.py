@@ -2,9 +2,9 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-The lines carry neither time nor number. The board sends both lines of a sample in one cycle, always
-in the same order, every ``PERIOD_S``. A first line and the next second line form a pair if no other
-gyro or acceleration line comes between them. This is so even if the second line is late.
+The lines carry neither time nor number. Every ``PERIOD_S``, the board sends both lines of a sample
+in one cycle, always in the same order. A first line and the next second line form a pair if no
+other gyro or acceleration line comes between them, even if the second line is late.
 
 A pair is false if its lines are of different samples. This happens if the second line of one sample
 and the first line of the next sample are both lost. Three observations show a false pair:
@@ -36,12 +36,11 @@ PAIR_WITHIN_S: Final = 0.005
 """Longest time in s between the two lines of a pair that needs no further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``: evidence in s from which the order of the two lines is known.
-
+"""``KNOWN_S``: smallest evidence in s that proves the order of the two lines.
 ``SUREST_S``: largest evidence that is stored.
 
-The evidence shows which line of a sample comes first: the line with the longer pauses before it. It
-is the sum of the pauses before gyro lines minus the sum of those before acceleration lines.
+The first line of a sample is the one with the longer pauses before it. So the evidence is the sum
+of the pauses before gyro lines, minus the sum of the pauses before acceleration lines.
 """
 MARKED_S: Final = PERIOD_S
 """Evidence in s that is added to a pause if a line of another kind comes during the pause.
@@ -54,7 +53,7 @@ PATIENCE: Final = 60
 If the board sends both lines half a period apart, the evidence stays weak.
 """
 MOST: Final = 10
-"""Limit of the numbers in ``_outside``, upwards and downwards."""
+"""Largest magnitude of the numbers in ``_outside``."""
 UNPOSED: Final = 20
 """How many gyro or acceleration lines may come while a pair waits for the next pose.
 

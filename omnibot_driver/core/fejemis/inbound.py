@@ -57,7 +57,8 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return an angle to relay to the drive board, in rad; None if the angle is not new."""
+        """Return the angle to relay to the drive board, in rad; None if no new angle has arrived.
+        """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 

@@ -31,7 +31,7 @@ LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
 """Smallest allowed ratio of the voltage that is sent to the wanted voltage.
 
-A lower voltage is sent if the checksum would not detect damage in the line with the wanted voltage.
+If the checksum would not detect damage to a line with the wanted voltage, a lower one is sent.
 """
 LEAST_TIME_S: Final = 0.04
 

@@ -149,7 +149,7 @@ class WheelConfiguration:
 class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
 
-    By the help text, the distance comes first. Some boards send the track first.
+    According to the board's help text, the distance comes first. Some boards send the track first.
     """
 
     first_m: float

@@ -38,7 +38,7 @@ ANGLE_COST: Final = 1e4
 For comparison: the cost is 1 for a number that is e (2.718) times as large as commanded.
 """
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to a speed in the drive board's line that is not 0."""
+"""The speed in the drive board's line is 0, or at least the outer wheel's speed divided by this."""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """
@@ -102,7 +102,7 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the ``robust`` line of the least cost; if none is robust, the cheapest line."""
+    """Return the ``robust`` line with the least cost; if no line is robust, the cheapest line."""
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

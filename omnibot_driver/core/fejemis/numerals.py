@@ -1,14 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Numbers that can be sent safely: a checksum detects if any two of their characters are lost.
+"""Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-A checksum does not detect the loss of both ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, or
-``-`` and ``6``. Each motion line already contains a ``2``, the source of the command. So the
-numbers never contain ``1``. They do not contain ``3`` or ``5`` either, and no ``6`` if the line has
-a minus sign.
+There are pairs of characters whose loss a checksum does not detect: ``1`` and ``2``, ``0`` and
+``3``, ``.`` and ``5``, ``-`` and ``6``. A motion line must not contain both characters of a pair.
+Each motion line contains a ``2``, the source of the command. So the numbers contain no ``1``. They
+can contain ``0`` and ``.``, so they contain neither ``3`` nor ``5``. In a line with a minus sign,
+they contain no ``6``.
 
-So there are gaps between the numbers. The largest gaps lie between 1 and 2 times a power of ten:
-between .0999 and .200, for example.
+So some values cannot be sent. The largest gap in each power of ten is like that from .0999 to .200.
 """
 
 from bisect import bisect_left, bisect_right
@@ -27,10 +27,10 @@ The first digit of a number counts 10**p, where p is at least ``SMALLEST`` and l
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
-    """Return all numbers from 0.0001 to 10000 that can be sent safely, in rising order.
+    """Return all numbers that can be sent safely, in rising order, and the text of each number.
 
-    The texts of the numbers are returned too. ``negative``: whether the line has a minus sign. The
-    numbers then contain no ``6``.
+    They lie between 0.0001 and 10000. ``negative``: whether the line has a minus sign. If it has,
+    the numbers contain no ``6``, because a checksum does not detect the loss of ``-`` and ``6``.
     """
     digits = "024789" if negative else "0246789"
     mantissas = [
@@ -48,7 +48,8 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
     """Return the number of ``numerals`` that is nearest to a positive ``number``, with its text.
 
-    ``down``: take the nearest one that is not larger than ``number``, if there is one.
+    ``down``: whether the result must not be larger than ``number``. If all numbers are larger, the
+    smallest one is returned.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)

@@ -60,7 +60,7 @@ class Obedience:
     def pause(self) -> None:
         """Record that the user requested a pause.
 
-        After an e-stop, ``start`` is then no longer due.
+        If ``start`` was due after an e-stop, it is no longer due.
         """
         self.pause_said = True
         self.start_at = math.inf
@@ -75,7 +75,7 @@ class Obedience:
         self.estopped = False
 
     def stopped(self, now: float, *, was_paused: bool) -> bool:
-        """Return whether the drive board is stopped, but not by the driver's e-stop."""
+        """Return whether the drive board is stopped for a reason other than the driver's e-stop."""
         if self.source != STOPPED:
             return False
         if self.pause_said or was_paused:

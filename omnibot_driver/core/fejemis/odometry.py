@@ -7,14 +7,14 @@ poses has steps of 0.05 m/s. The wheel speeds are finer, but do not add up exact
 displacement is the motion that the wheel speeds give between two poses, corrected towards the newer
 pose. The displacements add up to the pose.
 
-**Large differences.** The speeds and the two poses may differ by more than rounding explains. Then
-lines were lost, or a wheel turned quickly, and the displacement is the difference of the two poses.
-If they differ by only a little more, the displacement is the mean of both.
+**Large differences.** If lines were lost, or a wheel turned quickly, the wheel speeds and the two
+poses differ by more than rounding explains. Then the displacement is the difference of the poses.
+If the excess is small, the displacement is the mean of this difference and the wheels' motion.
 
 **Rejected poses.** A pose is rejected if the last pose and the wheel speeds do not explain it. The
-next pose may agree with the rejected pose. If the robot can have reached the next pose, it is
-accepted. If not, ``NEW_FRAME`` poses in a row must agree with the pose before them. Then the board
-has begun a new frame (command ``enc0``).
+next pose is accepted if it agrees with the rejected pose, and the robot can have reached it. If the
+robot cannot have reached it, the board may have begun a new frame (command ``enc0``). This is
+assumed as soon as ``NEW_FRAME`` poses in a row agree with the pose before them.
 """
 
 import math
@@ -37,9 +37,10 @@ both axes.
 """
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""``SLACK_M``, ``SLACK_RAD``: how far a pose may be from where the wheel speeds lead, in m and rad.
+"""``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose, in m and rad.
 
-``SPEED_UP_MPS2`` allows more, for acceleration.
+It is the deviation from the pose to which the wheel speeds lead. ``SPEED_UP_MPS2`` is the
+acceleration for which a larger deviation is accepted.
 """
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0

@@ -9,11 +9,10 @@ contain both characters of a pair (``motion_lines.py``).
 Two more kinds of damage may remain undetected, depending on the value of the checksum. So the
 digits of a motion line are chosen to get a safe checksum:
 
-- **A lost line end** joins two lines. The joined line is accepted if one more character is lost,
-  whose code equals the sum of the second line with its prefix. So this sum must not be the code of
-  a character in numbers. It must not be the code of ``;`` either: without ``;``, the digits of the
-  checksum would continue the last number of the first line. Some lines have no other possible
-  digits. Before such a line, the driver sends an empty line, which the boards ignore.
+- **A lost line end** joins two lines. If one certain character is lost too, the joined line is
+  accepted: the character whose code equals the sum of the second line with its prefix. So this sum
+  must not be the code of ``;`` or of a character in numbers. If no digits of the line avoid this,
+  the driver sends an empty line before it. The boards ignore empty lines.
 - **A lost digit of the checksum** is undetected if one certain character is lost too. So this
   character must not occur in numbers.
 

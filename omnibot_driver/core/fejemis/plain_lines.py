@@ -5,7 +5,7 @@
 An ``rc`` line contains a source (``2``), a speed and a turn rate. If the source or a space is lost,
 each later number takes the place of the number before it. The drive board uses only the root of the
 sum of the squares of speed and turn rate. So the driver sends this root as the speed, and 0 as the
-turn rate. If these numbers move by one place, the line is a stop.
+turn rate. If these numbers move forward by one place, the 0 becomes the speed: the line is a stop.
 
 One risk remains: the line may lose its decimal point, or a digit after it. The board obeys such a
 line until the next one, which follows with the next angle of the front wheel.

@@ -48,7 +48,7 @@ class FejemisSettings:
 
     ``track_m``, ``wheelbase_m``: geometry that is used until the boards report their own.
 
-    ``line_sums``: whether lines carry a checksum. With ``auto``, they do if the heartbeats do.
+    ``line_sums``: whether lines carry a checksum. With ``auto``, the board's heartbeats decide.
 
     ``allow_reverse``: whether a negative speed is sent to the boards (docs/boards/fejemis.md).
 

@@ -12,7 +12,7 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""How many of the lines that the firmware does not know are shown. They are the latest ones."""
+"""Largest number of lines unknown to the firmware that are shown. The latest ones are shown."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

@@ -29,9 +29,9 @@ AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: when implausible times in a row begin a new clock.
 
-There must be at least ``AGAIN`` of them, over at least ``AGAIN_AFTER_S``. They must agree: from one
-to the other, the board time and the arrival time advance equally, within ``AGREE_S``. A shorter
-series may be lines that waited for a stalled host and arrived at once.
+At least ``AGAIN`` such times must arrive, over at least ``AGAIN_AFTER_S``. Between them, the board
+time and the arrival time must advance equally, within ``AGREE_S``. Lines that arrive in a shorter
+time may only have waited for a stalled host.
 """
 SMALLEST_STEP_S: Final = 1e-6
 

@@ -2,7 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in ``TELL_EVERY_S``.
 
-A notice that stops the robot is never left out. If its text was shown recently, its text is empty.
+A notice that also makes the driver stop the robot is always passed on. If its text was shown
+recently, the notice is passed on with an empty text.
 """
 
 import math

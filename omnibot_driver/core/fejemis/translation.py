@@ -97,7 +97,7 @@ class Translation:
         self.extra(SteeringReading(angle_rad), now)
 
     def hear_front(self, message: Message, now: float) -> None:
-        """Convert a message of the front board. Its angle is handled elsewhere."""
+        """Convert a message of the front board, except the angle of the front wheel."""
         if isinstance(message, Infrared):
             first, second = message.distances_m
             self.extra(RangeReading("ir1", _seen(first)), now)

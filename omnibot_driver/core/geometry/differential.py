@@ -24,7 +24,7 @@ class DifferentialKinematics:
 
     @property
     def rims(self) -> "DifferentialKinematics":
-        """The same geometry with wheels of 1 m radius: wheel rates are then rim speeds in m/s."""
+        """The same geometry with wheels of 1 m radius, so wheel rates are rim speeds in m/s."""
         return replace(self, wheel_radius_m=1.0)
 
     def feasible(self, twist: BodyTwist) -> BodyTwist:

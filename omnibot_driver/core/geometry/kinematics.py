@@ -21,7 +21,7 @@ class Kinematics(Protocol):
 
     @property
     def rims(self) -> "Kinematics":
-        """The same geometry with wheels of 1 m radius: wheel rates are then rim speeds in m/s."""
+        """The same geometry with wheels of 1 m radius, so wheel rates are rim speeds in m/s."""
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The outlier filter: it rejects physically impossible readings, though their frames are valid.
+"""The outlier filter: it rejects physically impossible readings that arrive in valid frames.
 
 Two kinds of readings are impossible: a displacement faster than the robot can move, and a spike. A
 spike is a single reading that leaps away from all earlier readings, while the next reading leaps
@@ -8,9 +8,9 @@ back. A leap that lasts, or that is followed by more leaps, is a real shock. So 
 waits for the next reading of its kind, which shows whether to release or to reject it. Poses that
 arrive after a waiting displacement wait as well. No other reading ever waits.
 
-A knock on the robot may change one axis of an accelerometer for a single reading, and this reading
-is real. So a spike in one axis of an accelerometer is rejected only if it has the size of a bit. A
-flipped bit changes a word by its full scale, a half of it, a quarter, and so on.
+A knock on the robot can cause a spike in one axis of the accelerometer. Such a reading is real. A
+flipped bit causes a spike too. Its size is the full scale, a half of it, a quarter, and so on. So a
+spike in one axis of the accelerometer is rejected only if it has one of these sizes.
 
 A reading of a board's own odometry is rejected only if it contains NaN or infinity. A rejected
 displacement is treated like a displacement that was lost on the line. This module knows readings
@@ -42,27 +42,28 @@ CALMING: Final = 0.95
 """Factor by which the stored largest recent step shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Fraction of a leap of the IMU's values. The leap is a spike only under two conditions.
+"""Fraction of a leap of the IMU's values. The leap is a spike only if two conditions hold:
 
-* If an acceleration leaps, every other value of the IMU changes by at most this fraction.
-* With the next reading, every value returns to its value before the leap, up to this fraction.
+* If only accelerations leap, a single one leaps, and all other values change by at most this
+  fraction of the leap.
+* In the next reading, at most this fraction of the leap remains.
 """
 END_OF_SCALE: Final = 0.99996
-"""A value from this fraction of full scale on is regarded as the end of the scale. The largest
-positive word is just above it."""
+"""Smallest fraction of the full scale that is regarded as the end of the scale. The largest
+positive word is just above this fraction."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a leaping displacement, and the poses after it."""
 BACK: Final = 0.25
-"""A leap of a displacement was a spike only if the next displacement returns. It then differs from
-the displacement before the leap by at most this fraction of the leap."""
+"""A leap of a displacement was a spike only if the next displacement leaps back, so that at most
+this fraction of the leap remains."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    * ``force_step_mps2``: largest change of the specific force between two readings that is never
-      regarded as a spike.
+    * ``force_step_mps2``: change of the specific force between two readings. Changes up to this
+      size are never regarded as spikes.
     * ``full_scale_mps2``: full scale of the accelerometer; infinite if its readings are not
       integers.
     """
@@ -108,7 +109,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Add a reading; return the readings that need not wait any more, each kind in order."""
+        """Add a reading; return the readings that no longer wait, those of one kind in order."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -138,7 +139,7 @@ class OutlierFilter:
         return released
 
     def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
-        """Add an IMU reading; return the IMU readings that need not wait any more."""
+        """Add an IMU reading; return the IMU readings that no longer wait, in order."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity

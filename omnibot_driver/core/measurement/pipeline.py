@@ -131,7 +131,7 @@ class MeasurementPipeline:
         return measured
 
     def release(self) -> list[Measured]:
-        """Return the measurements that still wait for later readings, because none will come."""
+        """Return all measurements that still wait, because no later readings will come."""
         measured, released = self.flush(), self._outliers.release()
         return measured + [(sure, self._estimates(sure, at_s)) for sure, at_s in released]
 

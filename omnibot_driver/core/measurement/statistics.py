@@ -52,8 +52,8 @@ class StreamStatistics:
     _force: Vector3 | None = field(default=None, repr=False)
     _rate: Vector3 | None = field(default=None, repr=False)
     _sent_imu: int | None = field(default=None, repr=False)
-    """Number of IMU readings that the board had sent at the last displacement: the sum of ``imu``
-    and ``lost_imu`` then. None if unknown."""
+    """Number of IMU readings that the board had sent before the last displacement: the sum of
+    ``imu`` and ``lost_imu`` at that time. None if unknown."""
     _imus_per_displacement: int = field(default=0, repr=False)
 
     def read(self, readings: Sequence[Reading], delay_s: float) -> None:

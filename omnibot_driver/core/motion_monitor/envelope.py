@@ -3,8 +3,8 @@
 """The envelope: the velocities that a robot may have under its recent set-points.
 
 A robot follows its set-points late and smoothly. So its velocity is inside the convex hull of its
-recent set-points and rest. Rest is included because a robot may always be slower than commanded. A
-margin around the hull allows for inexact scales, unequal wheels and noise.
+recent set-points and rest. Rest is included because a robot that is slower than commanded is not a
+fault. A margin around the hull allows for inexact scales, unequal wheels and noise.
 
 This module knows velocities in the board's own axes; it does not know times.
 """

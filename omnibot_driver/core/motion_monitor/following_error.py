@@ -18,9 +18,9 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""A displacement is compared with the set-points during the displacement and in this time before
-it, in s. If the robot is clearly slower than all of them, something is assumed to hold the
-robot."""
+"""Time in s before a displacement. The motion is compared with the set-points in this time and
+during the displacement. A robot that is clearly slower than all these set-points is assumed to be
+held."""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55

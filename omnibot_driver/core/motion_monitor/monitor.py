@@ -23,7 +23,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""Time in s for which a robot still counts as driven after its last set-point that was not rest."""
+"""A robot counts as driven until this time, in s, after its last set-point other than rest."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -125,7 +125,8 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board may still hold an e-stop of its own.
+        The board itself may still hold an e-stop. So a robot that stands still after the release is
+        reported as HELD_BY_ESTOP, not as BLOCKED.
         """
         self._released = True
 
@@ -193,9 +194,9 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot that moves outside its envelope.
 
-        If the robot moves in the direction of a set-point, it is too fast, else it moves in the
-        wrong direction. Linear directions that differ by less than 60° count as the same direction.
-        ``explained``: velocities that recent set-points can cause.
+        A robot that moves in the direction of a set-point is too fast. In any other direction, it
+        moves the wrong way. Linear directions that differ by less than 60° count as the same
+        direction. ``explained``: velocities that recent set-points can cause.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

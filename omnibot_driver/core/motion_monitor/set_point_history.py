@@ -2,9 +2,9 @@
 
 """The history of set-points, and the velocities of the robot that they explain.
 
-A robot follows a set-point late, and leaves it smoothly. For ``HELD_S`` after a set-point is
-replaced, the robot may still have its full velocity. Afterwards the robot may have an ever smaller
-part of it. The set-point explains these velocities.
+A robot follows a new set-point late and smoothly. For ``HELD_S`` after the change, the robot may
+still have the full velocity of the old set-point. After that, the part of this velocity that the
+robot may have becomes smaller and smaller. The old set-point explains these velocities.
 
 This module knows velocities in the board's own axes, and times; it does not know how the robot
 moves.
@@ -35,8 +35,8 @@ FADING_S: Final = 0.2
 A robot that follows its set-points with a time constant of up to 0.35 s stays inside the envelope.
 """
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point is ignored. The robot may then have less than 2 % of
-its velocity."""
+"""Time in s after which a replaced set-point is ignored. By then, it explains less than 2 % of its
+velocity."""
 UNKNOWN_S: Final = 0.8
 """Time in s after the first known set-point during which earlier, unknown commands may still move
 the robot."""

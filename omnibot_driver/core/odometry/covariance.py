@@ -3,7 +3,8 @@
 """The uncertainty of the odometry, from three sources of error that are kept separately.
 
 * Errors of the wheels. Slip that varies is a random walk. A wrong wheel size, or constant slip, is
-  the same error in every turn of a wheel. It grows with the distance, and cancels on the way back.
+  the same error in every turn of a wheel. Its effect grows with the distance driven forward, and
+  shrinks again on the way back.
 * Unreported motion in gaps (``gap``). A later pose of the board reveals this motion.
 * Known errors of the published pose that are still being corrected. They are added at their full
   size.
@@ -30,7 +31,7 @@ INITIAL_VARIANCE: Final = 1e-6
 class OdometryNoise:
     """How fast the uncertainty grows. Each wheel has its own errors, which add to the body's error.
 
-    * ``wheel_drift``: standard deviation, in m, of a random walk after 1 m of motion at the rim.
+    * ``wheel_drift``: standard deviation, in m, of a wheel's random error after 1 m of rim motion.
     * ``wheel_scale``: standard deviation of the relative size error of one wheel.
     * ``wheel_slip``: mean fraction of the distance that is lost to slip, equal for all wheels.
     * ``wheels``: geometry of the wheels, at a wheel radius of 1 m.
@@ -128,8 +129,8 @@ class Uncertainty:
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        ``heading_rad``: heading before the move. The code computes with plain numbers, because Pose
-        objects would take a third of the time of an odometry message.
+        ``heading_rad``: heading before the move. The code uses plain numbers, because with Pose
+        objects it would take a third of the time that an odometry message takes.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return

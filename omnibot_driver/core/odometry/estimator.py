@@ -8,9 +8,9 @@ The estimator keeps the robot's pose in two frames:
   poses correct it.
 * The target of the ``CorrectionSmoother`` is the pose in the odometry frame.
 
-Both always move by the same tangent in the body's axes. So motion that was lost on the line is
-recovered with the next pose of the board. This module knows SE(2); it does not know bytes, clocks
-or ROS.
+Both poses always move by the same tangent in the body's axes. So motion that was lost on the line
+is recovered with the next pose of the board. This module knows SE(2); it does not know bytes,
+clocks or ROS.
 """
 
 import math
@@ -35,10 +35,10 @@ LONG_GAP_S: Final = 1.0
 shows the lost motion."""
 POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
-then is regarded as lost."""
+by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Standard deviation in rad, due to open gaps. A heading that has at least this deviation counts as
-unknown."""
+"""Standard deviation of the heading, in rad, that results from open gaps. A heading with at least
+this deviation counts as unknown."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -231,7 +231,7 @@ class Odometry:
         return estimates
 
     def _resume(self, told: Pose) -> list[OdometryEstimate]:
-        """Compute the motion that was lost before the waiting displacements, by means of a pose."""
+        """Use a pose to compute the motion that was lost before the waiting displacements."""
         assert self._board is not None
         seconds = self._backlog.unstamped_s(self._last_stamp_s)
         way = log_of(self._board.way_to(self._backlog.before(told)))

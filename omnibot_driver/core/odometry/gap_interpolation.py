@@ -14,8 +14,8 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated. Before this time has
-passed, the driver stops a robot that sends no data."""
+"""Longest time, in s of the board's clock, over which motion is interpolated. In a longer gap, the
+driver has already stopped the robot, because the board sends no data."""
 NO_WAY: Final = Pose()
 
 
@@ -35,8 +35,8 @@ class GapInterpolation:
         """Return the tangents of the lost displacements and of ``reading``, in the body's axes.
 
         A tangent is twist x time. ``heading_rad`` is the heading of the board before the lost
-        displacements. None means that the board has never reported a pose. Displacements are then
-        taken to be in body axes.
+        displacements. It is None if the board has never reported a pose. In this case, all
+        displacements are taken to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

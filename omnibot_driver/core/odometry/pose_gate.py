@@ -24,15 +24,15 @@ The limits are extended by the possible motion of the robot in open gaps.
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
-"""``FARTHEST_M``, ``FARTHEST_RAD``: limits of a plausible pose, in m and rad: a pose beyond 100 km
+"""``FARTHEST_M``, ``FARTHEST_RAD``: limits of a plausible pose, in m and rad. A pose beyond 100 km
 or 16,000 turns comes from misread bytes."""
 
 
 class PoseGate:
     """Decides which poses of the board are accepted.
 
-    * ``proved``: the last accepted pose. None before the first pose is accepted, and after the last
-      one has become invalid.
+    * ``proved``: the last accepted pose. None while no pose has been accepted, and after the last
+      accepted pose has become invalid.
     * ``doubted``: the last unexpected pose, which the next pose must confirm. It is moved along
       with the robot. None if no pose is to be confirmed.
     """

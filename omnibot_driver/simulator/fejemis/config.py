@@ -11,8 +11,15 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
 """Factory parameters of the steering controller: the manual's P-Lead controller.
 
-The order is use, Kp, useI, taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp,
-useULim, Ulim. tp is alpha * tau_d.
+The order is that of the help text:
+
+* use, Kp;
+* the integrator: useI, taui, ilimit;
+* a 1;
+* the forward lead filter: useLeadf, tz, tp, where tp is alpha * tau_d;
+* the backward lead filter: useLeadb, tz, tp;
+* the pre-filter: usePre, tz, tp;
+* the limit of the output: useULim, Ulim.
 """
 
 WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
@@ -22,9 +29,9 @@ WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
 class DriveConfig:
     """Configuration of the drive Teensy.
 
-    ``wheel_base_m``: distance between the driving wheels, which the odometry uses.
-
-    ``confs_m``: B and F, which the turning control uses.
+    ``wheel_base_m``: distance between the driving wheels, as the odometry uses it.
+    ``confs_m``: geometry for the turning control: the distance B between the driving wheels, and
+    the distance F from the axle to the steered wheel.
     """
 
     number: int

@@ -39,8 +39,8 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``frozen``: whether the sensor repeats its last angle.
 
-    ``absent``: whether the sensor is missing. The angle is then 0, and the diagnosis says that the
-    magneto core loops have not finished.
+    ``absent``: whether the sensor is missing. If it is, the angle is 0, and the diagnosis says that
+    the magneto core loops have not finished.
     """
 
     version = 100

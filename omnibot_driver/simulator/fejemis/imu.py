@@ -25,7 +25,7 @@ class Imu:
 
     ``orientation``: roll, pitch and yaw in rad.
 
-    ``calibrated``: new offsets from a calibration that has just ended, for the configuration;
+    ``calibrated``: if a calibration has just ended, the new offsets for the configuration;
     otherwise None.
     """
 

@@ -20,11 +20,10 @@ class Firmware:
     """Variant of the firmware. Each switch decides one point on which the sources differ.
 
     ``sums``: lines carry the checksum ``;NN`` and are checked, as with the public host programs. If
-    False, as in the manual, a line that begins with ``;`` is an unknown command.
-
-    ``reverse``: what the steering does with an angle beyond 90° at a negative speed. With
-    ``mirrored``, the wheel takes the angle of the same curve driven forward. With ``clamped``, it
-    stays at 90°.
+    False, lines carry no checksum, as in the manual. A line that begins with ``;`` is then an
+    unknown command.
+    ``reverse``: angle of the front wheel when the robot drives backward. ``mirrored``: the angle at
+    which the robot drives forward along the same curve. ``clamped``: 90° to the left or right.
 
     ``timed_velocity``: ``vel`` begins with the time.
 
@@ -87,8 +86,7 @@ class FejemisSettings:
 
     ``wheel_radius_scale``, ``track_scale``: true size divided by the configured size.
 
-    ``slip``: random error of the distance that a wheel rolls: its standard deviation in m after 1
-    m.
+    ``slip``: standard deviation, in m, of a wheel's random error of distance after 1 m.
 
     ``motor_lag_s``: time constant of a driving wheel's speed.
 

@@ -52,7 +52,7 @@ class Teensy(Generic[C]):
 
     ``silent``: whether the Teensy obeys, but sends nothing.
 
-    ``hung``: whether the Teensy neither obeys nor sends. The motors keep its last outputs.
+    ``hung``: whether the Teensy neither obeys nor sends. The motors keep the last outputs.
 
     ``unplugged``: whether the cable is unplugged. The Teensy continues to run.
 

@@ -6,8 +6,8 @@ The simulation takes bytes, advances by ``tick_s``, and returns bytes. The same 
 give the same output.
 
 Where the manual says nothing, these assumptions are made. Set-points never expire. Encoder ticks
-are signed and wrap at 2³². The e-stop button is reported on press and on release, and both set the
-set-points to zero.
+are signed and wrap at 2³². A press of the e-stop button is reported and sets the set-points to
+zero. So does a release of the button.
 
 This module knows the manual's table of messages and, through ``Quirks``, the public firmware. It
 does not know ports or real time.

@@ -54,8 +54,8 @@ class FirmwareOdometry(DocumentedOdometry):
     The RPMs are integers.
 
     ``stands``: whether the position does not change while both RPMs are equal.
-    ``divides``: whether the velocity is the displacement divided by the time since the last tick. A
-        time of zero then gives NaN or infinity.
+    ``divides``: whether the displacement is divided by the time since the last tick even if this
+        time is zero. The velocity is then NaN or infinite. If False, the velocity does not change.
     ``slow``: whether each count of the timer takes 0.7 % too long.
     """
 

@@ -53,8 +53,8 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether the readings are averaged as plain numbers. Their mean is then wrong
-    near north.
+    ``over_north``: whether the readings are averaged as plain numbers. If they are, the mean is
+    wrong near north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

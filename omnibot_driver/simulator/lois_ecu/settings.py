@@ -14,6 +14,8 @@ from typing import Literal
 class Quirks:
     """Deviations of the public firmware from the manual: none by default, all in ``FIRMWARE``.
 
+    Numbers such as 0x12 are the manual's command numbers.
+
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
     odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
         are equal.
@@ -36,7 +38,8 @@ class Quirks:
     button_waits_while_sending: a press switches the motors off only after the message or record in
         progress is sent.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
-    terminal_mode_zeroes_correction: every write of 0x11 overwrites the left short correction.
+    terminal_mode_zeroes_correction: every write of 0x11 overwrites the correction factor of the
+        left encoder's short levels, in effect with zero.
     button_is_lost_in_terminal_mode: in a terminal mode, a press of the button is not reported.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
@@ -125,7 +128,7 @@ class LoisSettings:
 
     wheel_radius_m, track_m, steps: nominal geometry. ``steps`` are encoder edges per turn.
     wheel_radius_scale, track_scale: true value divided by nominal value.
-    slip: standard deviation, in m, of the distance that a wheel rolls in 1 m.
+    slip: standard deviation, in m, of a wheel's random error of distance after 1 m.
     load_percent: standard deviation, in percent of duty, of the load from the ground. Its
         correlation time is 0.5 s.
     mark_noise: standard deviation of the distance between adjacent encoder marks, as a fraction of

@@ -31,7 +31,7 @@ class Terminal:
     def on(self) -> bool:
         """Whether the board is in a terminal mode.
 
-        It then sends data of its sensors, and no messages of its own.
+        In a terminal mode, it sends data of its sensors, and no messages of its own.
         """
         return self.mode not in NO_TERMINAL
 

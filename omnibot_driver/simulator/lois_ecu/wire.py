@@ -59,9 +59,9 @@ class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
     ``checks``: whether lines have a checksum.
-    ``lenient``: whether fields are read as C's strtol reads them. It accepts space, sign and
-        prefix, and stops at the first character that is not a digit. If false, such characters make
-        the line invalid.
+    ``lenient``: whether fields are read as C's strtol reads them. strtol accepts space, sign and
+        prefix, and stops at the first character that is not a digit. If ``lenient`` is false, such
+        characters make the line invalid.
     """
 
     def __init__(self, *, lenient: bool) -> None:
