@@ -232,7 +232,10 @@ class FejemisBoard(Board):
         return self._actuator
 
     def wanted(self, *, estop: bool) -> None:
-        """Receive a new order. Only an emergency stop latches the e-stop; others release it."""
+        """Receive a new order.
+
+        An emergency stop latches the e-stop. Any other order releases it.
+        """
         if not estop:
             self._obedience.release(self._now)
         elif not self._obedience.estopped:

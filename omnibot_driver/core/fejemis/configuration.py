@@ -62,7 +62,7 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers of the last reading, by keyword. Some may still lack the second, equal reading."""
+        """Numbers of the last reading, by keyword. Some may still lack a second, equal reading."""
         self.turned = False
         """Whether the board's ``confs`` line begins with the track.
 

@@ -57,8 +57,7 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return the angle to relay to the drive board, in rad; None if no new angle has arrived.
-        """
+        """Return the angle to relay to the drive board, in rad; None without a new angle."""
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 

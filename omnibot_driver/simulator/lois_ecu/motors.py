@@ -74,8 +74,7 @@ class Motor:
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Return how many turns the wheel makes, behind the backlash, if the motor makes ``turns``.
-        """
+        """Return how far the wheel turns behind the backlash, if the motor makes ``turns``."""
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns
