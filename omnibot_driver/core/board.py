@@ -106,8 +106,8 @@ class Board(Protocol):
     """
 
     clock: ReadingClock | None = None
-    """Clock for readings that carry the board's time. None if the readings do not carry a time. The
-    driver then computes stamps from the board's ticks, or from times of arrival."""
+    """Clock for readings that carry the board's time. None if the readings do not carry a time: the
+    driver then computes their stamps from the board's ticks, or from the times of arrival."""
 
     @property
     def mode(self) -> Mode:
@@ -153,8 +153,8 @@ class Board(Protocol):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
 
-        ``now`` is the time at which the bytes arrived. The board may return a reading later than
-        with its last byte, because later bytes may be needed to prove that the reading is valid.
+        ``now`` is the time at which the bytes arrived. If later bytes are needed to prove that a
+        reading is valid, a later call returns this reading.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -178,7 +178,7 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the packets other than commands that are due.
+        """Return the packets that are due, except commands.
 
         The packets are subscriptions, polls and relayed values. The driver calls this method at
         ``wake_at`` and always writes the packets, so the board can regard them as written.
@@ -241,11 +241,11 @@ class Board(Protocol):
         return NO_PACKETS
 
     def reset(self) -> Packets:
-        """Return the packets that reboot the board. Its mode is then unknown until data arrives."""
+        """Return the packets that reboot the board. Until data arrives, its mode is unknown."""
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Return the packets that stop the robot. They may depend on the robot's motion."""
+        """Return the packets that stop the robot. They can depend on the robot's motion."""
 
     def emergency_stop(self) -> Packets:
         """Return the board's own emergency stop, without Stop; empty if the board has none."""

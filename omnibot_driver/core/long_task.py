@@ -33,10 +33,10 @@ class LongTask:
         return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task that fails after ``limit_s``. ``token`` identifies the task in the answer.
+        """Begin a task, which fails if it takes longer than ``limit_s``.
 
-        ``name`` is the noun in messages such as "a recording is under way". Raises RequestRefused
-        if another task is in progress.
+        ``token`` identifies the task in the answer. ``name`` is the noun in messages such as "a
+        recording is under way". Raises RequestRefused if another task is in progress.
         """
         if self.active:
             raise RequestRefused(

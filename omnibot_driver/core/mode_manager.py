@@ -28,8 +28,9 @@ FLOWING_S: Final = 0.1
 A running board sends every 10 ms, so its pauses are shorter and are added in full."""
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command, or the notice of a paused board, takes to arrive. If a notice
-arrives sooner than this after a command, the board may have sent it before it obeyed. If data
-follows a notice within this time, the notice does not show that the board is paused."""
+arrives sooner than this after a command, the board may have sent the notice before it obeyed the
+command. If data follows a notice within this time, the notice does not show that the board is
+paused."""
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
 ANSWER_WITHIN_S: Final = 4.5
@@ -62,7 +63,7 @@ PAUSED: Final = Wanted.PAUSED
 
 
 class ModeManager:
-    """The mode that was requested from a board, and the exchange that is to bring it about.
+    """The mode that was requested from a board, and the exchange with the board to reach it.
 
     * ``run``: whether to start the board whenever it is connected. If not, the board keeps its
       mode.

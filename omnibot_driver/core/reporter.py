@@ -61,7 +61,7 @@ class Reporter:
         self.missing = ""
         self.shown = (self.state, self._policy.latched)
         self._beneath: tuple[Phase, Mode, bool, str] | None = None
-        """Values from which ``shown`` was computed. It is computed again if they change."""
+        """Values from which ``shown`` was computed. If they change, it is computed again."""
 
     @property
     def state(self) -> str:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Settings that may change while a session runs, the same for every board."""
+"""Settings that exist for every board, and can change while a session runs."""
 
 from dataclasses import dataclass, field
 

@@ -18,7 +18,7 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    * ``leaving``: whether the driver is shutting down. It then refuses everything.
+    * ``leaving``: whether the driver is shutting down. If it is, everything is refused.
     * ``missing``: which of the board's lines are not open, as a sentence; empty if all are open.
     """
 

@@ -59,9 +59,9 @@ class MotionInterlock:
     def be_active(self, now: float) -> None:
         """Record that a sender of commands is active.
 
-        The pause that ends a refusal is measured from now on. Call this when a command is refused
-        for any reason. Call it also after a stall of this process, because a sender may have been
-        active meanwhile.
+        A refusal ends after a pause without commands. The pause is measured from now on. Call this
+        when a command is refused for any reason. Call it also after a stall of this process,
+        because a sender may have been active during the stall.
         """
         self._commanded_at = now
 

@@ -99,8 +99,8 @@ class SetpointStream:
         """Record that the packets of a request were written, and adapt what to send next.
 
         Packets that begin with Stop on every channel count as a Stop. Other packets can do harm: if
-        the last motion frame lost bytes, the board completes it with the first bytes of these
-        packets. So after other packets, the stream repeats the set-point at once.
+        the last motion frame lost bytes, the board can complete the frame with the first bytes of
+        these packets. So after other packets, the stream repeats the set-point at once.
         """
         if self._heard is not None:
             self._heard(packets, now)

@@ -27,7 +27,7 @@ REGULAR: Final = 0.6
 """Interval between the arrivals of two late samples, in periods, above which a sample was lost.
 
 A sample is late if it arrives a period or more after its time. Late samples that waited for a
-stalled host arrive together. If they arrive one after the other, an earlier sample was lost.
+stalled host arrive together. If late samples do not arrive together, an earlier sample was lost.
 """
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s in which the board sends all lines of one control cycle."""

@@ -3,10 +3,9 @@
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
 There are pairs of characters whose loss a checksum does not detect: ``1`` and ``2``, ``0`` and
-``3``, ``.`` and ``5``, ``-`` and ``6``. A motion line must not contain both characters of a pair.
-Each motion line contains a ``2``, the source of the command. So the numbers contain no ``1``. They
-can contain ``0`` and ``.``, so they contain neither ``3`` nor ``5``. In a line with a minus sign,
-they contain no ``6``.
+``3``, ``.`` and ``5``, ``-`` and ``6``. Each motion line contains a ``2``, the source of the
+command, so the numbers contain no ``1``. They can contain ``0`` and ``.``, so they contain neither
+``3`` nor ``5``. In a line with a minus sign, they contain no ``6``.
 
 So some values cannot be sent. The largest gap in each power of ten is like that from .0999 to .200.
 """

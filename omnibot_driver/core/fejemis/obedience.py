@@ -3,7 +3,7 @@
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
 The driver sends ``stop`` to the board for a pause and also for its own e-stop. So the heartbeat
-alone does not tell which of them is in force. After the release of an e-stop, the driver sends
+alone does not tell a pause from an e-stop. After the release of an e-stop, the driver sends
 ``start`` until the heartbeat shows that the board obeys. A pause remains until the user calls
 ~/start.
 

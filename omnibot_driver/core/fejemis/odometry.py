@@ -72,7 +72,7 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection; keep the last pose, because the board may still use its frame."""
+        """Begin a new connection. Keep the last pose, because its frame may still be in use."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
         """How many rejected poses in a row agreed with the rejected pose before them."""

@@ -25,7 +25,7 @@ class Written(Enum):
     The driver writes both numbers to both boards.
     """
     FRONT_WHEEL = "fwoffset", 2
-    """Offset of the front wheel's angle in degrees, then 1 if the angle is inverted, or 0."""
+    """Offset of the front wheel's angle in degrees, then 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4
     """Raw values of infrared sensor 1 at 13 cm and at 50 cm, then those of sensor 2."""
     MAGNETOMETER = "magcal", 12

@@ -39,7 +39,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class TeensyClock:
     """Clock of one board.
 
-    ``restarted``: whether the last time of the board showed that it has restarted.
+    ``restarted``: whether the newest time from the board shows that the board has restarted.
     """
 
     def __init__(self) -> None:

@@ -10,8 +10,8 @@ conditions hold:
 * The readings of the accelerometer hardly vary.
 
 If the wheels do not report displacements, a steady turn meets these conditions. So the gyro's mean
-reading must also be below the largest bias in the sensor's specification. The measurement yields
-the magnitude of gravity as well.
+reading must also not exceed the largest bias that the sensor's specification allows. The
+measurement yields the magnitude of gravity as well.
 
 This module knows readings and times; it does not read a clock, and does not know when to measure.
 """

@@ -109,7 +109,7 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Add a reading; return the readings that no longer wait, those of one kind in order."""
+        """Add a reading; return the readings that no longer wait. Each kind stays in order."""
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):

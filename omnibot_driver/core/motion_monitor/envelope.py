@@ -3,7 +3,7 @@
 """The envelope: the velocities that a robot may have under its recent set-points.
 
 A robot follows its set-points late and smoothly. So its velocity is inside the convex hull of its
-recent set-points and rest. Rest is included because a robot that is slower than commanded is not a
+recent set-points and rest. Rest is included because motion that is slower than commanded is not a
 fault. A margin around the hull allows for inexact scales, unequal wheels and noise.
 
 This module knows velocities in the board's own axes; it does not know times.
@@ -17,8 +17,8 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
-"""Largest allowed ratio of speed to set-point. It is above 1 because users measure the scales of
-commands by hand, and because controllers overshoot."""
+"""Largest allowed ratio of speed to set-point. It is above 1 because the scales of commands, which
+users measure by hand, are not exact, and because controllers overshoot."""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """``NOISE_MPS``, ``NOISE_RADPS``: speed in m/s and yaw rate in rad/s outside the hull that are

@@ -125,13 +125,13 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board itself may still hold an e-stop. So a robot that stands still after the release is
-        reported as HELD_BY_ESTOP, not as BLOCKED.
+        The board itself may still hold an e-stop. So if the robot stands still although it is
+        commanded to move, HELD_BY_ESTOP is reported, not BLOCKED.
         """
         self._released = True
 
     def is_news(self, fault: Fault) -> bool:
-        """Return whether ``fault`` occurs for the first time since the robot moved as commanded.
+        """Return whether ``fault`` is the first of its kind since the robot moved as commanded.
 
         The fault is recorded, so the next call returns False.
         """

@@ -3,8 +3,8 @@
 """The history of set-points, and the velocities of the robot that they explain.
 
 A robot follows a new set-point late and smoothly. For ``HELD_S`` after the change, the robot may
-still have the full velocity of the old set-point. After that, the part of this velocity that the
-robot may have becomes smaller and smaller. The old set-point explains these velocities.
+still have the full velocity of the old set-point. After that, the robot may have an ever smaller
+part of this velocity. The old set-point explains these velocities.
 
 This module knows velocities in the board's own axes, and times; it does not know how the robot
 moves.

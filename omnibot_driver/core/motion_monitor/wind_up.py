@@ -38,8 +38,8 @@ HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""``BACK_MPS``, ``BACK_RADPS``: largest speed in m/s and yaw rate in rad/s against the set-point at
-which a robot may still be held.
+"""``BACK_MPS``, ``BACK_RADPS``: largest speed in m/s and yaw rate in rad/s of a held robot in the
+direction opposite to its set-point.
 
 A robot that moves back faster is not held. Such motion does not add to the wind-up.
 """

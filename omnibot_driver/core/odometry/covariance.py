@@ -33,7 +33,7 @@ class OdometryNoise:
 
     * ``wheel_drift``: standard deviation, in m, of a wheel's random error after 1 m of rim motion.
     * ``wheel_scale``: standard deviation of the relative size error of one wheel.
-    * ``wheel_slip``: mean fraction of the distance that is lost to slip, equal for all wheels.
+    * ``wheel_slip``: mean slip, equal for all wheels, as a fraction of the distance driven.
     * ``wheels``: geometry of the wheels, at a wheel radius of 1 m.
     * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations of a robot during a gap, in m/s²
       and rad/s².

@@ -14,8 +14,8 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated. In a longer gap, the
-driver has already stopped the robot, because the board sends no data."""
+"""Longest time, in s of the board's clock, over which motion is interpolated. If the board sends no
+data at all, the driver stops the robot sooner."""
 NO_WAY: Final = Pose()
 
 

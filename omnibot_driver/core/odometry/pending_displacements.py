@@ -66,10 +66,10 @@ class PendingDisplacements:
         return 0.0 if last_stamp_s is None else max(0.0, stamp_s - last_stamp_s)
 
     def unstamped_s(self, last_stamp_s: float | None) -> float:
-        """Return the time in s that the gap takes by the stamps, but at most ``unheard_s``.
+        """Return the duration of the gap in s according to the stamps, but at most ``unheard_s``.
 
-        By the stamps, the gap begins at ``last_stamp_s``. It ends when the first waiting
-        displacement begins: at its stamp minus its duration.
+        According to the stamps, the gap begins at ``last_stamp_s``. It ends when the first waiting
+        displacement begins: at the displacement's stamp minus its duration.
         """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:

@@ -170,7 +170,7 @@ class SimulatedLois:
         self._uart.receive(data)
 
     def advance(self) -> list[Packet]:
-        """Advance by one tick. Return the bytes sent in it as one packet, or an empty list."""
+        """Advance by one tick. Return the bytes sent in this tick as one packet, if any."""
         data = self.step()
         return [(0, data)] if data else []
 

@@ -56,7 +56,8 @@ class Quirks:
     limits_rpm: targets beyond 50 RPM are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
     slow_timer: a timer count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
-    slow_boot: the board does not react for 2 s after power-up. It reads the input afterwards.
+    slow_boot: the board does not react for 2 s after power-up. Input that arrives in this time is
+        read afterwards.
     """
 
     ticks_of_forward_targets: bool = False
