@@ -2,10 +2,9 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-**Why both are needed.** A pose has few digits. With steps of 1 mm every 20 ms, a speed from two
-poses has steps of 0.05 m/s. The wheel speeds are finer, but do not add up exactly. So a
-displacement is the motion that the wheel speeds give between two poses, corrected towards the newer
-pose. The displacements add up to the pose.
+**Why both are needed.** Poses in steps of 1 mm every 20 ms give speeds in steps of 0.05 m/s. The
+wheel speeds are finer, but do not add up exactly. So a displacement is the motion that the wheel
+speeds give between two poses, corrected towards the newer pose.
 
 **Large differences.** If lines were lost, or a wheel turned quickly, the wheel speeds and the two
 poses differ by more than rounding explains. Then the displacement is the difference of the poses.

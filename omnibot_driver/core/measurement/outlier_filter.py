@@ -6,7 +6,7 @@ Two kinds of readings are impossible: a displacement faster than the robot can m
 spike is a single reading that leaps away from all earlier readings, while the next reading leaps
 back. A leap that lasts, or that is followed by more leaps, is a real shock. So a reading that leaps
 waits for the next reading of its kind, which shows whether to release or to reject it. Poses that
-arrive after a waiting displacement wait as well. No other reading ever waits.
+arrive after a waiting displacement wait as well.
 
 A knock on the robot can cause a spike in one axis of the accelerometer. Such a reading is real. A
 flipped bit causes a spike too. Its size is the full scale, a half of it, a quarter, and so on. So a
