@@ -104,6 +104,6 @@ class Adjusting(Moves):
         learned.
         """
         odometry = self.odometry
-        moved_m = abs(odometry.moved_m) + abs(odometry.spun_rad) * self._settings.track_m / 2
+        moved_m = abs(odometry.moved_m) + abs(odometry.turn.spun_rad) * self._settings.track_m / 2
         if moved_m < STARTED_M:
             self.loop.stood(self._turns.units if self.motion is Motion.SPIN else None)

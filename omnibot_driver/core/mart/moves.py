@@ -94,7 +94,7 @@ class Moves(Asking):
             else:
                 self._recorded = move
                 return
-        self._surplus.learn(move, self.odometry.moved_m, self.odometry.spun_rad)
+        self._surplus.learn(move, self.odometry.moved_m, self.odometry.turn.spun_rad)
 
     def _use_turn_record(self) -> None:
         """Correct the heading by the record of the last turn, if its download has ended."""
@@ -105,7 +105,7 @@ class Moves(Asking):
             degrees = recorded_deg(self.jobs.turn_record, turn)
             used = degrees is not None and self.odometry.turn_recorded(degrees)
             self._unrecorded = 0 if used else self._unrecorded + 1
-        self._surplus.learn(turn, 0.0, self.odometry.spun_rad)
+        self._surplus.learn(turn, 0.0, self.odometry.turn.spun_rad)
 
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.
@@ -119,7 +119,7 @@ class Moves(Asking):
         done = Done(
             move,
             odometry.moved_m,
-            odometry.spun_rad,
+            odometry.turn.spun_rad,
             lasted_s=self._rested_s - self._started_s,
             quiet_s=now - self._rested_s + self._delay_s,
         )

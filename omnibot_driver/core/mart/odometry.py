@@ -88,7 +88,7 @@ class MartOdometry(Reckoning):
         stale_s, turn_rad = self.stale(now)
         errors += anywhere(abs(speed_mps) * stale_s * min(1.0, turn_rad), turn_rad)
         if self.on_the_spot:
-            errors += self.doubt.turn(self.spun_rad, self.told_rad)
+            errors += self.doubt.turn(self.turn.spun_rad, self.turn.told_rad)
         if not self.speeds.are_known:
             errors += anywhere(STARTS_MPS * ahead_s, STARTS_RADPS * ahead_s)
         more_mps, more_radps = self.speeds.changes

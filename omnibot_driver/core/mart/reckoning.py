@@ -19,15 +19,10 @@ from omnibot_driver.core.mart.motors import UNEQUAL
 from omnibot_driver.core.mart.relative_heading import RelativeHeading
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import Motion
+from omnibot_driver.core.mart.turn_angle import TurnAngle, is_of_another
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
-TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest accepted difference between a reported turn and the turn measured at the wheel.
-
-It is TOLD_RAD (rad), plus TOLD_PART of the wheel's turn. A reported number that differs by more is
-regarded as the answer to another query.
-"""
 BEGIN_RADPS: Final = 0.03
 """Standard deviation in rad/s of the turn rate in RM before the server reports a heading.
 
@@ -57,9 +52,9 @@ class Reckoning:
 
     ``slowing_since_s``: time of the first stop command in this motion, or None.
 
-    ``moved_m``, ``spun_rad``: distance, and turn on the spot, since this motion began.
+    ``moved_m``: distance since this motion began.
 
-    ``told_rad``: angle that the server has reported for a turn on the spot, or None.
+    ``turn``: angle of this motion if it is a turn on the spot, else of the last such turn.
 
     ``left_over_right``: expected ratio of left to right wheel speed while the heading is unknown,
     else None.
@@ -79,9 +74,9 @@ class Reckoning:
         self._began_s = self._stood_s = -math.inf
         self.slowing_since_s: float | None = None
         self.speeds = MeanSpeeds()
-        self._motion_rad = self.spun_rad = self.moved_m = 0.0
-        self.told_rad: float | None = None
-        self._guessed = self._may_be_recorded = False
+        self.turn = TurnAngle()
+        self._motion_rad = self.moved_m = 0.0
+        self._guessed = False
         self.reset()
 
     @property
@@ -98,7 +93,7 @@ class Reckoning:
         self.pose = Pose()
         self.doubt.reset()
         self._begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)
-        self._may_be_recorded = False
+        self.turn.forget()
 
     def connect(self) -> None:
         """Begin a new connection; the robot may have moved, or the server may have restarted."""
@@ -118,8 +113,9 @@ class Reckoning:
         self.wheel.begin()
         self.doubt.begin()
         self.heading.begin(now, anew=motion is Motion.REFERENCE)
-        self._motion_rad = self.spun_rad = self.moved_m = 0.0
-        self.told_rad, self._guessed, self._may_be_recorded = None, False, False
+        self.turn.begin()
+        self._motion_rad = self.moved_m = 0.0
+        self._guessed = False
 
     def started(self, now: float, *, sure: bool) -> None:
         """Record that the server has acknowledged the start.
@@ -144,13 +140,14 @@ class Reckoning:
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
-            self._finish_turn()
+            recorded = self.motion is Motion.TURN and not self._begins_in_move
+            self._correct_yaw(self.turn.end(may_be_recorded=recorded))
+            self.doubt.end_turn(self.turn.spun_rad, self.turn.told_rad)
         self.doubt.end()
         way_m, turn_rad = self.maybe
         self.doubt.add(way_m**2, turn_rad**2)
         if self._begins_in_move:  # the part of the move before the reset is not known
-            self.doubt.add(self.moved_m**2, self.spun_rad**2)
-        self._may_be_recorded = self.motion is Motion.TURN and not self._begins_in_move
+            self.doubt.add(self.moved_m**2, self.turn.spun_rad**2)
         self._begins_in_move = False
         self.motion = Motion.NONE
         self.wheel.rest()
@@ -244,11 +241,9 @@ class Reckoning:
             self._guessed = True
             return wheel_m * (1.0 - ratio) / self._settings.track_m
         turn_rad = wheel_m * (1.0 - (-1.0 if ratio is None else ratio)) / self._settings.track_m
-        told = not _is_of_another(told_rad - turn_rad, turn_rad)
-        if self.motion is Motion.TURN and told:
+        if self.motion is Motion.TURN and not is_of_another(told_rad - turn_rad, turn_rad):
             turn_rad = told_rad
-        self.spun_rad += turn_rad
-        return turn_rad if self.told_rad is None else 0.0  # the reported turn includes it
+        return self.turn.add(turn_rad)
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct a heading that was computed from commands, once the server reports the turn.
@@ -269,44 +264,28 @@ class Reckoning:
 
         ``degrees``: this angle, with the server's sign.
         """
-        self.told_rad = math.radians(degrees) * self._settings.heading_sign
-        self._correct_yaw(self.told_rad - self.spun_rad)
+        told_rad = math.radians(degrees) * self._settings.heading_sign
+        self._correct_yaw(self.turn.tell(told_rad))
 
     def turn_recorded(self, degrees: float) -> bool:
         """Correct the heading after a controlled turn by the angle that the server has recorded.
 
-        ``degrees``: this angle, with the server's sign. In two cases, it corrects nothing and
-        returns False: the angle differs too much from the turn measured at the wheel, or the turn
-        was not the last motion in this odometry frame.
+        ``degrees``: this angle, with the server's sign. Return whether the angle was used; if not,
+        nothing is changed.
         """
         told_rad = math.radians(degrees) * self._settings.heading_sign
-        wrong_rad = told_rad - self.spun_rad
-        if not self._may_be_recorded or _is_of_another(wrong_rad, self.spun_rad):
+        spun_rad = self.turn.spun_rad
+        wrong_rad = self.turn.record(told_rad)
+        if wrong_rad is None:
             return False
-        self._may_be_recorded = False
         self._correct_yaw(wrong_rad)
-        self.doubt.turn_recorded(self.spun_rad, told_rad)
-        self.spun_rad = told_rad
+        self.doubt.turn_recorded(spun_rad, told_rad)
         return True
 
     def _correct_yaw(self, wrong_rad: float) -> None:
         self.pose = Pose(self.pose.x_m, self.pose.y_m, self.pose.yaw_rad + wrong_rad)
         self.rolled += Pose(0.0, 0.0, wrong_rad)
         self.speeds.correct(wrong_rad)
-
-    def _finish_turn(self) -> None:
-        """End a turn on the spot after its last count.
-
-        If the reported angle differs too much from the turn measured at the wheel, the measured
-        turn is used.
-        """
-        told_rad = self.told_rad
-        wrong_rad = 0.0 if told_rad is None else self.spun_rad - told_rad
-        if _is_of_another(wrong_rad, self.spun_rad):
-            self._correct_yaw(wrong_rad)
-            told_rad = None
-        self.doubt.end_turn(self.spun_rad, told_rad)
-        self.told_rad = None
 
     def _move(self, way_m: float, turn_rad: float, seconds: float, wheel_m: float) -> None:
         tangent = Pose(way_m, 0.0, turn_rad)
@@ -343,11 +322,3 @@ class Reckoning:
         if self.motion is not Motion.REFERENCE:
             stale_s = 0.0
         return stale_s, ACCELERATION_RADPS2 * stale_s * stale_s / 2
-
-
-def _is_of_another(wrong_rad: float, spun_rad: float) -> bool:
-    """Return whether a reported turn that is wrong by ``wrong_rad`` belongs to another motion.
-
-    ``spun_rad``: the turn that the wheel has measured.
-    """
-    return abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(spun_rad)

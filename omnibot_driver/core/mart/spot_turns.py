@@ -201,7 +201,7 @@ class SpotTurns:
     def _is_seen(self, seconds: float) -> bool:
         """Return whether a turn of this duration shows how fast the motors turn."""
         speeds = self._odometry.speeds
-        if seconds < SPINS_UP_S + speeds.window_s or abs(self._odometry.spun_rad) <= SEEN_RAD:
+        if seconds < SPINS_UP_S + speeds.window_s or abs(self._odometry.turn.spun_rad) <= SEEN_RAD:
             return False
         return abs(speeds.changes[1]) < EVEN * abs(speeds.means[1])
 
@@ -225,7 +225,7 @@ class SpotTurns:
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
             return False
-        expected_rad = self._odometry.spun_rad + self._rate_radps * unseen_s
+        expected_rad = self._odometry.turn.spun_rad + self._rate_radps * unseen_s
         if abs(reply.number) <= 1 and abs(expected_rad) > UNSURE_RAD:
             return True  # MCSTAT, or a sonar
         told_rad = math.radians(reply.number) * self.settings.heading_sign
@@ -247,7 +247,7 @@ class SpotTurns:
         is learned.
         """
         odometry = self._odometry
-        spun_rad = odometry.spun_rad
+        spun_rad = odometry.turn.spun_rad
         odometry.spin_told(degrees)
         if disturbed or not (self.units and self._is_seen(turned_s)):
             return

@@ -128,7 +128,7 @@ def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> Non
     bench.run_until(lambda: downloads(bench) == 1, 20.0)
     odometry = bench.board._pilot.odometry
     odometry.reset()
-    assert not odometry.turn_recorded(math.degrees(odometry.spun_rad) + 2.0)
+    assert not odometry.turn_recorded(math.degrees(odometry.turn.spun_rad) + 2.0)
     assert odometry.pose == Pose()
 
 
@@ -139,7 +139,7 @@ def test_a_record_makes_the_heading_more_certain_but_not_better_than_the_gyro() 
     bench.run_until(lambda: downloads(bench) == 1, 20.0)
     odometry = bench.board._pilot.odometry
     before = odometry.doubt.total([]).yaw_yaw
-    assert not odometry.turn_recorded(math.degrees(odometry.spun_rad) + 60.0)
-    assert odometry.turn_recorded(math.degrees(odometry.spun_rad) + 2.0)
+    assert not odometry.turn_recorded(math.degrees(odometry.turn.spun_rad) + 60.0)
+    assert odometry.turn_recorded(math.degrees(odometry.turn.spun_rad) + 2.0)
     assert math.radians(0.7) ** 2 < odometry.doubt.total([]).yaw_yaw < before / 4
-    assert not odometry.turn_recorded(math.degrees(odometry.spun_rad) + 2.0)
+    assert not odometry.turn_recorded(math.degrees(odometry.turn.spun_rad) + 2.0)
