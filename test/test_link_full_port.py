@@ -31,10 +31,10 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A write fails because the port is full. The link then repeats its opening sequence first.
+    """A write fails because the port is full, so the board may have received half a command.
 
-    The board may have received half a command. A Stop comes before the sequence: the link writes it
-    before it opens the port again, because the board may accept data sooner.
+    The link then opens the port again and repeats its opening sequence before anything else. Even
+    before that, it writes a Stop, because the board may accept data sooner.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())

@@ -130,7 +130,7 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 ) -> None:
     """NTP steps the clock after a stall. Commands from the stall stay old, and new ones stay fresh.
 
-    The send times are by the clock after the step.
+    All of them have send times by the stepped clock.
     """
     standstill = resumed(3.0)
     standstill.passed(103.5, wall_ns(103.5))

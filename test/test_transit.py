@@ -249,8 +249,8 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """A sender's first message is 0.5 s late, so its clock seems to be 0.5 s behind.
 
-    The driver therefore has two estimates of the next send time. The second one, by the sender's
-    own clock, is right.
+    The clock may also be right. So the driver has two estimates of the next send time: by its own
+    clock, and by the sender's clock. Here the second one is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

@@ -59,7 +59,10 @@ def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch)
 def test_with_the_updater_each_status_is_a_task_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each status becomes one task, which fills every report. The library gives the period."""
+    """Each status becomes one task, which fills in each report.
+
+    The library sets the period of the reports.
+    """
     made: list[Any] = []
 
     def make(node: object, period_s: float) -> Updater:

@@ -25,17 +25,17 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether an angle to the right with a digit 6 is within half a degree of this one.
+    """Return whether an angle to the right with a digit 6 is within half a degree of this angle.
 
-    Such angles are about −60° to −69°, and −6°, −16° and so on.
+    Such angles are −6°, −16° and so on, and all from −60° to −69°.
     """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """The driver sends most angles in steps of 0.1°, and the others in larger steps.
+    """The driver sends most angles in steps of 0.1°.
 
-    The larger steps serve to avoid texts in which damage would not be noticed.
+    It skips an angle if damage to its text would not be noticed. There, the steps are larger.
     """
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
@@ -87,9 +87,10 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """Three characters of a line are lost. The board accepts less than 1 % of such lines.
+    """Three characters of a line are lost.
 
-    The numbers are in docs/boards/fejemis.md.
+    In less than 1 % of the cases, the board then reads another angle. The numbers are in
+    docs/boards/fejemis.md.
     """
     chance = random.Random(seed)
     passed = total = 0
@@ -104,9 +105,10 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Without checksums, the driver sends whole degrees. Lost characters never leave more than 90°.
+    """Without checksums, the driver sends whole degrees.
 
-    Only beyond 90° would the inner wheel be faster than the outer one.
+    If characters are lost, the angle that the board reads is still at most 90°. Only beyond 90°
+    would the inner wheel be faster than the outer one.
     """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)

@@ -179,7 +179,7 @@ def test_a_small_difference_is_written_after_a_start() -> None:
 
 
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
-    """Without checksums, a query loses one or two characters. It does not become a command."""
+    """Without checksums, a query that loses one or two characters does not become a command."""
     bench = nominal(Simulated(firmware=Firmware(sums=False)))
     bench.run(8.0)
     texts = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}
@@ -218,9 +218,10 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """Motion is refused until the board has the user's setting. The user may change it meanwhile.
+    """Motion is refused until the board has the user's setting.
 
-    The line that writes the setting may be lost, and is not repeated while the robot is driven.
+    A change of the setting meanwhile has no effect on this. The line that writes the setting may be
+    lost. The driver does not repeat this line while the robot is driven.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

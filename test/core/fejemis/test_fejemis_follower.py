@@ -86,7 +86,7 @@ def test_motion_is_refused_until_the_wheel_has_moved() -> None:
 def test_after_a_second_fault_within_a_minute_only_a_start_helps() -> None:
     """The first fault ends when the wheel moves.
 
-    A second one within a minute ends only by a start.
+    A second fault within a minute ends only by ~/start.
     """
     follower = Follower()
     at = blocked(follower, 0.0)
@@ -114,9 +114,10 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
+    """The firmware limits the wheel to 90° in reverse.
 
-    The robot rolls less than 12 cm. After the second fault, motion is refused until a start.
+    The user commands a motion backward, and the robot turns instead. The driver stops it before it
+    has rolled 12 cm. After the second fault, motion is refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)

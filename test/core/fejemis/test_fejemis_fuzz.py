@@ -75,7 +75,7 @@ def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
 
 
 def test_bytes_that_come_before_anything_is_known_move_nothing() -> None:
-    """A board sends lines that a previous driver has requested, before its first heartbeat.
+    """Before its first heartbeat, a board sends lines that a previous driver has requested.
 
     The driver stays in ``connecting`` and publishes no odometry.
     """

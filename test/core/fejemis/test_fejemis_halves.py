@@ -50,7 +50,7 @@ def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
 def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
     """One board becomes silent. The robot is stopped, and a notice names the board.
 
-    A new command moves the robot once both boards send again.
+    When both boards send again, a new command moves the robot.
     """
     bench = nominal()
     bench.drive_on()
@@ -151,9 +151,9 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
     ],
 )
 def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: str) -> None:
-    """The two boards do not form a pair, for example two drive boards. A notice says so once.
+    """The two boards do not form a pair, for example because both are drive boards.
 
-    Motion is refused.
+    A notice says so once. Motion is refused.
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
@@ -190,9 +190,9 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
-    """After a reconnect one port is silent.
+    """After a reconnect one port is silent. The driver remembers which board was at this port.
 
-    The driver knows which board was there, and names it once.
+    One notice names that board.
     """
     bench = nominal()
     bench.close()
@@ -249,9 +249,10 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """No more angles arrive while the robot drives. It is stopped when the last angle is 60 ms old.
+    """No more angles arrive while the robot drives.
 
-    The driver does not wait for the next command.
+    The driver stops the robot when the last angle is 60 ms old. The driver does not wait for the
+    next command.
     """
     bench = nominal()
     bench.drive_on()
@@ -360,7 +361,8 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
     """The boards change ports during each disconnection. The robot is driven as before each time.
 
-    The driver remembers which requests a board does not know. It does so by board, not by port.
+    The driver remembers which requests each board does not know. This memory belongs to the board,
+    not to the port.
     """
     bench = nominal()
     for swapped in (True, False, True):
@@ -378,7 +380,7 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
 def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
     """After a reconnect another board may be at the port.
 
-    The diagnostics do not show the old values.
+    So the diagnostics no longer show the old values.
     """
     bench = nominal()
     bench.run(6.0)
@@ -395,8 +397,8 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
     """The boards change ports but keep running. The front board's clock is ``ahead_s`` ahead.
 
-    The driver must not use this clock for the times of the drive board. The stamps of the odometry
-    would be wrong, or the drive board would seem to have restarted.
+    The driver must not use this clock for the times of the drive board. Otherwise the stamps of the
+    odometry would be wrong, or the drive board would seem to have restarted.
     """
     bench = Bench()
     bench.robot.front._clock_s += ahead_s

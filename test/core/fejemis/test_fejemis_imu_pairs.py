@@ -142,7 +142,7 @@ class Outcome:
     given: list[tuple[int, int]]
     false: list[tuple[int, int]]
     excused: list[tuple[int, int]]
-    """False pairs that nothing in the stream shows to be false."""
+    """False pairs that cannot be recognized, because nothing in the stream shows their error."""
 
 
 def outcome(reads: list[Read]) -> Outcome:

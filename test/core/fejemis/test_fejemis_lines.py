@@ -132,7 +132,10 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """The manual's example lines are decoded, and a line for each of its lists of fields."""
+    """The decoder reads the example lines of the manual.
+
+    It also reads a line for each list of fields in the manual.
+    """
     assert parse(text) == GOLDEN[text]
 
 
@@ -147,7 +150,7 @@ def test_what_no_board_sends_is_not_a_message(text: str) -> None:
 def test_every_chunking_tells_the_same(end: bytes, *, sums: bool) -> None:
     """The same bytes arrive at once, byte by byte or in random pieces.
 
-    The messages are the same.
+    In each case, the decoder returns the same messages.
     """
     of_each_kind = {text.split()[0]: (text, GOLDEN[text]) for text in GOLDEN}.values()
     texts = [text.encode() for text, _ in of_each_kind]
@@ -188,7 +191,7 @@ def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
 
 
 def test_a_line_may_have_200_characters_and_no_more() -> None:
-    """A line of over 200 characters is discarded up to its end, whatever its pieces are."""
+    """A line of over 200 characters is discarded up to its end, in whatever pieces it arrives."""
     decoder = FejemisDecoder()
     text = b"# " + b"x" * (LONGEST_LINE - 2)
     assert len(feed(decoder, text + b"\n")) == 1
@@ -198,7 +201,8 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 
 
 def test_half_a_line_at_the_end_is_none() -> None:
-    """The bytes end without a line end. The last line is not decoded, as it may be incomplete."""
+    """The bytes end without a line end. The last line is not decoded, because it may be incomplete.
+    """
     decoder = FejemisDecoder()
     assert feed(decoder, b"gyro 1 2 3") == []
     assert decoder.flush(0.0) == []
@@ -251,7 +255,7 @@ def test_heartbeats_contradict_a_setting_but_do_not_overrule_it(
 
 
 def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None:
-    """A board prints a value always with the same number of decimals.
+    """A board always prints a value with the same number of decimals.
 
     A line with another number of decimals is damaged and discarded.
     """

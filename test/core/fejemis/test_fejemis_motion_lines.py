@@ -59,9 +59,10 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """Two characters of the manual's example line are lost, and the board reads another motion.
+    """The manual's example line loses two characters, and the board reads another motion.
 
-    So the driver chooses its digits such that the checksum shows this loss.
+    So the driver does not use these digits. It chooses digits with which the checksum shows such a
+    loss.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
@@ -106,11 +107,12 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """The line end after ``rc 2 0 0`` and the semicolon of the next line are lost.
+    """Two lost characters can join two lines: a line end, and the semicolon of the next line.
 
-    The checksum of the next line then extends the last 0. A checksum of 92 gives ``rc 2 0 092``,
-    which means 92 degrees/s. With 02 or 92, the sum of the longer line is still right. So the
-    driver puts an empty line before a line with such a sum.
+    The line ``rc 2 0 0`` then ends with the checksum of the next line. If this checksum is 92, the
+    result is ``rc 2 0 092``, which means 92 degrees/s. With the checksum 02 or 92, the sum of the
+    joined line is still right. So the driver puts an empty line before a line with one of these two
+    checksums.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -137,7 +139,7 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front line gives the angle within 0.02°, and a gentle curve within 1 %.
+    """The front line gives the angle within 0.02°, and a small angle also within 1 %.
 
     The drive line gives the outer wheel's speed within 0.6 %.
     """
@@ -156,8 +158,8 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     """The two numbers in the drive line avoid certain digits.
 
-    Together they still reach every wheel speed. Negative numbers have fewer digits, so the speed is
-    only right within 1.8 %.
+    Together they still reach every wheel speed within 1.8 %. Negative numbers are the least exact,
+    because they have fewer digits.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.03**n for n in range(240))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -185,7 +187,7 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """Nothing is added to a line except a checksum and perhaps an empty line before it.
+    """The driver adds only a checksum to a line and, in some cases, puts an empty line before it.
 
     A related firmware obeys ``stop`` only if it is the complete line.
     """
@@ -199,9 +201,9 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """Without checksums, a lost space or source number shifts the numbers, which commands a stop.
+    """Without checksums, the loss of a space or of the source number shifts the other numbers.
 
-    Only damage within the speed itself can make the robot faster.
+    The board then reads a stop. Only damage within the speed itself can make the robot faster.
     """
     for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         text = plain_drive_line(speed, turn)

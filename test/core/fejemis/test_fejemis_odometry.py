@@ -74,9 +74,10 @@ def test_displacements_add_up_to_the_pose() -> None:
 
 
 def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
-    """The board prints poses in steps of 1 mm, which alone would give steps of 0.05 m/s.
+    """The board prints poses in steps of 1 mm.
 
-    With the wheel speeds, the published speed is smoother.
+    Speeds from poses alone would have steps of 0.05 m/s. The driver also uses the wheel speeds, so
+    the published speed is smoother.
     """
     spread = {}
     for with_speeds in (True, False):
@@ -232,7 +233,10 @@ def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> Non
 
 
 def test_joint_states_follow_the_wheels() -> None:
-    """The robot drives a curve. Odometry has the same rolled distances as the simulated wheels."""
+    """The robot drives a curve.
+
+    In the odometry, each wheel has rolled as far as the simulated wheel.
+    """
     bench = nominal()
     bench.drive_on(0.3, 0.3, 3.0)
     bench.run(1.5)

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Every command in the boards' help has an example line here, the golden line.
+"""Tests that two tables contain every command and every subscription in the boards' help.
 
-It also has a use, or a reason why the driver does not use it.
+A row of the table ``SAID`` has an example of the command, the golden line. It also says where the
+driver uses the command, or why the driver does not use it.
 """
 
 import math
@@ -152,7 +153,10 @@ def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
 
 
 def test_no_row_is_of_something_else() -> None:
-    """The tables contain only what the help contains, and ``sub``, which subscribes."""
+    """The tables contain no command or subscription that is not in the help.
+
+    The only exception is ``sub``, the command that subscribes.
+    """
     drive, front = listed(DRIVE_HELP), listed(FRONT_HELP)
     assert SAID.keys() - {"sub"} <= drive[0] | front[0]
     assert HEARD.keys() <= drive[1] | front[1]

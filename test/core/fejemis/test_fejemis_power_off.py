@@ -66,7 +66,7 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
     """The user requests a power off just after ~/start, while ``on`` is still being repeated.
 
-    The driver stops repeating ``on``, so the power off stays.
+    The driver stops repeating ``on``, because ``on`` would cancel the power off.
     """
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
@@ -76,9 +76,9 @@ def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
 
 
 def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """After a silence of the board, the driver starts it by itself. The power off stays.
+    """A board is silent for a while, so the driver starts it again.
 
-    Only ~/start by the user cancels it.
+    This does not cancel the power off. Only ~/start by the user cancels it.
     """
     mark = bench.now
     bench.speaks = set()

@@ -50,7 +50,7 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """The drive board restarts at any time within a read of 20 ms.
+    """The driver reads every 20 ms, and the drive board restarts at any time between two reads.
 
     So a read may contain poses from before and after the restart. Odom still has no jump.
     """
@@ -145,9 +145,10 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """The front board is silent for a while. Then a heartbeat from before the silence is read.
+    """The front board is silent for a while.
 
-    It does not prove that the board has not restarted. Only a newer heartbeat does.
+    Then the driver reads a heartbeat from before the silence. This heartbeat does not prove that
+    the board has not restarted. Only a newer heartbeat proves it.
     """
     bench = nominal()
     bench.run(2.0)
@@ -169,7 +170,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 ) -> None:
     """The data of one board stops for a while, so the board may have restarted.
 
-    The state becomes nominal only after a heartbeat shows that it has not restarted.
+    The state becomes nominal only after a heartbeat shows that the board has not restarted.
     """
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}

@@ -242,7 +242,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
 
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
-    """During a calibration or a loading, motion is refused, as the robot must be at rest."""
+    """During a calibration or a loading, motion is refused, because the robot must be at rest."""
     bench = nominal()
     bench.board.services.ask(job, None, bench.now)
     bench.settle()
@@ -345,8 +345,9 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """The line ``off 300`` may lose its 3 and a 0, and its checksum still fits.
+    """If the line ``off 300`` loses its 3 and a 0, its checksum still fits.
 
-    The power is cut at once. So the driver increases the delay to a number without two such digits.
+    The board would then cut the power at once. So the driver sends a longer delay, a number without
+    two such digits.
     """
     assert whole_seconds(wanted_s) == seconds

@@ -54,9 +54,10 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """The command ``rc`` contains a speed and a turn rate. In a curve, the robot moves at others.
+    """The command ``rc`` contains a speed and a turn rate.
 
-    The expected values come from the manual's equations.
+    In a curve, the actual speed and turn rate of the robot differ from them. The expected values
+    come from the manual's equations.
     """
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
@@ -85,9 +86,9 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """The front wheel still turns to its angle. Meanwhile, the robot is not faster than commanded.
+    """While the front wheel turns to its angle, the robot is not faster than commanded.
 
-    It may only be faster by as much as an error of 5° in the wheel's angle explains.
+    A small excess is allowed. It corresponds to an error of 5° in the wheel's angle.
     """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
@@ -114,7 +115,7 @@ def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> N
 
 
 def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
-    """The front wheel's angle is not known, so the drive board would compute with an old one.
+    """The front wheel's angle is not known, so the drive board would compute with an old angle.
 
     The driver stops the drive board.
     """
@@ -216,9 +217,9 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
 
 @pytest.mark.parametrize(("v", "w"), [(-0.2, 0.0), (-0.2, 0.3), (-0.01, 0.5)])
 def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
-    """The user commands reverse, which no parameter allows. The robot only turns.
+    """The parameter ``allow_reverse`` is off, and the user commands a motion backward.
 
-    One notice explains why.
+    The robot only turns. One notice names the parameter.
     """
     bench = nominal()
     bench.drive_on(v, w, 3.0)

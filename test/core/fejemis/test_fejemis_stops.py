@@ -82,9 +82,10 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The heartbeat names the source of the command that the board obeys, which proves a pause.
+    """The heartbeat names the source of the command that the board obeys.
 
-    The pause lasts if the user latches and releases the e-stop meanwhile.
+    The source -1 proves that the board is paused. If the user latches and releases the e-stop
+    during a pause, the pause continues.
     """
     bench = nominal()
     bench.drive_on()
@@ -152,8 +153,8 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
     """A thousand lift voltages and colours come in a second. The driver sends twenty of each.
 
-    The newest is sent last, and a stop is sent at once. The line for the brush is sent no more
-    often.
+    The newest voltage and the newest colour are sent last. A voltage of 0 is sent at once.
+    Meanwhile, the line for the brush is sent only as often as usual.
     """
     machine = Machine()
     machine.set_brush(True)
@@ -247,7 +248,7 @@ def test_what_turns_is_refused_in_an_estop_and_in_a_pause() -> None:
 def test_a_command_that_expires_leaves_the_brush_on() -> None:
     """A command expires, and only the wheels stop.
 
-    The brush stays on, as a robot may sweep at rest.
+    The brush stays on, because a robot may sweep at rest.
     """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)

@@ -101,7 +101,7 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
-    """A reading has a stamp before that of the last reading. Its stamp is increased.
+    """If a stamp is not after the previous stamp, it is increased.
 
     A stamp in the future is set to the present time.
     """
@@ -143,7 +143,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
-    """The drive board's lines of 0.3 s arrive in one read.
+    """For 0.3 s, the lines of the drive board wait. Then all of them arrive in one read.
 
     Each orientation has the stamp of its IMU sample.
     """
@@ -177,7 +177,10 @@ def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
 
 
 def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None:
-    """A battery reading has a late stamp. The stamps of the orientations do not change."""
+    """Stamps must increase only among readings of the same kind.
+
+    A reading of another kind has an earlier stamp, which is not changed.
+    """
     stamped = StampedReadings()
     for content, stamp_s in ((1, 2.0), ("a", 1.0), (1, 2.0)):
         stamped.add(ExtraReading(content), stamp_s, 2.0)

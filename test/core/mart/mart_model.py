@@ -50,8 +50,8 @@ class Driver(NamedTuple):
 
     ``moved``: whether the last motion was a controlled move.
 
-    ``counted``: whether the encoder was read after the robot stopped, when no late copy that could
-    do harm was left.
+    ``counted``: whether the encoder was read after the robot stopped. A reading does not count if a
+    harmful late copy was still on its way.
 
     ``greeted``: whether the driver has already stopped the server once.
     """
@@ -161,7 +161,10 @@ def _ends(world: World) -> Iterator[Step]:
 
 
 def _waits(world: World) -> Iterator[Step]:
-    """Yield the steps without a command: a requested stop, an ended wait, an answered query."""
+    """Yield the steps in which the driver sends no command.
+
+    For example, the user requests a stop, a wait ends, or a query is answered.
+    """
     server, driver = world.server, world.driver
     state = driver.state
     if state in (State.STARTING, State.DRIVING, State.REVERSING, State.TURNING, State.MOVING):
@@ -260,8 +263,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    A late reply is never taken for the reply to a check or to a controlled move, because these take
-    longer.
+    A late reply is never taken for the reply to a check or to a controlled move. The replies to
+    these take longer than any late reply.
     """
     driver = world.driver
     state = driver.state

@@ -70,7 +70,7 @@ class Found(NamedTuple):
     ``steps``: the number of steps between these worlds.
 
     ``bad``: the steps to the first world that must not occur, and then what is wrong in that world.
-    The tuple is empty if no such world was found.
+    ``bad`` is empty if no such world was found.
     """
 
     worlds: int

@@ -103,7 +103,10 @@ def _stop_port(server: Server, word: str) -> tuple[Server, Reply]:
 
 
 def servers() -> dict[Server, tuple[str, ...]]:
-    """Return all states that the server can reach if no datagram is lost, each with its steps."""
+    """Return all states that the server can reach if no datagram is lost.
+
+    Each state has the steps that lead to it.
+    """
     row = [Server()]
     found: dict[Server, tuple[str, ...]] = {Server(): ()}
     while row:

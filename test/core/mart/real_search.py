@@ -55,15 +55,20 @@ The driver's regular queries are not counted. Later datagrams are only the repea
 e-stop.
 """
 PROOF_S: Final = 0.25
-"""Time in s after the death of the IMU. A motion that begins after this time had no check."""
+"""Time in s after the death of the IMU.
+
+A motion that begins later had no check while the IMU worked.
+"""
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """Commands that the server may be executing when a driver starts."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times in s after the start of the driver. The network works from then on."""
+"""Times in s for which the network is interrupted after the start of the driver, one in each trial.
+"""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s for which the network then works, before it is interrupted again for 1 s."""
+"""Times in s for which the network then works, one in each trial. Then it is interrupted for 1 s.
+"""
 ENDS_S, SETTLED_S = 16.0, 1.5
 
 

@@ -21,8 +21,8 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 ) -> None:
     """With a dead IMU, the driver does not send commands that would start the motors, and says why.
 
-    On a server that has RST IMU, the driver repeats the check by itself, and allows motion when the
-    IMU is back. On a server without it, motion stays refused, as the check could move the robot.
+    On a server that has RST IMU, the driver repeats the check by itself. It allows motion when the
+    IMU is back. On a server without RST IMU, a check could move the robot, so motion stays refused.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -71,10 +71,10 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The server rejects an RM, so the driver knows that RM has arrived.
+    """The server rejects an RM.
 
-    The stop before the next RM is therefore short. Two seconds after the command, the speed is
-    right.
+    The rejection proves that RM has arrived, so the stop before the next RM can be short. Two
+    seconds after the command, the speed is right.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 3.0)
@@ -121,9 +121,10 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects RM because of an obstacle, which was the reason of the last B.
+    """The server rejects RM because of an obstacle.
 
-    The front sonar shows no obstacle. So the driver sends RM again, and reports no obstacle.
+    But this obstacle ended an earlier motion, B, and the front sonar shows no obstacle. So the
+    driver sends RM again, and reports no obstacle.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
@@ -148,7 +149,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 ) -> None:
     """The IMU dies while the robot moves, and the heading stays constant.
 
-    The driver stops the robot within 1.2 s, reports the server as lost, and refuses motion until
+    The driver stops the robot within 1.2 s and reports the server as lost. It refuses motion until
     the server is restarted. With the public source the heading changes only during RM, so only RM
     is tested there.
     """

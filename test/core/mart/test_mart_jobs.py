@@ -27,7 +27,10 @@ def test_the_gyro_is_calibrated_at_rest() -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
-    """With a dead IMU the server would never answer SB, nor any later command."""
+    """With a dead IMU the server would never answer SB, nor any later command.
+
+    So the job fails, and the driver does not send SB.
+    """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
     done = bench.job(Job.BIAS)

@@ -166,10 +166,10 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """A reply to the first stop shows whether the motion had begun before it.
+    """The reply to the first stop shows whether the motion had begun before that stop.
 
-    "No motion" after the second stop does not show it. The first stop may have ended the motion,
-    and its reply may be lost.
+    A "no motion" after the second stop does not show it. The first stop may have ended the motion,
+    and its reply may have been lost.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True

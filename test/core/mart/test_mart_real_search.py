@@ -56,7 +56,8 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver to send SRM and SM after the stop port, without asking what still moves."""
+    """Patch the driver to send SRM and SM after a stop on the stop port, without asking what moves.
+    """
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
 

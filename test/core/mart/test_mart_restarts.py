@@ -71,8 +71,8 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
 def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(seed: int) -> None:
     """The network loses replies.
 
-    The driver sends HELLO, and the answer shows that the server is there. So the driver does not
-    assume a restart again and again.
+    After a loss, the driver sends HELLO, and the answer shows that the server is there. So the
+    driver does not take each loss for a restart.
     """
     bench = MartBench("source", NetworkFaults(lose=0.1), seed=seed).ready()
     appeared = set()

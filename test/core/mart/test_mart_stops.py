@@ -273,7 +273,7 @@ def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
 def test_a_restarted_driver_stops_what_it_meets() -> None:
     """A driver starts while the robot moves, and stops it.
 
-    In a controlled move the server does not answer.
+    This also works in a controlled move, during which the server does not answer.
     """
     for begun in (b"RM 30", b"B SLOW", b"L SLOW", b"TF 200", b"MCR 300"):
         bench = MartBench()
@@ -290,9 +290,9 @@ def test_a_restarted_driver_stops_what_it_meets() -> None:
 def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
     wish: str,
 ) -> None:
-    """The driver is killed at any moment of a motion.
+    """The driver is killed at any moment of a motion. It has prepared stop commands before.
 
-    The guard repeats the stops that the driver prepared, for a second, and the robot comes to rest.
+    For one second, the guard repeats these commands. The robot comes to rest.
     """
     twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
     seen = set()

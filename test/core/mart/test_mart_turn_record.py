@@ -42,18 +42,19 @@ def downloads(bench: MartBench) -> int:
 
 
 def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
-    """The value at "stop detected" includes the distance that the robot coasts."""
+    """The angle is the one at "stop detected" in the record. It includes the coasting of the robot.
+    """
     assert recorded_deg([RECORD], MCR.request("SLOW", 90)) == -91.73
     assert recorded_deg([RECORD.replace(b"\n", b"\r\n")], MCR.request(90)) == -91.73
 
 
 def test_the_record_of_another_turn_is_not_used() -> None:
-    """The target in the file must be the angle that the driver has requested."""
+    """The driver uses a record only if its target is the angle that the driver has requested."""
     assert recorded_deg([RECORD], MCL.request("SLOW", 89)) is None
 
 
 def test_only_the_first_piece_of_the_file_is_needed() -> None:
-    """A lost piece does no harm unless it is the first one."""
+    """The angle is in the first piece of the file. The loss of any other piece does no harm."""
     content = RECORD + b"10,,0.1,2\n" * 100
     first, *others = [content[at : at + PIECE] for at in range(0, len(content), PIECE)]
     assert recorded_deg([first, *others[1:]], MCR.request(90)) == -91.73
@@ -63,7 +64,10 @@ def test_only_the_first_piece_of_the_file_is_needed() -> None:
 
 @given(st.lists(st.binary(max_size=PIECE) | st.just(RECORD[:100]), max_size=4))
 def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
-    """Other files, or an incomplete beginning of a record, do not raise an error."""
+    """Other files, and records whose beginning is incomplete, contain no angle.
+
+    They do not raise an error.
+    """
     assert recorded_deg(pieces, MCR.request(90)) is None
 
 
@@ -87,7 +91,11 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 def test_a_server_without_records_is_asked_twice(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The manual does not say what is in the file, so the driver also works without it."""
+    """The manual does not say what the file contains, so a server may give no angle.
+
+    The robot reaches its goals without it. The driver requests the record of two turns, and then no
+    more.
+    """
     bench = MartBench("source").ready()
     if missing == "angle":
         monkeypatch.setattr(files, "_turn_record", lambda motion: ("MC spin",))
@@ -100,7 +108,10 @@ def test_a_server_without_records_is_asked_twice(
 
 
 def test_a_new_command_does_not_wait_for_the_record() -> None:
-    """The user stops the goal and drives while the record of a turn is on its way."""
+    """While the record of a turn is on its way, the user stops the goal and drives.
+
+    The robot drives at once.
+    """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, 0.0)
     bench.run_until(lambda: downloads(bench) == 1, 20.0)
@@ -122,7 +133,10 @@ def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
 
 
 def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> None:
-    """The new frame begins at the present heading, so there is nothing to correct."""
+    """The odometry is reset, and the record of a turn from before arrives.
+
+    The driver discards the record, because the new frame begins at the present heading.
+    """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
     bench.run_until(lambda: downloads(bench) == 1, 20.0)
@@ -133,7 +147,10 @@ def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> Non
 
 
 def test_a_record_makes_the_heading_more_certain_but_not_better_than_the_gyro() -> None:
-    """The covariance of the heading becomes that of an angle that the server reports."""
+    """A record reduces the variance of the heading to that of an angle from the gyro.
+
+    A record with an impossible angle, or a second record of the same turn, has no effect.
+    """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
     bench.run_until(lambda: downloads(bench) == 1, 20.0)

@@ -119,7 +119,7 @@ def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
 def test_readings_come_in_the_order_of_the_line() -> None:
     """Readings have the order of their frames.
 
-    The order matters because a pose includes the delta before.
+    The order matters because a pose includes the motion of the delta before it.
     """
     sent = [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0), PausedFrame(0)]
     kinds = [type(reading) for reading in readings(bot(), *sent)]

@@ -196,8 +196,8 @@ def test_a_frame_means_the_velocity_that_it_commands(
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
     """A velocity is encoded, and then read from the bytes again.
 
-    The two differ by 0.5 LSB of rounding. To avoid a byte that is a letter, it may be up to 1.5
-    LSB.
+    Because of rounding, the two may differ by 0.5 LSB. If the driver avoids a harmful byte, they
+    may differ by 1.5 LSB.
     """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)

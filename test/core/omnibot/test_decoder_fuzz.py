@@ -88,7 +88,7 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """A frame that fits the one before it is returned with its last byte.
+    """A frame that fits the one before it is returned as soon as its last byte has come.
 
     Only a frame whose last byte may begin a header must wait.
     """
@@ -175,7 +175,7 @@ def test_work_is_linear_and_memory_bounded(
 ) -> None:
     """A pattern that is hard to decode is repeated.
 
-    The last third costs about as much as the second.
+    The last third of the stream costs about as much work as the second third.
     """
     stream = pattern * (THIRD // len(pattern))
     if chunk_length < THIRD:

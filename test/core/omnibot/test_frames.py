@@ -100,9 +100,9 @@ def test_each_frame_table_is_laid_out_as_in_the_manual(
 
 
 def test_the_pose_may_be_little_endian() -> None:
-    """The manual may also mean that the bytes of each float are reversed.
+    """The manual can also be read such that the bytes of each float are reversed.
 
-    A setting selects this order.
+    A setting selects this byte order.
     """
     typed = bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 09")
     frame = PoseFrame(1000.0, -2.5, 1.0, 9)

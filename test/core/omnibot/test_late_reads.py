@@ -19,7 +19,8 @@ Reads = Iterator[tuple[bytes, float]]
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
 """Times in s for which a reader stops.
 
-Several are near 8.8 ms, for which the line is idle between two ticks, or 10 ms, a whole tick.
+Some are close to 8.8 ms, for which the line is idle between two ticks. Some are close to 10 ms, a
+whole tick.
 """
 
 
@@ -72,9 +73,9 @@ def heard(reads: Reads) -> list[Frame]:
 @pytest.mark.parametrize("stop_s", STOPS_S)
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: float) -> None:
-    """A reader stops once, between any two bytes of five frames. No frame is lost.
+    """A reader reads promptly for 0.5 s. Then it stops once, between any two bytes of five frames.
 
-    Before that, it has read promptly for 0.5 s.
+    No frame is lost.
     """
     ticks = ticks_of(name)[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -87,7 +88,10 @@ def test_a_reader_that_is_stopped_anywhere_loses_nothing(name: str, stop_s: floa
 @pytest.mark.parametrize("most", [1, 8, 32])
 @pytest.mark.parametrize("piece", [1, 4])
 def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: int) -> None:
-    """After a stop, a reader reads the bytes that waited in small pieces. No frame is lost."""
+    """After a stop, a reader reads only a few bytes at a time until it has caught up.
+
+    No frame is lost.
+    """
     ticks = ticks_of("driving")[:100]
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     begin = len(b"".join(ticks[:50]))

@@ -82,9 +82,10 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """All frames are lost for a while. The odometry then changes by at most 2 m/s and 8 rad/s.
+    """All frames are lost for a while.
 
-    The first step covers the whole gap, so it may be as large as a motion during the gap.
+    After that, no step of the odometry is faster than 2 m/s and 8 rad/s. The first step covers the
+    time of the whole gap, so it may be larger than the others.
     """
     for seed in range(5):
         on = line(seed, frame=frame)
@@ -205,9 +206,9 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 @pytest.mark.parametrize("use_board_pose", [True, False])
 @pytest.mark.parametrize("phase", range(5))
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
-    """A pose shows that deltas were lost, before the next delta does.
+    """Deltas are lost, and a pose arrives before the next delta.
 
-    Their motion is added only once.
+    Both show the motion of the lost deltas, which is added only once.
     """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)

@@ -132,7 +132,7 @@ def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: f
 def test_nobody_is_told_anything_of_right_settings(
     frame: str, order: str, start: BoardPose
 ) -> None:
-    """All settings are right, and the robot starts far away, at zero or close to zero.
+    """All settings are right. The robot starts at the origin, close to it, or far away.
 
     There is no advice.
     """

@@ -53,7 +53,7 @@ def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode)
 
 
 def test_only_p_is_ever_refused() -> None:
-    """Only P is refused in some modes. S and R are always allowed."""
+    """P is refused in some modes. S and R are allowed in every mode."""
     missing = {
         happening
         for happening, mode in product(Happening, Mode)
@@ -79,7 +79,7 @@ def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard
 def test_the_mode_is_imu_only_after_25_imu_frames_alone(mode: Mode) -> None:
     """25 IMU frames in a row show IMU-only mode.
 
-    After 24, five deltas may still be lost by chance.
+    24 do not, because five deltas may have been lost by chance.
     """
     made = tracker(mode)
     if mode is Mode.IMU_ONLY:
@@ -113,7 +113,7 @@ def test_r_makes_the_mode_unknown(mode: Mode) -> None:
 def test_imu_frames_from_before_r_do_not_count_after_it() -> None:
     """24 IMU frames come before R and one after it.
 
-    The mode is unknown, as R sets the count to 0.
+    The mode is unknown, because R sets the count to 0.
     """
     made = tracker(Mode.NOMINAL)
     for _ in range(24):

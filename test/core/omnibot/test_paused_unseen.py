@@ -14,7 +14,10 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 def test_what_was_commanded_before_it_ends_with_stop(
     kept_back: int, imu_only: bool, run: bool
 ) -> None:
-    """After such a pause, the board may resume an old command. The driver sends Stop for 1 s."""
+    """Another program pauses the board and starts it again.
+
+    The board may then resume an old command. So the driver sends Stop for 1 s.
+    """
     bench = Bench(BoardSettings(seed=2, running=True, imu_only=imu_only), run=run)
     bench.open()
     bench.run(2.0)

@@ -56,8 +56,8 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
     """After a pause, a delta has any count.
 
-    Either the board has restarted, or the old count continues. The explanation with fewer lost
-    deltas is accepted. If both have equally many, it is the restart.
+    Either the board has restarted, or the old count continues. The driver accepts the explanation
+    with fewer lost deltas. If both have equally many, it accepts the restart.
     """
     sequence = begun(count)
     sequence.pause()

@@ -21,7 +21,7 @@ def through(path: NetworkPath, every_s: float = 0.01) -> list[bytes]:
 
 
 def test_a_good_network_hands_over_at_once_and_in_order() -> None:
-    """A network without faults delivers each datagram at once, once and in order."""
+    """A network without faults delivers each datagram once, without delay and in order."""
     network = FaultyNetwork()
     network.to_board.send(b"hello", 1.0)
     assert network.to_board.arrived(1.0) == [b"hello"]

@@ -126,7 +126,8 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 
 
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
-    """Return whether command 0x11 sets the short correction to zero, even in an unchanged mode."""
+    """Return whether command 0x11 sets the short correction to zero. The mode stays the same here.
+    """
     rig = Rig(quirks)
     rig.run(2.1)
     rig.say(SetTerminalMode(TerminalMode.HOST))

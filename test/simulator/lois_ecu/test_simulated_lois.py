@@ -67,7 +67,7 @@ def test_periods_stretch_with_the_load() -> None:
 def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -> None:
     """20 RPM are commanded once.
 
-    Both wheels reach that speed and keep it, as set-points never expire.
+    Both wheels reach that speed and keep it, because set-points never expire.
     """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 10.0)
@@ -141,7 +141,7 @@ def test_terminal_mode_passes_lines_of_a_sensor_and_silences_the_protocol(quirks
 def test_without_checksum_it_takes_shorter_lines_alone(quirks: Quirks) -> None:
     """Checksums are switched off.
 
-    The board rejects lines that have one, but still sends its own.
+    The board rejects lines with a checksum, but its own lines still have one.
     """
     rig = Rig(quirks)
     rig.run(2.1)
@@ -266,7 +266,8 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 
 
 def test_planted_errors_are_in_the_truth_alone() -> None:
-    """The true wheels are 5 % larger than the board assumes. So its odometry is too short."""
+    """The true wheels are 5 % larger than the board assumes. So the board's odometry is too short.
+    """
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)
     rig.say(SetRpm(0, 0))

@@ -276,7 +276,10 @@ def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
 
 
 def test_a_documented_move_is_cancelled_at_any_time() -> None:
-    """A controlled move is stopped at any time. A server as in the manual answers it within 1 s."""
+    """A controlled move is stopped at any time.
+
+    A server as in the manual replies to the move within 1 s.
+    """
     for start, stop in (("TF 100", "SL"), ("TB 100", "SL"), ("MCR 170", "SS"), ("MCL 170", "SS")):
         for after_s in (0.02, 0.12, 1.0):
             rig = Rig(DOCUMENTED)

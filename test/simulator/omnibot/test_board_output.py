@@ -109,7 +109,7 @@ def test_a_sequence_goes_on_after_a_pause() -> None:
 def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
     """The board is paused and starts again.
 
-    Deltas and poses keep their ticks, as ticks always count.
+    Ticks are counted during the pause too, so deltas and poses keep their rhythm.
     """
     board = SimulatedBoard(RUNNING)
     run(board, 0.05)

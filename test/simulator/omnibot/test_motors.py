@@ -70,7 +70,7 @@ def test_the_effort_saturates() -> None:
 
 
 def test_efforts_within_the_dead_zone_move_nothing() -> None:
-    """A resting wheel does not turn at an effort within the dead zone, but at a larger one."""
+    """An effort within the dead zone does not turn a resting wheel. A larger effort turns it."""
     motor = Motor()
     assert motor.advance(DEAD_ZONE_PWM) == 0.0
     assert motor.advance(-DEAD_ZONE_PWM) == 0.0
@@ -84,7 +84,10 @@ def test_efforts_within_the_dead_zone_move_nothing() -> None:
 )
 @settings(max_examples=50)
 def test_friction_never_drives_a_wheel(efforts: list[float]) -> None:
-    """Whatever the efforts, a wheel never turns against both its motion and its effort."""
+    """Friction only slows a wheel down.
+
+    Whatever the efforts, the wheel reverses only if its effort points that way.
+    """
     motor = Motor()
     for effort in efforts:
         before = motor.speed

@@ -118,10 +118,7 @@ def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: Re
 
 
 def test_a_letter_after_a_stray_header_byte_is_a_letter() -> None:
-    """The letter S comes after a stray FF.
-
-    The receivers obey it, and only the naive one loses it.
-    """
+    """The letter S comes after a stray FF. All receivers obey it, except the naive one."""
     assert understood("FF 53") == [START]
     assert understood("FF 53", kind=WINDOW) == [START]
     assert understood("FF 53", kind=NAIVE) == []
@@ -209,7 +206,7 @@ def test_a_frame_without_its_header_acts_by_its_letters() -> None:
 
 
 def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
-    """FF FF FE begins a frame. Most receivers start it with the second FF."""
+    """FF FF FE begins a frame. Most receivers take the second FF as the beginning of the frame."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         typed = "FF FF FE 02 00 20 00 00 00 00"
         assert understood(typed, kind=kind) == [ControlFrame(0x02, (32, 0, 0))]
