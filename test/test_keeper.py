@@ -161,7 +161,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
 ) -> None:
     """The guard cannot be killed when the driver ends. The driver does not wait for it.
 
-    A suspended process that the driver cannot kill imitates an uninterruptible sleep.
+    In this test, the guard is a suspended process that the driver cannot kill.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

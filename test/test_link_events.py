@@ -67,9 +67,10 @@ def test_events_of_all_threads_leave_in_the_order_in_which_they_happened(board: 
 
 
 def test_a_listener_that_hangs_delays_no_estop_and_no_repetition(board: PtyBoard) -> None:
-    """A listener hangs. Neither a caller's e-stop nor the repetition of a command waits for it.
+    """A listener hangs.
 
-    The listener gets its events later, in order.
+    Neither a caller's e-stop nor the repetition of a command waits for the listener. The listener
+    gets its events later, in order.
     """
     listener, ours = Listener(), session()
     deliver, hang, goes_on = listener.deliver, threading.Event(), threading.Event()

@@ -101,7 +101,10 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """One of two clocks is read late. Their offset does not change. It changes if a clock steps."""
+    """The driver estimates the offset of two clocks.
+
+    A late reading of one clock does not change the estimate. A step of a clock changes it.
+    """
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
     assert messages.clock_offset(offset, 2_000, 500_002_900, 903_000) == offset

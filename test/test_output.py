@@ -52,7 +52,7 @@ def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
 def test_output_that_is_not_read_does_not_block_the_program() -> None:
     """The program prints more than all buffers can hold, and its output is not read.
 
-    It does not block.
+    The program does not block.
     """
     program = """
 import contextlib, os
@@ -73,7 +73,7 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """The output is not read, and Python prints a traceback after the context. This does not block.
+    """The output is not read. Python prints a traceback after the context, and this does not block.
 
     The pipe is exactly full (16 lines), or more output waits for it (100 lines).
     """

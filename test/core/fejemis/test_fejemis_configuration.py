@@ -193,9 +193,9 @@ def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
 
 
 def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
-    """The user's setting for checksums is wrong, so only heartbeats are decoded.
+    """The user's setting for checksums is wrong, so the driver decodes only heartbeats.
 
-    A notice explains it.
+    A notice says that the heartbeats contradict the setting.
     """
     bench = Bench(settings=FejemisSettings(line_sums="off"))
     bench.open()

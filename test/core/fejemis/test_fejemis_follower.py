@@ -160,9 +160,10 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """Motion is refused until ~/start. After a reconnect the driver starts the board by itself.
+    """After two faults, motion is refused until the user calls ~/start.
 
-    Motion is still refused, until the user calls ~/start.
+    After a reconnect the driver starts the board by itself. This start is not enough: motion is
+    still refused.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

@@ -313,7 +313,10 @@ def test_a_sum_lets_one_damaged_line_in_99_through() -> None:
 
 
 def test_what_is_a_command_without_its_last_character_is_asked_with_a_sum_alone() -> None:
-    """The query ``svpi`` without its ``i`` would set the servo. It is sent only with a checksum."""
+    """The query ``svpi`` without its ``i`` would set the servo.
+
+    So the driver sends this query only with a checksum.
+    """
     for sums in (True, False):
         polls = Polls("front")
         texts = [text for n in range(40) for text in polls.due(float(n), sums=sums)]

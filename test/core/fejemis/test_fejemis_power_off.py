@@ -50,7 +50,7 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> None:
     """The board does not confirm ``on``, and a line may be lost.
 
-    The driver sends it three times.
+    So the driver sends ``on`` three times.
     """
     mark = bench.now
     bench.hears = {FRONT}

@@ -172,7 +172,7 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
     """The robot is commanded to turn on the spot, and it does not roll before it turns.
 
-    If both boards got ``rc 2 0 w`` at once, it would roll 0.17 m.
+    If both boards got ``rc 2 0 w`` at once, the robot would roll 0.17 m.
     """
     bench = nominal()
     for _ in range(12):
@@ -185,7 +185,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
     """The turn on the spot is reversed, so the front wheel must turn by 180°, for over 1 s.
 
-    The robot rests until then, and no fault is reported.
+    While the wheel turns, the robot rests, and no fault is reported.
     """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)

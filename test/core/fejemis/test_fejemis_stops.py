@@ -84,8 +84,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
     """The heartbeat names the source of the command that the board obeys.
 
-    The source -1 proves that the board is paused. If the user latches and releases the e-stop
-    during a pause, the pause continues.
+    The source -1 proves a pause. The pause lasts even if the user latches and releases the e-stop.
     """
     bench = nominal()
     bench.drive_on()

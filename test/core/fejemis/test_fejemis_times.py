@@ -89,7 +89,10 @@ def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
 
 
 def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
-    """A restart soon after the start looks almost like late lines. The clock still notices it."""
+    """A restart soon after the start looks almost like late lines.
+
+    The clock still notices the restart.
+    """
     clock = TeensyClock()
     assert all(clock.see(0.1 + 0.02 * n, 5.0 + 0.02 * n) for n in range(30))
     restarts = 0

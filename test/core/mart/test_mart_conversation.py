@@ -264,8 +264,8 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
     """A second motion begins, and an encoder count of the motion before arrives.
 
-    Either this count is late, or the server has not received the start. So the pose does not
-    change.
+    Either this count is late, or the server has not received the start. In both cases the pose must
+    not change.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -324,9 +324,10 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """A check of the IMU usually takes a while. If the IMU is missing, the server answers at once.
+    """A check of the IMU usually takes a while.
 
-    It also does so if the command is unknown. The driver accepts such an early failure.
+    But if the IMU is missing or the command is unknown, the server answers at once. The driver
+    accepts such an early failure.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -302,7 +302,7 @@ def test_the_setting_of_the_clock_gives_way_to_the_users_first_job() -> None:
 def test_the_clock_is_set_while_the_robot_stands() -> None:
     """The driver sets the clock with TIME and six numbers, in UTC.
 
-    It does not do so during a drive.
+    During a drive it does not set the clock.
     """
     bench = MartBench().ready()
     assert bench.job(Job.TIME, 11, 22, 2026, 20, 15, 30).success

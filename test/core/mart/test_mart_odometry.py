@@ -123,8 +123,8 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
     """After a second motion the encoder count is the same as before it.
 
-    Either the start was lost, or an equal motion has ended. The covariance covers both, even after
-    a later count that is certain.
+    Either the start was lost, or an equal motion has ended. The covariance covers both cases, even
+    after a later count that is certain.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)

@@ -290,7 +290,7 @@ def test_a_restarted_driver_stops_what_it_meets() -> None:
 def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
     wish: str,
 ) -> None:
-    """The driver is killed at any moment of a motion. It has prepared stop commands before.
+    """During a motion, the driver has stop commands ready at any time. It is killed at any moment.
 
     For one second, the guard repeats these commands. The robot comes to rest.
     """

@@ -191,7 +191,10 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A paused text has lost one character. It is not returned, unless only a blank is missing."""
+    """A paused text has lost one character. The text is not returned.
+
+    There is one exception: the blank before the line feed may be missing.
+    """
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
     found = decoded([LEAD_IN + hurt + LEAD_IN + LEAD_IN])

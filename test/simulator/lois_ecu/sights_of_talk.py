@@ -68,7 +68,8 @@ def clock_in_ms(quirks: Quirks) -> bool:
 
 
 def clock_stops_while_sending(quirks: Quirks) -> bool:
-    """Return whether the board's clock is more than 3 % slow, as it stops during each message."""
+    """Return whether the board's clock is more than 3 % slow, because it stops during each message.
+    """
     rig = Rig(quirks)
     rig.run(3.0)
     began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]

@@ -27,9 +27,10 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """RM fails on some servers although the robot moves. The server then knows of no motion.
+    """Some servers answer RM with a failure although the robot moves.
 
-    So SRM fails and SL has no effect. Only a write to the motors stops the robot.
+    Such a server then knows of no motion. So SRM fails and SL has no effect. Only a write to the
+    motors stops the robot.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -143,7 +144,7 @@ def test_a_stuck_motor_is_told_of(text: str, seconds: float) -> None:
 def test_a_stuck_left_motor_is_not_noticed() -> None:
     """The left motor is stuck.
 
-    The server does not notice it, as only the right wheel has an encoder.
+    The server does not notice it, because only the right wheel has an encoder.
     """
     rig = Rig(stuck="left")
     rig.drive("F")

@@ -130,7 +130,7 @@ def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
 def test_rst_imu_proves_it_in_0_13_s() -> None:
     """RST IMU shows in 0.13 s whether the IMU works.
 
-    The server refuses it while the robot moves.
+    While the robot moves, the server refuses RST IMU.
     """
     rig = Rig()
     assert rig.ask("RST IMU") == "ok"
@@ -146,7 +146,7 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
     """The server has given up a dead IMU, and the IMU works again.
 
-    The server uses it only after a successful RST IMU or SB.
+    The server uses the IMU only after a successful RST IMU or SB.
     """
     for cure in ("RST IMU", "SB"):
         rig = Rig()

@@ -237,7 +237,7 @@ def test_a_quirk_is_unseen_on_a_server_as_documented(name: str) -> None:
 def test_what_only_the_source_says_is_played_only_if_it_is_asked_for(name: str) -> None:
     """Some quirks are only in the published source.
 
-    They are off unless that variant is selected.
+    They are on only in the variant that imitates this source.
     """
     assert SEEN[name](SOURCE)
     assert not SEEN[name](FIRMWARE)
