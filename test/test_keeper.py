@@ -18,7 +18,7 @@ from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """A suspended guard does not read the new stop bytes. The driver replaces it.
+    """A suspended guard does not read the new stop bytes. The driver replaces this guard.
 
     Otherwise the guard would later write outdated stop bytes.
     """

@@ -102,9 +102,9 @@ def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
 
 
 def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too() -> None:
-    """A port opens while the link closes. The link still writes a last Stop to it.
+    """A port opens while the link closes.
 
-    The robot may still follow a command from before the port was lost.
+    The link still writes a last Stop to this port, because the robot may follow an old command.
     """
     listener, started = Listener(), threading.Event()
     closer = threading.Thread(target=lambda: link.close("stop"))
@@ -127,8 +127,8 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
     """The port is lost during a drive, and the driver ends.
 
-    The driver tries to open the port once more for a Stop. It knows that the stop was sent and is
-    unconfirmed.
+    The driver tries to open the port once more for a Stop. The driver knows that this Stop was
+    sent, but that nothing confirms it.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()

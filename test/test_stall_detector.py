@@ -39,7 +39,7 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 
 
 def test_a_standstill_is_told_once_with_its_length() -> None:
-    """The first thread that runs after a stall reports it, and no other thread does.
+    """The first thread that runs after a stall reports the stall, and no other thread does.
 
     The next stall is reported again.
     """
@@ -71,8 +71,8 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
     """The driver stalls three times in a few seconds.
 
-    Commands from before the last stall are not fresh. On a very busy computer the driver may stall
-    again before a retransmission delivers a command.
+    Commands from before the end of the last stall are not fresh. A retransmission may deliver a
+    command only after a second or third stall.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
@@ -95,7 +95,7 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """A command sent shortly before a stall is not fresh, since it waited in a queue during it."""
+    """A command sent shortly before a stall is not fresh. It waited in a queue during the stall."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)

@@ -43,7 +43,10 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """The driver writes each setting to the board that uses it. It repeats this after a restart."""
+    """The driver writes each setting to the board that uses it, and reads it back.
+
+    After a restart of the board, the driver writes the setting again.
+    """
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))

@@ -169,7 +169,8 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
     """One port leads to a board of another robot. The driver sends only stops and queries to it.
 
-    It sends no ``start``, which could release a robot that another user stopped.
+    It must not send ``start``, because ``start`` could release a robot that another user has
+    stopped.
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
@@ -180,7 +181,7 @@ def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[i
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_never_speaks_is_missed(half: str) -> None:
-    """One board never sends anything. One notice names it."""
+    """One board never sends anything. One notice names this board."""
     bench = Bench()
     bench.speaks = {1 - HALVES[half]}
     bench.open()

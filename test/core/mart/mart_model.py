@@ -202,7 +202,7 @@ def sweeps_first(driver: Driver) -> bool:
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which the driver, after it has used the stop port, asks what still moves.
+    """Return the step in which the driver asks what still moves, after a stop on the stop port.
 
     First the driver asks for the server's name. The answer shows that all earlier datagrams have
     arrived or are lost. Then the driver asks whether a motion is in progress, and reads the encoder

@@ -64,11 +64,9 @@ STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 """Commands that the server may be executing when a driver starts."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times in s for which the network is interrupted after the start of the driver, one in each trial.
-"""
+"""Times in s for which the network is interrupted at first, one in each trial."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s for which the network then works, one in each trial. Then it is interrupted for 1 s.
-"""
+"""Times in s for which the network then works. After that, it is interrupted for 1 s."""
 ENDS_S, SETTLED_S = 16.0, 1.5
 
 

@@ -33,7 +33,7 @@ Handed = Iterator[tuple[float, bytes]]
 def ticks() -> Iterator[tuple[float, bytes]]:
     """Yield the time in s and the bytes of each tick of a robot at rest.
 
-    Its gyro reads -1, which has bytes like a header, more often than any value but 0.
+    After 0, the most frequent value of its gyro is -1, whose bytes look like a header.
     """
     board = SimulatedBoard(BoardSettings(seed=1, running=True))
     for tick in range(TICKS):
@@ -72,7 +72,7 @@ def behind_timer(timer_s: float) -> Handed:
 def test_hardly_a_frame_waits_for_the_next_packet(
     adapter: Callable[[], Handed], waits: float
 ) -> None:
-    """An IMU frame waits only if a delta may follow it, or if the adapter splits it."""
+    """An IMU frame waits only if a delta may follow it, or if the adapter splits the frame."""
     board = OmniBot(OmniBotSettings())
     ends: list[int] = []
     sent = 0

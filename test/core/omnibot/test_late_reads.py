@@ -39,10 +39,11 @@ def stopped(
 ) -> Reads:
     """Yield the reads of a reader that stops once, for ``stop_s``, after ``place`` bytes.
 
-    ``piece``: the number of bytes in each read before the stop.
+    After the stop the reader reads every 20 µs, until it has all bytes that have arrived.
 
-    ``most``: the largest number of bytes in a read. After the stop the reader reads every 20 µs,
-    until it has all bytes that have arrived.
+    ``most``: the largest number of bytes in a read.
+
+    ``piece``: the number of bytes in each read before the stop.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -168,8 +169,9 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
     """The line is cut within a frame and comes back within a later frame.
 
-    Together the two parts are as long as one frame. Only the pause between them shows that they are
-    two. The reader is prompt and measures this pause, so no false frame is returned.
+    Together the two parts are as long as one frame. Only the pause between the parts shows that
+    they belong to two frames. The reader is prompt and measures this pause, so no false frame is
+    returned.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
