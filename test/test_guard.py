@@ -231,8 +231,8 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
     """The guard gets heartbeats and stop bytes through one pipe.
 
-    It separates them correctly, wherever a read ends. Stop bytes may contain the letter ``e``,
-    which alone means a heartbeat with a latched e-stop.
+    The guard separates them correctly, wherever a read ends. Stop bytes may contain the letter
+    ``e``. Alone, this letter means a heartbeat with a latched e-stop.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

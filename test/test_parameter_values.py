@@ -174,8 +174,7 @@ def test_axis_signs_are_three_ones_of_either_sign(signs: object) -> None:
 def test_a_frame_name_is_not_empty_and_has_no_leading_slash(
     parameter: Parameter, wrong: str
 ) -> None:
-    """An empty frame name, or one with a leading slash, is refused, because it is invalid in tf2.
-    """
+    """An empty frame name, or one with a leading slash, is invalid in tf2, so it is refused."""
     with pytest.raises(ParameterError, match=f"'{parameter.name}'"):
         parameter.check(wrong)
 

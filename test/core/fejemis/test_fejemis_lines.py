@@ -201,7 +201,9 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
 
 
 def test_half_a_line_at_the_end_is_none() -> None:
-    """The bytes end without a line end. The last line is not decoded, because it may be incomplete.
+    """The bytes end without a line end.
+
+    The last line is not decoded, because it may be incomplete.
     """
     decoder = FejemisDecoder()
     assert feed(decoder, b"gyro 1 2 3") == []

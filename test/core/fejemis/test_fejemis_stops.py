@@ -176,7 +176,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
     """A lift voltage waits before it is sent. Its time limit begins when it is sent.
 
-    A stop before that discards the voltage.
+    If a stop comes before that, the voltage is discarded.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)

@@ -46,7 +46,9 @@ def test_a_reply_is_read(data: bytes) -> None:
 
 @given(st.binary(max_size=600))
 def test_no_datagram_raises(data: bytes) -> None:
-    """The decoder makes one message of each datagram, whatever its bytes. An empty one gives none.
+    """The decoder makes one message of each datagram, whatever its bytes.
+
+    An empty datagram gives no message.
     """
     assert len(MartDecoder().feed(data, 0.0)) == bool(data)
 

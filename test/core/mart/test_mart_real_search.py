@@ -56,8 +56,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver to send SRM and SM after a stop on the stop port, without asking what moves.
-    """
+    """Patch the driver to send SRM and SM after the stop port. It does not ask what moves."""
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
 

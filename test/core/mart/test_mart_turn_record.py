@@ -42,7 +42,9 @@ def downloads(bench: MartBench) -> int:
 
 
 def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
-    """The angle is the one at "stop detected" in the record. It includes the coasting of the robot.
+    """The driver uses the angle at "stop detected".
+
+    This angle includes the coasting of the robot.
     """
     assert recorded_deg([RECORD], MCR.request("SLOW", 90)) == -91.73
     assert recorded_deg([RECORD.replace(b"\n", b"\r\n")], MCR.request(90)) == -91.73

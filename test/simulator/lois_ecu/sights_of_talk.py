@@ -68,8 +68,7 @@ def clock_in_ms(quirks: Quirks) -> bool:
 
 
 def clock_stops_while_sending(quirks: Quirks) -> bool:
-    """Return whether the board's clock is more than 3 % slow, because it stops during each message.
-    """
+    """Return whether the board's clock is over 3 % slow, because it stops during each message."""
     rig = Rig(quirks)
     rig.run(3.0)
     began, counts = rig.now, [ticks_in(rig.run(0.5))[-1].time_counts]
@@ -127,7 +126,9 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 
 
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
-    """Return whether command 0x11 sets the short correction to zero. The mode stays the same here.
+    """Return whether command 0x11 sets the short correction to zero.
+
+    Here the mode stays the same.
     """
     rig = Rig(quirks)
     rig.run(2.1)

@@ -266,7 +266,9 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 
 
 def test_planted_errors_are_in_the_truth_alone() -> None:
-    """The true wheels are 5 % larger than the board assumes. So the board's odometry is too short.
+    """The true wheels are 5 % larger than the board assumes.
+
+    So the board's odometry is too short.
     """
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)

@@ -111,7 +111,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """A motor is stuck. The first RM fails without a reason, and an RM after F gives one."""
+    """A motor is stuck. The first RM fails without a reason. After F, an RM fails with a reason."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)

@@ -81,7 +81,9 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
-    """RMCS comes with one number, and the server refuses it. No other command counts its numbers.
+    """RMCS comes with one number, and the server refuses it.
+
+    Other commands do not count their numbers.
     """
     rig = Rig()
     rig.drive("RM 30")

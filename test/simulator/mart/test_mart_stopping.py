@@ -186,8 +186,8 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
     """A controlled move begins with a measurement of the gyro's bias, and SL comes in this time.
 
-    After 0.03 s SL is ignored. After 0.1 s it ends the move late, and the move is answered as
-    failed.
+    An SL after 0.03 s is ignored. An SL after 0.1 s ends the move late, and the server answers the
+    move with a failure.
     """
     rig = Rig()
     rig.say("TF 24")

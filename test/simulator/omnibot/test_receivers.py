@@ -165,7 +165,9 @@ def test_an_idle_gap_ends_half_a_frame() -> None:
 
 
 def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
-    """A pause within a frame is shorter than 5 ms. The frame continues, because bytes may be late.
+    """A pause within a frame is shorter than 5 ms.
+
+    The frame continues, because bytes may be late.
     """
     short, whole = "FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00"
     false = [ControlFrame(0x02, (0, 0, 255))]

@@ -59,8 +59,7 @@ def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
 
 
 def test_the_pose_frame_can_be_little_endian() -> None:
-    """The manual can also be read such that the bytes of each float in a pose frame are reversed.
-    """
+    """The manual can also be read such that the bytes of each float in a pose are reversed."""
     sent = pose_frame(1000.0, -2.5, 1.0, 7, "little")
     assert sent == bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 07")
 
