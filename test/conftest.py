@@ -37,7 +37,7 @@ settings.load_profile("same")
 
 
 WAITING = ("faults", "system", "tools")
-"""Folders with tests that wait in real time, and therefore are slow."""
+"""Folders with tests that wait in real time. These tests are slow."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

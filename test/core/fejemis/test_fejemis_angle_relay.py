@@ -121,7 +121,7 @@ def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() 
 @pytest.mark.parametrize("sums", [True, False])
 @pytest.mark.parametrize("angle_deg", [0.3, 5.5, 12.4, 45.5, -6.25, -64.9])
 def test_the_mean_of_what_is_told_is_the_angle(angle_deg: float, *, sums: bool) -> None:
-    """The driver adds the rounding error of an angle to the next one, so the mean is exact."""
+    """The driver adds the rounding error of an angle to the next angle, so the mean is exact."""
     relay = AngleRelay()
     told = [float(relay.text(math.radians(angle_deg), sums=sums)[4:]) for _ in range(200)]
     assert sum(told) / len(told) == pytest.approx(angle_deg, abs=0.01)

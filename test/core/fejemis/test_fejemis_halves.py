@@ -112,9 +112,10 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """The port of one board disappears while the robot drives. The link opens only the other port.
+    """The port of one board disappears while the robot drives.
 
-    The other board receives a stop, and motion is refused until both ports are open.
+    Then the link can open only the other port. The other board receives a stop, and motion is
+    refused until both ports are open.
     """
     bench = nominal()
     bench.drive_on()

@@ -170,7 +170,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """The lift line has 60 to 100 % of the requested voltage, and at most the requested time.
 
-    If one or two characters are lost, the board reads at most 12 V, and no longer time.
+    If one or two characters are lost, the board reads at most 12 V, and never a longer time.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)

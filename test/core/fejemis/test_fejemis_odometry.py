@@ -116,7 +116,7 @@ def test_a_gap_is_settled_by_the_pose_after_it() -> None:
 def test_a_false_pose_moves_nothing(damage: Callable[[BoardPose], BoardPose]) -> None:
     """A false pose arrives, and the odometry skips it.
 
-    The next correct pose continues as before.
+    With the next correct pose, the odometry continues.
     """
     drive = Drive()
     drive.run(0.0, 0.0, 0.1)

@@ -220,7 +220,7 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """The driver sends each command that it uses as in the command's golden line.
+    """If the driver uses a command, it sends the command in the form of the golden line.
 
     It never sends the other commands, such as ``setid``, which can erase the board.
     """

@@ -24,7 +24,10 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 
 def late(chance: random.Random) -> float:
-    """Return the delay of a read in s: 0.36 ms on average, and in one of 100 up to 20 ms more."""
+    """Return the delay of a read in s: 0.36 ms on average.
+
+    In 1 % of the reads, it is longer by up to 20 ms.
+    """
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 

@@ -128,7 +128,10 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 
 @pytest.mark.parametrize("text", [b"Paused: 3\n", b"Paused: 3 \r\n", b"Paused: 3\r\n"])
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
-    """A paused text may end with other white space than in the manual, as firmware may differ."""
+    """A paused text may end with other white space than in the manual.
+
+    Firmware may differ in this.
+    """
     assert decode(text) == PausedFrame(3)
 
 

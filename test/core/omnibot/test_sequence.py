@@ -145,8 +145,8 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
     """Two seconds after the count 205, a delta has the count 0.
 
-    A continued count would be 0 too, because 50 deltas fit into this time. The next pose has the
-    count 0 as well, which shows a restart.
+    A continued count would be 0 too, because 50 deltas fit into this time. The next pose also has
+    the count 0. A continued pose counter would not be 0, so the board has restarted.
     """
     sequence = Sequence()
     for count in range(206):
@@ -211,8 +211,8 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
     """While the host's clock stood still, 100 deltas were lost.
 
-    So the next count is far ahead of the time. The lost deltas are counted when the delta after it
-    confirms the count.
+    So the count of the next delta is too high for the elapsed time. When the delta after it
+    confirms this count, the lost deltas are counted.
     """
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
@@ -249,9 +249,9 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """After 3 s of silence, a delta has the count 0, but only four IMU frames have arrived.
+    """After 3 s of silence, four IMU frames and a delta with the count 0 arrive.
 
-    A continued count would mean that many deltas were lost. So the board has restarted.
+    A continued count would not be 0 at this time. So the board has restarted.
     """
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)

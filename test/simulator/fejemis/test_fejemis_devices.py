@@ -156,7 +156,7 @@ def test_configuration_is_lost_in_a_restart_unless_it_was_saved() -> None:
 def test_id_zero_erases_the_configuration() -> None:
     """``setid 0`` erases the configuration.
 
-    ``eew`` saves one again only after another ``setid``.
+    After that, ``eew`` saves nothing until another ``setid`` comes.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "setname cart", "confw 0.08 0.08 20 64 0.41", "eew", "setid 0")
