@@ -72,7 +72,7 @@ def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_names_its_simulated_board(name: str) -> None:
-    """The command ``simulator --board`` runs a profile's simulated board by the profile's name."""
+    """The command ``simulator --board NAME`` runs the simulated board of the profile NAME."""
     module = boards.load(name).SIMULATOR
     assert module == f"omnibot_driver.simulator.{name}"
     assert name in simulated_boards()

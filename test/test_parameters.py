@@ -192,7 +192,7 @@ def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_contro
 def test_values_reach_the_core_under_their_meaning() -> None:
     """The value of each parameter arrives in the setting that has the same meaning.
 
-    All values differ from their defaults, so the test would find one in the wrong place.
+    All values differ from their defaults, so the test would find a value in the wrong place.
     """
     values = check_all(
         {

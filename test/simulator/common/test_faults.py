@@ -31,7 +31,7 @@ def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
 ) -> None:
     """The same bytes are sent whole and in chunks.
 
-    The same ones are lost or changed, also in bursts.
+    Each time, the same bytes are lost or changed, also in bursts.
     """
     faults, data = LineFaults(lose=0.01, burst=0.005, flip=0.01), SENT[:2000]
     line = FaultyLine(faults, seed)

@@ -33,7 +33,7 @@ def test_a_good_network_hands_over_at_once_and_in_order() -> None:
 def test_datagrams_are_lost_at_the_given_rate() -> None:
     """With a loss rate of 0.1, one datagram in ten is lost.
 
-    The two directions lose different ones.
+    Each direction loses different datagrams.
     """
     network = FaultyNetwork(NetworkFaults(lose=0.1))
     there, back = through(network.to_board), through(network.from_board)

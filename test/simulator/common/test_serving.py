@@ -113,7 +113,10 @@ def test_empty_datagrams_and_several_at_once_come_apart(client: socket.socket) -
 
 
 def test_what_nobody_asked_for_is_dropped_and_counted() -> None:
-    """A board sends a datagram before any request has come. Without a receiver, it is dropped."""
+    """A board sends a datagram before any request has come.
+
+    The datagram has no receiver, so it is dropped.
+    """
 
     class Talking(ToyServer):
         def advance(self) -> list[tuple[int, bytes]]:

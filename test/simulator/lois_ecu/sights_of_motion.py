@@ -53,9 +53,10 @@ def velocity_may_be_nan(quirks: Quirks) -> bool:
 
 
 def sign_of_command(quirks: Quirks) -> bool:
-    """Return whether the measured speed is negative before the wheel reverses.
+    """Return whether the measured speed of a reversing wheel is negative too early.
 
-    The robot drives forward, and gets a command to drive backward.
+    The wheel turns forward, and a command to drive backward comes. The measured speed is already
+    negative while the wheel still turns forward.
     """
     rig = Rig(quirks).booted()
     rig.drive(30, 40, 6.0)

@@ -211,7 +211,7 @@ def test_undocumented_moves_answer_ok(text: str) -> None:
 
 
 def test_the_port_is_silent_during_a_controlled_move() -> None:
-    """TF SLOW 80 takes 20 s. Requests that come in this time are answered after it."""
+    """TF SLOW 80 takes 20 s. Requests that come in this time are answered afterwards."""
     rig = Rig()
     rig.say("TF SLOW 80", "ENC", "RMRA")
     assert rig.run(15.0) == []

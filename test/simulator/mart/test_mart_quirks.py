@@ -83,10 +83,7 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether, after a stop that took 0.57 s, the next RM fails at once.
-
-    The RM after that succeeds.
-    """
+    """Return whether the first RM after a stop of 0.57 s fails at once. The second RM succeeds."""
     rig = Rig(quirks)
     rig.drive("RM 66")
     assert rig.ask("SRM") == "ok"
