@@ -56,7 +56,10 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver to send SRM and SM after the stop port. It does not ask what moves."""
+    """Patch the driver to send SRM and SM after it has used the stop port.
+
+    The patched driver does not ask what still moves.
+    """
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
 
