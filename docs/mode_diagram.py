@@ -29,7 +29,7 @@ Point = tuple[float, float]
 
 
 def svg() -> str:
-    """Return the picture. Arrows show what changes the mode, and boxes show what does not."""
+    """Return the picture. Arrows show events that change the mode; boxes show those that do not."""
     pairs = [(before, after) for before in Mode for after in Mode if before is not after]
     return "\n".join(
         [
@@ -91,9 +91,10 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 
 
 def _label(before: Mode, after: Mode) -> list[str]:
-    """Return the label of an arrow: at the middle of a horizontal arrow, else near the start.
+    """Return the label of an arrow.
 
-    At these places no two labels overlap.
+    The label is at the middle of a horizontal arrow, and near the start of any other arrow. At
+    these places, labels do not overlap.
     """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)

@@ -2,8 +2,8 @@
 
 """Launch file that publishes the robot's description and fixed frames; it can also start RViz.
 
-robot_state_publisher and the driver put ``frame_prefix`` before the names of frames only. The names
-of joints stay the same.
+robot_state_publisher and the driver put ``frame_prefix`` before the names of frames, but not before
+the names of joints.
 """
 
 from launch import LaunchDescription

@@ -111,10 +111,10 @@ class Serializer:
 
 
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
-    """Return the planar part of a serialised geometry_msgs/Twist, and whether it has no other part.
+    """Return the planar part of a serialised Twist, and whether all its other parts are zero.
 
-    Raises CommandRefused for NaN or infinity. Raises it also for bytes that are not a Twist,
-    because a middleware might deliver such bytes.
+    Raises CommandRefused for NaN or infinity, and for bytes that are not a geometry_msgs/Twist. A
+    middleware might deliver such bytes.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)

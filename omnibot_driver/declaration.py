@@ -53,8 +53,8 @@ def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[s
     """Return the values of all the driver's parameters after a change.
 
     ``values`` are the values before the change. Each value is converted to the type of its
-    parameter. ROS accepts an integer for a real parameter, and without the conversion a message
-    would publish that integer as 0.
+    parameter, because ROS accepts an integer for a real parameter. Without the conversion, a
+    message would publish that integer as 0.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})

@@ -171,7 +171,7 @@ def _run(ending: Ending, args: list[str]) -> None:
 def _set_deadline() -> None:
     """End the process if the shutdown takes longer than ``LONGEST_END_S``.
 
-    The guard then stops the robot.
+    In this case the guard stops the robot.
     """
 
     def give_up() -> None:

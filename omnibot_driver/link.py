@@ -30,17 +30,17 @@ from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s. The reader may have to wait until the guard has repeated
-Stop, which takes less."""
+Stop. This wait is shorter than ``JOIN_TIMEOUT_S``."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board's proof takes
-longer, the driver waits that long. Without a proof, the guard then repeats Stop."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board needs more time
+for a proof, the driver waits for that time. If no proof comes, the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, if no guard process can repeat Stop. It replaces
 ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
-"""Longest wait, in s, for a second proof that the robot is at rest. If a board's proof takes
-longer, the driver waits that long. The driver sends nothing during this wait, so the second proof
-shows that the board received the last Stop undamaged."""
+"""Longest wait, in s, for a second proof that the robot is at rest. If a board needs more time for
+a proof, the driver waits for that time. The driver sends nothing during this wait. So the second
+proof shows that the board received the last Stop undamaged."""
 
 T = TypeVar("T")
 

@@ -5,8 +5,8 @@
 The calls are made in the order of the events that caused them. A thread queues a call while it
 holds the lock under which the event occurred. It makes the queued calls after it has released that
 lock, so a slow listener does not delay commands. Only one thread makes calls at a time. A second
-thread that wants to make calls leaves them to the first. This module knows threads; it does not
-know what is delivered.
+thread that wants to make calls leaves its calls to the first one. This module knows threads; it
+does not know what is delivered.
 """
 
 import threading
@@ -15,8 +15,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls from which ``deliver`` waits for the listener. With fewer queued calls, it
-leaves them to the thread that makes calls now."""
+"""Number of queued calls from which ``deliver`` waits while another thread makes calls. With fewer
+queued calls, ``deliver`` leaves them to that thread and returns at once."""
 
 Delivery = Callable[[], object]
 
@@ -54,7 +54,7 @@ class Outbox:
 
     @property
     def full(self) -> bool:
-        """Whether ``MOST_WAITING`` calls wait. Then do not queue calls that can be omitted."""
+        """Whether ``MOST_WAITING`` calls wait. If so, do not queue calls that can be omitted."""
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:

@@ -151,7 +151,8 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock.
 
-        This clock is 0 at first, and measurements are not published then. It may also jump back.
+        This clock is 0 at first. While it is 0, measurements are not published. The clock may also
+        jump back.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -177,7 +178,7 @@ class Publishing:
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
-        """Return a function that publishes packets, those of each channel on a topic of its own."""
+        """Return a function that publishes packets. Each channel has a topic of its own."""
         publishers = [
             self._node.create_publisher(UInt8MultiArray, f"{topic}/{name}".rstrip("/"), RAW_DEPTH)
             for name in self._channels
@@ -230,9 +231,10 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text was not logged since valid data last arrived from the board.
+        """Return whether this text is new: not logged since valid data last came from the board.
 
-        So a port that is lost and opened again and again is reported once.
+        So if a port is lost and opened again and again without valid data, this is reported only
+        once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

@@ -109,7 +109,7 @@ class Reader:
         self._outbox.deliver()
 
     def _attach_anew(self, port: Transport) -> None:
-        """Begin a new connection, because a line of the board was lost or connected."""
+        """Begin a new connection, because one of the board's lines was lost or opened again."""
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
@@ -168,7 +168,7 @@ class Reader:
     def _process(self, now: float) -> None:
         """Let the session act on received bytes. The caller holds the lock.
 
-        The measurements in these bytes have been delivered before.
+        The measurements in these bytes were already delivered.
         """
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:

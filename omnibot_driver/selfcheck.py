@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on settings of the computer and of other nodes that disturb the driver.
+"""Advice on what disturbs the driver: settings of the computer, and other nodes.
 
 This module checks the USB adapter of an open port, the clock, nodes of the same name, and
 publishers of ``cmd_vel`` with another message type. It reads sysfs; it does not use pyserial, ROS

@@ -61,8 +61,9 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the board is sent when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop was written to every line. It is written when the link ends, or
-        later if the port was lost while the robot drove."""
+        """Whether the last Stop was written to every line. The last Stop is written when the link
+        ends. If the port was lost while the robot drove, the last Stop is written when the port is
+        open again."""
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
@@ -130,7 +131,8 @@ class SharedSession:
     def blocked(self) -> bool:
         """Whether the port did not accept the last packets and will be opened again.
 
-        This is True only for a moment: the reader, which opens the port again, is already awake.
+        This is True only for a moment, because the reader is already awake and opens the port
+        again.
         """
         with self.lock:
             return self.write_error is not None
@@ -191,7 +193,7 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer runs, and with it the watchdog. Send a heartbeat if one is due."""
+        """Record that the pacer, and so the watchdog, runs. Send a heartbeat if one is due."""
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())

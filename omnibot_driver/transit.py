@@ -38,12 +38,12 @@ LARGEST_DRIFT: Final = 5e-4
 and NTP corrects a clock at most at this rate."""
 CLOCK_RETREATS: Final = 10.0
 """A message is assigned to the sender that it fits best. A message that is 1 s too early for a
-sender fits it as badly as a message that is this number of seconds too late."""
+sender fits as badly as a message that is ``CLOCK_RETREATS`` seconds too late."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender is regarded as known, because at least one
-of them had almost no delay. With fewer messages, all of them may have been delayed. Then the
-estimated send time of the next message is too late."""
+of them had almost no delay. If there are fewer messages, perhaps all of them were delayed. In that
+case the estimated send time of the next message is too late."""
 
 Differences = tuple[float, float]
 """Time of our clock when a message arrived, minus the time of the sender's clock when it was sent.

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The boards that the driver works with: a profile of each, imported when it is chosen.
+"""The boards that the driver supports. Each has a profile, which is imported only if it is chosen.
 
-A profile is the only module outside the core that knows its board. It has the board's parameters,
-and makes the board's objects from their values. The rest of the driver works with any board.
+A profile is the only module outside the core that knows its board. The profile has the board's
+parameters, and makes the board's objects from their values. The rest of the driver works with any
+board.
 """
 
 from collections.abc import Callable, Mapping
@@ -27,8 +28,8 @@ PROFILES: Final = {
 DEFAULT: Final = "omnibot"
 
 Publish = Callable[[Any, int], None]
-"""Function that publishes one value. Only this board has values of this type. The second argument
-is the stamp in ns of ROS time."""
+"""Function that publishes one value, of a type that only one board has. The second argument is the
+stamp in ns of ROS time."""
 
 
 class Profile(Protocol):
@@ -53,7 +54,7 @@ class Profile(Protocol):
         """Return the kinematics of the wheels, from checked values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Create the publishers, services and subscriptions on the node that only this board has.
+        """Give the node the publishers, services and subscriptions that only this board has.
 
         Returns the functions that publish the values of ``Extra`` events, by type of value. The
         methods ``call`` and ``command`` of ``link`` give access to the session. The driver calls
@@ -88,8 +89,9 @@ def table_for(given: Mapping[str, object]) -> Table:
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     """Return the values of all parameters of the given board.
 
-    Raises ParameterError if a value is wrong, or if the board lacks a given parameter. The error
-    then names the boards that have this parameter, or the parameter with the nearest name.
+    Raises ParameterError if a value is wrong, or if the board lacks a given parameter. For a
+    parameter that the board lacks, the error names the boards that have it. If no board has it, the
+    error names the parameter with the nearest name.
     """
     table = table_for(given)
     for name in given:

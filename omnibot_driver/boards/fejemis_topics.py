@@ -212,7 +212,7 @@ class FejemisTopics:
     def _lift(self, link: Any) -> Callable[..., None]:
         """Return the callback of ``lift_cmd``.
 
-        It obeys a command of 0 V in any state of the boards, however old the command is.
+        The callback obeys a command of 0 V in any state of the boards, however old the command is.
         """
 
         def lift(session: Session, message: Float32, now: float) -> None:
@@ -244,7 +244,7 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``off``: whether the action switches something off, which is always possible.
+        ``off``: whether the action switches something off. Such an action needs no connection.
         """
 
         def say(session: Session, now: float) -> str:

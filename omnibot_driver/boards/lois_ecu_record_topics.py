@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Services that start a record of the LOIS ECU. Each answers when the record's file is written.
+"""Services that start a record of the LOIS ECU, and answer when the record's file is written.
 
 This module only connects ROS to the session.
 """

@@ -2,9 +2,9 @@
 
 """The numbers of the command TIME, and when they may be sent.
 
-The server ignores the seconds of TIME: it sets its clock to the full minute. It also computes the
-heading with this clock. If the clock is set back between two motions, the heading is wrong. This
-module knows times only.
+The server ignores the seconds of TIME: it sets its clock to the full minute. The server also
+computes the heading with this clock. If the clock is set back between two motions, the heading is
+wrong. This module knows times only.
 """
 
 import time
@@ -19,7 +19,7 @@ def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second for TIME (UTC), or None if TIME must wait.
 
     ``now_s``: this computer's time in s since 1970. ``may_set_back``: whether the server's clock
-    may be set back. If not, TIME must wait for the end of a minute. At the end of a minute, the
+    may be set back. If not, TIME must wait for the end of a minute. In the seconds ``ENDS_S``, the
     numbers are those of the next minute.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S

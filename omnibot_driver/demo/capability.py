@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo must know about a board. The board's profile contains it, so nothing has to run.
+"""What the demo must know about a board. It comes from the board's profile; nothing has to run.
 
 This module must not name a board, and must not use ROS or processes.
 """
@@ -24,8 +24,8 @@ class Capability:
 
     ``sideways``: whether the robot can drive along its y axis.
 
-    ``ports``: the driver's parameter for each address that the simulator prints. It is empty if
-    another address determines this one.
+    ``ports``: the driver's parameter for each address that the simulator prints. The name is empty
+    if the driver derives the address from another one.
 
     ``real``: arguments of the driver for the real robot.
 

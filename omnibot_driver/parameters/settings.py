@@ -2,8 +2,8 @@
 
 """Settings of the core's session, made from checked parameter values.
 
-If a board's table lacks a parameter, the parameter has no meaning for this board. The settings then
-have a default in its place.
+If a board's table lacks a parameter, the parameter has no meaning for this board. In its place, the
+settings have a default.
 """
 
 import math

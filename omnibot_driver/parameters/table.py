@@ -61,8 +61,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""By the name of a common parameter: a function that returns whether a board with these traits has
-the parameter. A parameter that is not listed has no such condition."""
+"""For each listed common parameter: a function that returns whether a board with given traits has
+the parameter. Common parameters that are not listed do not depend on the traits."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -78,8 +78,8 @@ DISPENSABLE: Final = frozenset(
         "twist_angular_stddev",
     }
 )
-"""Common parameters that a board may omit. The driver reads all other common parameters on each
-board whose traits they fit, so a board must have them."""
+"""Common parameters that a board may omit. A board must have all other common parameters that fit
+its traits, because the driver reads them."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
 """Values of ``on_exit`` besides stop, each with the request that a board must support for it."""
 

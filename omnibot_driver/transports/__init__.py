@@ -42,7 +42,7 @@ class Transport(Protocol):
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether nothing outside this process receives what is written."""
+        """Whether what is written stays in this process, as with a simulated board in memory."""
 
     @property
     def overruns(self) -> int | None:
@@ -58,8 +58,8 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets; discard packets for a missing line.
 
-        Raises LinkError if a line is lost. Then bytes that were written but not sent yet are
-        discarded.
+        Raises LinkError if a line is lost. In this case, bytes that were written but not sent yet
+        are discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

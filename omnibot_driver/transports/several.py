@@ -65,9 +65,10 @@ class Several:
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """Descriptors of all lines, by channel; None for a missing line, even if it is still open.
+        """Descriptors of all lines, by channel; None for a missing line.
 
-        If another process had a copy of that descriptor, the driver could not open the line again.
+        A missing line may still have an open descriptor. This descriptor is not given to the guard:
+        with a copy in another process, the driver could not open the line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -78,7 +79,7 @@ class Several:
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether nothing outside this process receives what is written to any open line."""
+        """Whether what is written to the open lines stays in this process."""
         return all(port.ends_with_us for port in self._ports)
 
     @property
@@ -93,7 +94,8 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines that have bytes are read in turn.
 
-        Raises LinesChanged when a line is lost or open again, and LinkError when all are missing.
+        Raises LinesChanged when a line is lost or open again, and LinkError when all lines are
+        missing.
         """
         if not self._ready:
             self._open_missing()
@@ -156,7 +158,10 @@ class Several:
         return [line.port for line in self._lines if line.port is not None]
 
     def _shared_out(self, packets: Packets) -> "Iterator[tuple[Line, bytes]]":
-        """Yield each line with all its bytes, in the order of the first packet for each line."""
+        """Yield each line once, with the joined bytes of all packets for this line.
+
+        A line whose first packet comes earlier is yielded earlier.
+        """
         for channel in dict.fromkeys(channel for channel, _ in packets):
             own = tuple(packet for packet in packets if packet[0] == channel)
             yield self._lines[channel], joined(own)
@@ -188,7 +193,7 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write waiting bytes to lines with room, and let ``poll`` watch the others for room.
+        """Write waiting bytes to lines with room. Let ``poll`` watch the lines without room.
 
         A line that has no room for ``WRITE_TIMEOUT_S`` is regarded as missing.
         """
@@ -255,7 +260,7 @@ class Line:
         self.trouble, self.waits, self.watched = "", b"", False
 
     def write(self, data: bytes, now: float) -> bool:
-        """Write ``data`` after the waiting bytes; return False if bytes have waited for too long.
+        """Write the waiting bytes, then ``data``; return False if bytes have waited for too long.
 
         If the line is missing but still open, only the bytes that it accepts at once are written.
         """
@@ -272,7 +277,8 @@ class Line:
     def flush(self, now: float) -> bool:
         """Write waiting bytes; return False if some of them have waited for ``WRITE_TIMEOUT_S``.
 
-        Then these bytes are discarded, and also bytes that were written but not sent yet.
+        If the result is False, the waiting bytes are discarded, and also bytes that were written
+        but not sent yet.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

@@ -37,7 +37,7 @@ class SimulatedTransport:
     overruns: int | None = None
     """None, because a channel in memory does not count lost bytes."""
     ends_with_us: bool = True
-    """Always True: nothing outside this process receives what is written."""
+    """Always True, because the simulated board is in this process."""
     descriptors: tuple[int, ...] | None = None
     """None, because another process cannot inherit a channel in memory."""
 

@@ -153,7 +153,7 @@ class UdpPorts:
 
 
 def _is_silence(error: OSError) -> bool:
-    """Return whether the error only means that the other side does not listen at present."""
+    """Return whether the error only means that the host does not listen at present."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
 
 

@@ -117,9 +117,10 @@ class CommandEncoder:
     def drive_to(self, pose: Pose) -> bytes:
         """Encode a goal for positional control.
 
-        A goal of zero is a place, so it is not replaced by Stop. Raises CommandRefused if a
-        coordinate exceeds 16 bits, or if its high byte is one of the letters S, P and R. If the
-        line loses bytes, the board could obey such a byte as a letter.
+        A zero velocity is sent as Stop, but a zero goal is not. It is a real position: the origin.
+
+        Raises CommandRefused if a coordinate exceeds 16 bits, or if its high byte is one of the
+        letters S, P and R. If the line loses bytes, the board could obey such a byte as a letter.
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)

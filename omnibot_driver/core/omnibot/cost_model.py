@@ -66,7 +66,8 @@ BAD_TEXT: Final = 4.0
 KNOWN_GAP: Final = 11.0
 """Cost of a pause within a frame, on a line that so far paused only between frames.
 
-With this cost, the decoder does not accept the frame at once, but accepts it on more evidence.
+This cost is so high that the decoder does not accept the frame at once. It is low enough for the
+decoder to accept the frame when there is more evidence.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -104,8 +105,7 @@ With deltas at 25 Hz, four IMU frames per delta and five deltas per pose are exp
 """
 
 CONTRADICTED: Final = 1.5
-"""Cost of a pose that contradicts the deltas: its turn since the last pose differs from their
-sum."""
+"""Cost of a pose whose turn since the last pose differs from the sum of the turns in the deltas."""
 
 IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
@@ -272,8 +272,9 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the last byte of this frame may belong to the next header.
 
-    This is impossible if the byte is not part of any header. It is also impossible for an IMU frame
-    whose last word is the same as in the IMU frame before, unless the byte is FF.
+    The byte must be part of some header. Of an IMU frame, the last word must also differ from that
+    of the IMU frame before. A last byte FF is an exception: it may belong to the next header even
+    if the word is the same.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

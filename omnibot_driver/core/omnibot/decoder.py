@@ -6,10 +6,10 @@ The protocol has no checksum. Read as a word, a header is one of the most common
 at rest. So a header alone proves nothing. The bytes around a frame decide whether the decoder
 accepts it:
 
-* *In step* means that the frame begins right after an accepted one. The decoder returns it as soon
-  as its last byte arrives, unless evidence speaks against it. There is such evidence if the bytes
-  after it do not begin like a frame, or if its content is a spike. Other evidence is that the line
-  was idle within it, or that its last byte may belong to the next header.
+* *In step* means that the frame begins right after an accepted one. If no evidence speaks against
+  the frame, the decoder returns it as soon as its last byte arrives. Four kinds of evidence speak
+  against a frame. The bytes after the frame do not begin like a frame. Its content is a spike. The
+  line was idle within the frame. Its last byte may belong to the next header.
 * *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
   cost, which is the sum of the evidence against it (``cost_model``). The decoder returns a frame of
   the cheapest interpretation when every interpretation without this frame costs clearly more.
@@ -53,8 +53,8 @@ SHORTEST_RUN: Final = DELTA_LENGTH
 CALM_S: Final = 10.0
 """Time in s without damage after which a line is regarded as one that loses few bytes.
 
-The last byte of a frame may be the first byte of the next header, if bytes were lost. On a line
-that loses few bytes, the decoder needs less evidence that this is not the case.
+If bytes were lost, the last byte of a frame may be the first byte of the next header. On a line
+that loses few bytes, the decoder needs less evidence that this byte belongs to the frame.
 """
 FRAMES_TO_SETTLE: Final = 3
 """An uncertain frame is discarded when this number of certain frames has followed it."""
@@ -73,8 +73,8 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    The module ``single_imu`` decodes some frames without this class. It then updates the following
-    attributes:
+    The module ``single_imu`` decodes some frames without this class. For each of these frames, it
+    updates the following attributes:
 
     ``context``: what the frames so far show.
 
@@ -248,7 +248,7 @@ class FrameDecoder:
         return self.last_arrival_s - self._damaged_at_s > CALM_S
 
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
-        """Accept all frames of ``walk`` except the last two, because odd bytes follow these.
+        """Accept all frames of ``walk`` except the last two, because odd bytes follow the last two.
 
         The result is always False, so that ``_walk`` can return it.
         """
@@ -302,10 +302,10 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """Yield each decided piece with whether to accept it, up to the first undecided one.
+        """Yield the pieces before the first undecided one, each with whether to accept it.
 
         A piece is decided if later bytes cannot change the result. A piece that ends at or before
-        the position ``until`` has waited long enough, so it is decided as well.
+        the position ``until`` has waited long enough, so it is also decided.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

@@ -65,7 +65,7 @@ class FrameSchedule:
 
         ``skipped``: number of bytes right before the frame that belong to no frame.
 
-        Each lost IMU frame is returned only once. For a pose the result is 0: IMU frames that were
+        Each lost IMU frame is counted only once. For a pose the result is 0. IMU frames that were
         lost before a pose are included in the result for the next frame.
         """
         cycle = self._cycle

@@ -24,8 +24,8 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""The bytes of headers. A frame that ends with one of them may have lost a byte. Then its last byte
-belongs to the next header."""
+"""The bytes of headers. A frame that ends with one of these bytes may have lost a byte. If it has,
+its last byte belongs to the next header."""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")

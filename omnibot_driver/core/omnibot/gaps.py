@@ -112,8 +112,8 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Learn from accepted frames whether the pauses of this line are between frames.
 
-        The line causes pauses only between frames; an adapter causes pauses anywhere. ``ends``: the
-        position after each accepted frame among the bytes held.
+        The line causes pauses only between frames; an adapter causes pauses anywhere. ``ends``: for
+        each accepted frame, the position of the byte after it, among the bytes held.
         """
         start = 0
         for end in ends:
@@ -124,7 +124,7 @@ class InterFrameGaps:
             start = end
 
     def against(self, data: bytes | bytearray, start: int, end: int) -> float:
-        """Return the cost of the pauses within ``data[start:end]``, if these bytes are a frame."""
+        """Return the cost of assuming that ``data[start:end]`` is a frame with these pauses."""
         return sum(
             gap.price
             for gap in self._within(start, end)

@@ -2,9 +2,9 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-A read does not return when bytes arrive. It returns when the operating system runs the reader, with
-all bytes that the adapter has delivered by then. So a pause between two reads proves little about
-the line.
+A read does not return when bytes arrive. The read returns when the operating system runs the
+reader. Its result is all bytes that the adapter has delivered until that moment. So a pause between
+two reads proves little about the line.
 
 The board's clock proves more, because the board sends an IMU frame in every tick. If bytes were
 lost in a pause within a frame, this frame and all later ones are late by whole ticks. If only the
@@ -105,16 +105,16 @@ class Gap(NamedTuple):
 def cause(
     gap: Gap, reads: list[Read], data: bytes | bytearray, start: int, end: int, byte_s: float
 ) -> Cause:
-    """Return the cause of ``gap``, a pause within ``data[start:end]``, if these bytes are a frame.
+    """Return the cause of ``gap``, a pause within the supposed frame ``data[start:end]``.
 
     ``reads``: all reads since the pause, beginning with the read that ended it. ``byte_s``: time in
     s that the line takes for a byte.
 
     The reader was late in each of these cases:
 
-    * Later bytes are on time again. Exception: all bytes since the pause came at the pace of the
-      line. Then perhaps the reader was prompt and no frame begins at ``start``, so the next frame
-      shows the cause.
+    * Later bytes are on time again. There is one exception: all bytes since the pause came at the
+      pace of the line. Perhaps the reader was prompt, and the supposed frame is wrong. In this case
+      the next frame decides.
     * Bytes came faster than the line can send them, so they had waited to be read.
     * The frame is a text, or a text follows it. A paused board does not send frames in ticks.
     * ``MOST_BYTES`` after the frame have not proved an idle line.
@@ -181,10 +181,11 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause, as the frame after it shows. This frame begins at ``start``.
+    """Return the cause of a pause, from the next frame, which begins at ``start``.
 
-    If this frame has a pause too, which ended a whole number of ticks after the first pause, the
-    line was idle. Otherwise the reader was late. ``first``: the read that ended the first pause.
+    Perhaps the next frame has a pause too. If this second pause ended a whole number of ticks after
+    the first one, the line was idle. In all other cases the reader was late. ``first``: the read
+    that ended the first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

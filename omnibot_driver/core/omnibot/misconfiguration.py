@@ -29,10 +29,10 @@ The board sends this number of poses in 2 s.
 """
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""``SMALLEST``, ``LARGEST``: limits for the absolute value of a coordinate in mm or mrad, unless
-the coordinate is 0.
+"""``SMALLEST``, ``LARGEST``: limits for a coordinate's absolute value, in mm or mrad.
 
-A value outside the limits shows that its bytes were read in the wrong order.
+A coordinate may also be 0. A value outside the limits shows that its bytes were read in the wrong
+order.
 """
 POSE_PERIODS: Final = 2
 """Longest time between two poses that are compared, in pose periods. So one pose between them may

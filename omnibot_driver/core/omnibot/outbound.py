@@ -65,9 +65,10 @@ def transmission(*parts: bytes) -> bytes:
 
 
 def harmless(counts: tuple[float, float, float]) -> Words:
-    """Return the words nearest to ``counts`` whose bytes contain neither a letter nor a header.
+    """Return three words near to ``counts``, without a letter or a header in their bytes.
 
-    Letters are S, P and R. The absolute values of the words are at most ``MAX_WORD``.
+    Each word is the nearest one to its count for which this is possible. Letters are S, P and R.
+    The absolute values of the words are at most ``MAX_WORD``.
     """
     a, b, c = counts
     words = nearest(a, b, c)
@@ -96,7 +97,7 @@ def begins_with_a_letter(word: int) -> bool:
 
 
 def _harmless_word(count: float, word: int, follows: int) -> int:
-    """Return the word nearest to ``count`` whose bytes contain neither a letter nor a header.
+    """Return the nearest word to ``count`` that has no letter and no header in its bytes.
 
     ``word``: the integer nearest to ``count``. ``follows``: the byte after the word.
     """

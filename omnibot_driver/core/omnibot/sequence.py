@@ -28,8 +28,8 @@ and lacks one byte in ten.
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and so of the time that the counter shows.
 
-After a silence of minutes, the error may be seconds. Then the counter is not reliable evidence of a
-restart, but the board's pose is.
+After a silence of minutes, the error may be seconds. After such a silence, only the board's pose is
+reliable evidence of a restart. The counter is not.
 """
 EARLY_S: Final = 0.2
 """After a restart, the counter may show at most this much more time, in s, than has elapsed.
@@ -75,15 +75,15 @@ class Sequence:
         self._ahead: int | None = None
         """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        The counter may have a flipped bit, or the bytes may not be a true frame. So the number of
-        lost deltas is computed from the elapsed time, until a delta continues this counter.
+        A counter that is too high may have a flipped bit, or its bytes may not be a true frame.
+        Until another delta continues this counter, lost deltas are computed from the elapsed time.
         """
         self._left: tuple[int, float, int] | None = None
         """The last counter before a supposed restart, its arrival time in s, and the first counter
         after it."""
 
     def pause(self) -> None:
-        """Record that the board paused. Then its counter may continue, or restart from zero."""
+        """Record that the board paused. Its next counter may continue the count or be zero."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:

@@ -37,8 +37,8 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""A frame is sure if each other interpretation of its first byte costs at least this much more.
-Each of them is then at least 30 times less likely."""
+"""A frame is sure if each other interpretation of its first byte costs at least this much more. A
+cost that is higher by this much means an interpretation that is at least 30 times less likely."""
 STEP: Final = 5.5
 """First cost limit of the search, above the lower bound of the cost.
 
@@ -283,7 +283,7 @@ class _Search:
         return found
 
     def pieces(self) -> list[Segment]:
-        """Return the complete frames on the shortest path, each with whether it is sure."""
+        """Return the complete frames on the shortest path, and mark those that are sure."""
         cost = self._cost
         path: list[_Edge] = []
         edge = self._by[self._end]

@@ -30,12 +30,12 @@ LARGEST_SKEW_PPM: Final = 115.0
 SKEW_KNOWN_S: Final = 75.0
 """Time in s for which one arrival time affects the estimated clock skew.
 
-A skew that ends sooner may come from a busy computer, so it is not reported.
+A skew that lasts for less than this time is not reported, because it may come from a busy computer.
 """
 
 BUSY_SHARE: Final = 0.1
-"""Largest share of time, from 0 to 1, for which the reader may wait for the processor. If the
-reader waits longer, the computer is reported as too busy."""
+"""Share of time, from 0 to 1, for which the reader waits for the processor. Above this share, the
+computer is reported as too busy."""
 
 PUBLISHED_ODOMETRY: Final = "Published odometry (Hz)"
 """Label of the rate at which the driver publishes odometry. The label "Odometry rate (Hz)" is for

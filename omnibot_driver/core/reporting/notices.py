@@ -110,9 +110,9 @@ class Notices:
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
         """Return the notice that a stop is unconfirmed.
 
-        The driver has repeated Stop for its full time and has not measured a standstill.
-        ``measured``: whether displacements arrived meanwhile. ``blind``: whether the board did not
-        measure its wheels after the last command.
+        The driver has repeated Stop until its time limit, and has not measured a standstill.
+        ``measured``: whether displacements arrived in this time. ``blind``: whether the board did
+        not measure its wheels after the last command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
@@ -123,10 +123,10 @@ class Notices:
         return [STOP_UNHEEDED if measured else STOP_UNMEASURED]
 
     def standing(self, sentence: str) -> list[str]:
-        """Return the sentence as a list if the sentence of the previous call was empty.
+        """Return the sentence as a list when its condition begins to hold; else an empty list.
 
-        Else return an empty list. The caller passes an empty sentence while the condition for the
-        sentence does not hold. So each time that the condition begins to hold, it is reported once.
+        While the condition does not hold, the caller passes an empty sentence. So the condition
+        begins to hold when a sentence follows an empty one.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []

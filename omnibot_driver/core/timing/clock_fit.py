@@ -2,10 +2,10 @@
 
 """The time of each tick: a straight line over the ticks, fitted to bounds of their times.
 
-The bytes of a tick arrive late, never early. So all arrivals are on or above the line, and its
-slope is the true period. Bytes that a read did not bring were sent after that read. So the line
-cannot be much lower either. The ticks are divided into blocks. Of each block, at most two points
-are kept:
+The bytes of a tick arrive late, never early. So all arrivals are on or above the line, and the
+line's slope is the true period. Bytes that a read did not bring were sent after that read. So the
+line cannot be far below the arrivals either. The ticks are divided into blocks. Of each block, at
+most two points are kept:
 
 * *Latest*: the arrival with the smallest delay. This upper bound is always valid. After bursts,
   stalls and losses it is higher than necessary.
@@ -56,7 +56,7 @@ FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
 late ones cannot be recognized."""
 LATE_PART: Final = 0.1
-"""Largest assumed fraction of reads that are late by more than the time ``LATE_S``, in s."""
+"""Largest assumed fraction of late reads. A read is late if its delay exceeds ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
 """Largest allowed distance of an earliest point below a latest point, as a fraction of a period.

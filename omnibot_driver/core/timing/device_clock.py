@@ -7,10 +7,10 @@ unknown and always changes, but never before they were sent. For each reading, t
 answered.
 
 *Which tick is it?* Each IMU reading is one tick. IMU readings that are reported as lost are counted
-too. Others are lost without a report; the counter in the displacements shows how many. Until the
-next displacement arrives, or on a board that sends none, arrival times show these losses. A read
-takes all bytes that have arrived. So its newest tick is hardly older than one period, and never in
-the future.
+too. Some IMU readings are lost without a report. The counter in the displacements shows how many.
+Until the next displacement arrives, or on a board without displacements, arrival times show these
+losses. A read takes all bytes that have arrived. So the newest tick of a read is hardly older than
+one period, and never in the future.
 
 *When was it?* ``ClockFit`` fits a line to the arrivals. The error that remains in the stamps is
 constant: it is the smallest delay that ever occurs.
@@ -45,7 +45,7 @@ If an adapter delivers every 16 ms, the reads occur at five different phases of 
 """
 CALM: Final = 0.45
 """Largest distance of a read from the line, as a fraction of a period, at which the tick of the
-read is certain. The read before must be as near to the line. The fraction must be less than a
+read is certain. The previous read must be as near to the line. The fraction must be less than a
 half."""
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period. So if the line
@@ -150,8 +150,9 @@ class DeviceClock:
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """Return the stamp in s of one reading that came alone and on time, else None.
 
-        If the result is None, nothing has changed, and ``stamps`` must be called. Most reads of a
-        board with an IMU bring one reading on time; this method is faster for them.
+        If the result is None, nothing has changed, and ``stamps`` must be called. On a board with
+        an IMU, most reads bring one reading on time. For such a read, this method is faster than
+        ``stamps``.
         """
         if reading.lost:
             return None
@@ -253,8 +254,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
 
-        If another tick was read just before, both had waited to be read. Then only the delay of the
-        new tick is kept.
+        If another tick was read just before, both ticks had waited to be read. In this case only
+        the delay of the new tick is kept.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -269,8 +270,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set the stamp of a tick to the line's time, but limit the step from the last stamp.
 
-        ``latest_s``: latest allowed stamp. ``room_s``: step in s that leaves room, before the time
-        of the read, for the later stamps of this read.
+        ``latest_s``: latest allowed stamp. ``room_s``: a step in s after which the later stamps of
+        this read are still possible. No stamp may be later than the read.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -72,7 +72,7 @@ class Motor:
     def advance(self, pwm: float, load_pwm: float = 0.0) -> float:
         """Turn for one tick under a constant effort; return the counts turned, not rounded.
 
-        load_pwm: effort of an outside force, which acts without the motor's delay.
+        load_pwm: effort of an outside force. This effort acts without the motor's delay.
         """
         constants, start = self._constants, self.speed
         self._on_the_way.append(pwm)
@@ -93,7 +93,7 @@ class Motor:
         return turned
 
     def turn(self, counts: float, pwm: float) -> None:
-        """Turn by ``counts`` in one tick by an outside force, whatever the motor's effort is."""
+        """Let an outside force turn the wheel by ``counts`` in one tick, against any effort."""
         self._on_the_way.append(pwm)
         self._on_the_way.popleft()
         self.speed = counts

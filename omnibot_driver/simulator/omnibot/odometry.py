@@ -3,8 +3,8 @@
 """The firmware's odometry from its encoders (manual, Odometry equation).
 
 The 25 Hz frame contains the motion since the frame before. Each such difference is computed from
-unrounded values and then rounded. A host that sums the differences therefore also sums the rounding
-errors.
+unrounded values, and is rounded afterwards. So a host that adds the differences also adds their
+rounding errors.
 
 This module knows encoder counts, the robot's dimensions as the firmware assumes them, and the units
 of the 25 Hz frame. It must not know modes, time, or the true pose of the robot.

@@ -57,7 +57,7 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``, but discard the byte after FF unless it is FE.
+    """Find frames like ``counting``, but discard a byte other than FE after FF.
 
     So the header in FF FF FE is missed.
     """
@@ -135,7 +135,7 @@ class CommandReceiver:
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
         """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        If ``control_frames`` is False, control frames are not recognised. Then each of their bytes
+        If ``control_frames`` is False, control frames are not recognised, and each of their bytes
         may act as a state letter.
         """
         if self.to_swallow:

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Set points of the wheels (manual, Control equation), in encoder counts per control tick.
+"""Set-points of the wheels (manual, Control equation), in encoder counts per control tick.
 
-This module knows scales, signs and the kinematics. It must not know modes, nor when a set point
+This module knows scales, signs and the kinematics. It must not know modes, nor when a set-point
 takes effect.
 """
 
@@ -13,13 +13,13 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 def from_wheel_words(values: Triple, settings: BoardSettings) -> Wheels:
-    """Return the set points of the wheels for a control frame of mode 2 (v_A, v_B, v_C)."""
+    """Return the set-points of the wheels for a control frame of mode 2 (v_A, v_B, v_C)."""
     a, b, c = (value / settings.linear_scale for value in values)
     return _counts_per_tick((a, b, c), settings)
 
 
 def from_velocity_words(values: Triple, settings: BoardSettings) -> Wheels:
-    """Return the set points of the wheels for a control frame of mode 1 (Vx, Vy, Omega).
+    """Return the set-points of the wheels for a control frame of mode 1 (Vx, Vy, Omega).
 
     The switch of the board must be on velocity.
     """
@@ -29,7 +29,7 @@ def from_velocity_words(values: Triple, settings: BoardSettings) -> Wheels:
 
 
 def from_twist(twist: tuple[float, float, float], settings: BoardSettings) -> Wheels:
-    """Return the set points of the wheels for velocities of the base in m/s and rad/s.
+    """Return the set-points of the wheels for velocities of the base in m/s and rad/s.
 
     ``settings.axis_signs`` is applied to the velocities.
     """

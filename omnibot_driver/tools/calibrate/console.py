@@ -51,7 +51,7 @@ class Console:
         self.rich.print(text, markup=False, soft_wrap=True)
 
     def confirm(self, question: str) -> None:
-        """Ask for a confirmation. Raises ToolError unless the answer is yes."""
+        """Ask for a confirmation. Raises ToolError if the answer is not yes."""
         if not self.asks(question):
             raise ToolError("you said no, so nothing was moved or written")
 

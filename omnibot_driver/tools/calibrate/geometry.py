@@ -65,8 +65,8 @@ def believed(now: Mapping[str, Any]) -> dict[str, float]:
     """Return the sizes in m and the scales from which ``odom`` is computed, by parameter name.
 
     If the board sends wheel counts, the driver computes the odometry from its own parameters for
-    the sizes. Otherwise the board computes the odometry from the manual's sizes, and the driver
-    scales the board's result.
+    the sizes. If not, the board computes the odometry from the manual's sizes, and the driver
+    scales the result.
     """
     if now["delta_frame"] == "wheel_counts":
         return {name: now[name] for name in ("wheel_radius", "base_radius")}

@@ -3,11 +3,11 @@
 """Fit the robot's geometry to drives whose ends the user measured with a tape.
 
 The module converts each path of the odometry to the distances that the wheels rolled. From these
-distances it computes the path again with other radii of the wheels and of the base, until the ends
-fit the tape. Any mixture of lines, turns and squares can be used if it determines the radii. The
-method is that of J. Borenstein and L. Feng, "UMBmark: a benchmark test for measuring odometry
-errors in mobile robots" (1995), extended to three wheels. This module knows paths and readings; it
-does not know how the robot was driven.
+distances, it computes the path again with other radii of the wheels and of the base. It varies the
+radii until the ends of the paths fit the tape. The drives can be any mixture of lines, turns and
+squares that determines the radii. The method is that of J. Borenstein and L. Feng, "UMBmark: a
+benchmark test for measuring odometry errors in mobile robots" (1995), extended to three wheels.
+This module knows paths and readings; it does not know how the robot was driven.
 """
 
 import math

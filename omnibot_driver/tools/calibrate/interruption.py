@@ -63,7 +63,7 @@ class Interruption:
             self._deferred = False
 
     def reading(self, read: Callable[[str], str]) -> Callable[[str], str]:
-        """Return a function that calls ``read``, and that a signal interrupts at once."""
+        """Return a function that calls ``read``. A signal interrupts the call at once."""
 
         def ask(question: str) -> str:
             self.check()

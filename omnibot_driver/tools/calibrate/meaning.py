@@ -18,7 +18,7 @@ from omnibot_driver.tools.needs import ToolError
 ControlMethod = Literal["velocity", "position"]
 
 STANDS_PART: Final = 0.1
-"""Fraction of the commanded speed up to which the robot is regarded as standing still."""
+"""Up to this fraction of the commanded speed, the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
 """The robot is regarded as stopping if its speed has decreased to this fraction or less.

@@ -32,7 +32,7 @@ LOOK_S: Final = 1.0
 SLOW_LOOK_S: Final = 3.0
 """Time, in s, that replaces ``LOOK_S`` if the board measures its motion only rarely.
 
-Then a part of the odometry is only predicted, so the comparison needs a longer time.
+On such a board, a part of the odometry is only predicted, so the comparison needs a longer time.
 """
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
@@ -59,12 +59,12 @@ class Bounds:
 
     ``seconds``: longest duration.
 
-    ``acceleration``: largest change of the commanded speed per s, in m/s². For ``wheel_cmd``, of
-    the wheels' rates, in rad/s².
+    ``acceleration``: largest change of the commanded speed per s, in m/s². For ``wheel_cmd``, the
+    largest change of a wheel's rate per s, in rad/s².
 
     ``angular_acceleration``: largest change of the commanded yaw rate per s, in rad/s².
 
-    If an acceleration is infinite, the command changes at once.
+    If an acceleration is infinite, its part of the command changes at once.
     """
 
     speed: float

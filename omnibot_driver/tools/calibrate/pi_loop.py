@@ -75,7 +75,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Ratio of a time constant as written to the board to the time constant that results.
+        """Written time constant divided by the time constant that results on the board.
 
         The ratio differs from 1 because the board's control period is not the nominal period.
         """

@@ -187,9 +187,9 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 def _plant(found: PlantFit, free: Levels) -> Plant:
     """Return the plant of a wheel. Its gain and dead zone come from the speeds at two duties.
 
-    ``found``: the fit to starts at full duty, with the time constants and the speed at full duty.
+    ``found``: the fit to starts at full duty, which includes the time constants and the speed.
 
-    ``free``: the measurement at half duty, with the speed at half duty.
+    ``free``: the measurement at half duty, which includes the speed.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
@@ -224,6 +224,6 @@ def _gains(tuned: Mapping[str, Tuned]) -> dict[str, float]:
 def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> None:
     """Restore the parameters ``names`` to their values in ``before``.
 
-    If such a value is None, the parameter keeps its new value until a restart.
+    If a value in ``before`` is None, the parameter keeps its new value until a restart.
     """
     bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})

@@ -4,9 +4,9 @@
 
 Tn compensates the plant's slow time constant. The Tn that is written to the board is longer,
 because the board computes its coefficients for a longer control period than the real one. Kp is
-searched, and Td too if a phase margin is required. Only gains whose overshoot is within the goal
-are allowed. Of these gains, the tool takes those with the smallest sum of settling time and
-integrated error.
+searched. If a phase margin is required, Td is searched too. Gains are allowed only if their
+overshoot is within the goal. Of the allowed gains, the tool takes those with the smallest sum of
+settling time and integrated error.
 
 Afterwards the dead time of a plant is fitted to steps that were recorded with the tuned gains.
 """
@@ -69,7 +69,7 @@ class Goals:
 
     ``settled_s``: settling time in s. The tool warns the user if the settling time is longer.
 
-    ``phase_margin_deg``: smallest allowed phase margin. If it is None, Td is 0, and only the
+    ``phase_margin_deg``: smallest allowed phase margin. If this goal is None, Td is 0, and only the
     overshoot limits the gain (gain optimum).
     """
 
@@ -176,9 +176,9 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, with which the model explains the recorded steps best.
 
-    ``wheels``: for each wheel its plant, its loop and its recorded steps. The wheels get the same
-    dead time. It is at least ``LEAST_DEAD_S``, because gains for too short a dead time make the
-    speed overshoot.
+    ``wheels``: for each wheel its plant, its loop and its recorded steps. All wheels get the same
+    dead time. This dead time is at least ``LEAST_DEAD_S``. Gains for a dead time that is too short
+    make the speed overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

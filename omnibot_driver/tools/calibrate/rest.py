@@ -2,10 +2,9 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A measurement in one posture cannot distinguish an accelerometer's bias from a tilt of the sensor.
-Nor can it distinguish a tilt of the sensor from a slope of the floor. Only the bias along gravity
-can be found, because the magnitude of gravity is known. This module knows readings; it does not
-know how they are recorded.
+A measurement in one posture cannot distinguish three causes: a bias of the accelerometer, a tilt of
+the sensor, and a slope of the floor. Only the bias along gravity can be found, because the
+magnitude of gravity is known. This module knows readings; it does not know how they are recorded.
 """
 
 from collections.abc import Callable

@@ -109,8 +109,8 @@ class Robot(Listener):
 
         ``obeys``: whether a robot that does not move is a fault.
 
-        ``monitored``: whether the driver's motion monitor stays on. It must be off if the
-        calibration does not know yet how fast or in which direction the robot moves.
+        ``monitored``: whether the driver's motion monitor stays on. The monitor must be off while
+        the speed or the direction of the robot's motion is not calibrated.
 
         ``show``: a function that is called with the seconds since the start.
 

@@ -56,7 +56,7 @@ def wanted(axis: int) -> Pattern:
 def wheel_sign(wheel: int, seen: Pattern) -> int:
     """Return 1 if the wheel turned in the manual's direction, -1 if it turned in reverse.
 
-    Raises Contradiction unless exactly this wheel turned.
+    Raises Contradiction if this wheel did not turn, or if another wheel turned.
     """
     name = WHEELS[wheel]
     turned = [n for n in range(3) if seen[n]]
@@ -101,8 +101,8 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    That is so if x times y is not the sign of yaw. If the user only regards another side of the
-    robot as its front, the signs describe no mirror image.
+    A mirror image has signs of x and y whose product is not the sign of yaw. If the user only
+    regards another side of the robot as its front, the product is the sign of yaw.
     """
     x, y, yaw = signs
     return x * y != yaw

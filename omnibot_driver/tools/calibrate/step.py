@@ -80,8 +80,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    Each step begins at a different time within an odometry delta. So all steps together show the
-    response at more times than the ends of the deltas.
+    One step shows the response only at the ends of its odometry deltas. Each step begins at another
+    time within a delta. So all steps together show the response at more times.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

@@ -5,8 +5,8 @@
 Time 0 of a step is its *onset*: the first control tick at which the board could use the command.
 The times of the ticks are known from the timestamps. But a command may take effect at another tick
 than the calculated one. This happens if the command arrives close to a tick, or if a busy computer
-delays it. The recorded step then shows the tick at which the command took effect. This module knows
-commands and wheel rates; it does not know how they were recorded.
+delays the command. In such a case, the recorded step shows the tick at which the command took
+effect. This module knows commands and wheel rates; it does not know how they were recorded.
 """
 
 import math
@@ -60,7 +60,7 @@ class Step:
     ``last_radps``: the rate that was commanded before ``before_radps``.
 
     ``last_ticks``: number of ticks from the change between these two rates to the onset. The
-    response to that change may not have ended.
+    response to this earlier change may still continue at the onset.
     """
 
     before_radps: float

@@ -13,9 +13,9 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains
 UNLIKE_ONE: Final = 0.02
 """Difference of a wheel's gain from 1 above which the tool recommends ``calibrate scale``."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation, in rad/s, of the rate of an odometry delta that comes from quantisation.
+"""Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
 
-The encoder quantises a delta, and so does the protocol, with its unit of 0.1 mm.
+A delta is quantised twice: by the encoder, and by the protocol's unit of 0.1 mm.
 """
 MANY: Final = 1.5
 """Multiple of ``QUANTUM_RADPS`` above which the tool warns the user about the residuals.

@@ -21,10 +21,10 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest fraction of the times in a record that may be missing."""
 UNLIKE: Final = 1.5
-"""Largest accepted ratio between a time between ticks and the median of these times.
+"""Largest accepted ratio of a time between ticks to the median of these times.
 
-The ratio is that of the longer to the shorter of both. A larger ratio shows that the board missed
-an edge of the encoder's signal, or noticed it late.
+For a time below the median, the ratio is that of the median to the time. A larger ratio shows that
+the board missed an edge of the encoder's signal, or noticed it late.
 """
 SMOOTHED: Final = 4
 """Number of successive times between ticks from which one speed is computed.
@@ -81,7 +81,7 @@ def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
 
     While the board makes the record, both corrections must be 1. The two levels alternate. The
     level with the shorter mean time is the short level. After a missed edge, the function decides
-    this anew. Raises ToolError if the ticks are not regular.
+    anew which level is the short one. Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

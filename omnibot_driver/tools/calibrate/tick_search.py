@@ -54,7 +54,7 @@ the board's clock loses up to 6 ms at a missed mark.
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which the board cannot miss a mark.
 
-The wheel is still slow then.
+The wheel is still slow during these ticks.
 """
 OUTLIER: Final = 5.0
 """Error of a time between ticks, in standard deviations, above which the time is not used."""
@@ -77,7 +77,8 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    ``values`` has their sum and their ratio instead, so that the search has only one optimum.
+    ``values`` contains the sum and the ratio of the time constants. With these two values, the
+    search has only one optimum.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -99,8 +100,8 @@ class Search:
     - for each record, the time of its first mark in s
     - the positions of the marks in ticks, while the marks are fitted
 
-    The first mark is given by its time, because just after the start the distance is small: it
-    grows with the cube of the time.
+    The first mark is given by its time and not by its distance. Just after the start, the distance
+    is too small: it grows with the cube of the time.
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:

@@ -51,8 +51,8 @@ class Behaviour:
 
     ``command_error_s``: integral of the absolute error after a step of 1.
 
-    ``load_error_s``: the same integral after a step of the load. The load equals the effort for a
-    speed of one count per tick.
+    ``load_error_s``: the same integral after a step of the load. The size of this step is the
+    effort for a speed of one count per tick.
 
     ``ms``: peak of the sensitivity; 1 is the most robust value.
 
@@ -90,7 +90,8 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
 
     The function searches a grid that becomes narrower in each round.
 
-    ``now``: the present gains. Each candidate's behaviour is compared with theirs.
+    ``now``: the present gains. The behaviour with each candidate is compared with the behaviour
+    with ``now``.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

@@ -142,8 +142,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        ``suspend`` ends the thread that reads keys, before Textual starts a new one. Without this,
-        two threads would read keys.
+        Textual starts a new thread that reads keys. ``suspend`` ends the old thread before that.
+        Otherwise two threads would read keys.
         """
         with self.suspend():
             pass

@@ -141,7 +141,7 @@ class Feed:
     # Actions of the user
 
     def estop(self) -> None:
-        """Latch the e-stop by topic and by service; repeat both until the driver confirms it."""
+        """Latch the e-stop by topic and by service. Repeat both until the driver confirms."""
         if self.dead_man:
             self.dead_man.stop()
         self._model.estop_asked = True

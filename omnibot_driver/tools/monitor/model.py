@@ -35,7 +35,7 @@ JUMP_MPS: Final = 2.0
 """``JUMP_M``, ``JUMP_MPS``: how far the pose may move between two messages, in m and in m/s.
 
 The sum of both is allowed: the distance, and the speed multiplied by the time. If the pose moves
-further, the odometry was reset, and the monitor begins a new path.
+further, the monitor assumes a reset of the odometry, and begins a new path.
 """
 
 
@@ -67,7 +67,7 @@ class View:
 
     ``said``: the reply to the user's last action.
 
-    ``lacks``: what the robot's board does not have, of ``imu``, ``start`` and ``pause``.
+    ``lacks``: which of ``imu``, ``start`` and ``pause`` the robot's board does not have.
     """
 
     driver: str
@@ -177,7 +177,7 @@ class Model:
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
         """Store a message of ``cmd_vel``.
 
-        Another node has sent it. So it does not show that the driver runs.
+        Another node has sent this message. So the message does not show that the driver runs.
         """
         self._commanded = twist, now_s
 

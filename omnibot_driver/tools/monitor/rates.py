@@ -36,7 +36,7 @@ class Rate:
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0
 
     def age_s(self, now_s: float) -> float | None:
-        """Return the time since the last message, in s; None if it is older than ``WINDOW_S``."""
+        """Return the age of the last message, in s; None if the age is above ``WINDOW_S``."""
         self._forget(now_s)
         return now_s - self._recent_s[-1] if self._recent_s else None
 

@@ -16,7 +16,7 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after a disconnection that shows whether the driver has ended.
+"""Time in s after a disconnection.
 
 A driver that still publishes /diagnostics after this time has not ended.
 """

@@ -17,7 +17,7 @@ TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
 """Speed of a wheel's rim, in m/s, above which the robot is regarded as commanded or as moving.
 
-If a lower speed is commanded, friction may prevent the motion.
+Lower commanded speeds are ignored, because friction may prevent the motion.
 """
 STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
@@ -117,8 +117,8 @@ class Answer:
 
     ``gains``: for each axis, the ratio of measured to commanded motion; NaN if unknown.
 
-    ``error``: for each axis, the rms difference between the measured motion and the commanded
-    motion times the gain.
+    ``error``: for each axis, the rms difference between two motions: the measured one, and the
+    product of the gain and the commanded one.
     """
 
     lag_s: float
@@ -213,8 +213,8 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 def _stopped(log: Log, at_s: Array) -> Mask:
     """Return at which of these times the driver did not carry out commands.
 
-    These are the times with a state that is not running, or with a latched e-stop.
-    ``COMMAND_TIMEOUT_S`` after their end is included.
+    These are the times with a state that is not running, or with a latched e-stop. The time of
+    ``COMMAND_TIMEOUT_S`` after each of them is included.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [

@@ -25,7 +25,7 @@ from omnibot_driver.tools.report.robots import Topics, choose, find
 LOOK_ROUND_S: Final = 2.0
 """Time in s for which the program searches for robots.
 
-The search continues after the first robot, because there may be others.
+The search continues after the first robot, because there may be other robots.
 """
 DISCOVERY_S: Final = 5.0
 DEPTH: Final = 1000
@@ -78,8 +78,8 @@ def _discover(
 ) -> tuple[str, Topics, dict[str, str], bool]:
     """Find the robot; return its namespace, its topics, message types, and whether it is alone.
 
-    The message types are those of all topics in ROS, by the name of the topic. The robot is alone
-    if no other robot runs.
+    The message types are those of all topics in ROS, by the name of the topic. The last value is
+    True if no other robot runs.
     """
     began_s = time.monotonic()
     while True:

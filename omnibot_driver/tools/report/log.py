@@ -46,9 +46,9 @@ class Series:
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
-        """Return for each of these times the last row that has arrived.
+        """Return, for each time in ``at_s``, the last row that had arrived at this time.
 
-        If this row is older than the timeout, or missing, the result is zeros.
+        If the row is missing, or older than ``timeout_s``, the result is zeros.
         """
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):
@@ -111,8 +111,7 @@ class Log:
 
     ``troubles``: what could not be read.
 
-    ``alone``: whether there is no other robot. Then everything in /diagnostics belongs to this
-    robot.
+    ``alone``: whether this is the only robot. If so, everything in /diagnostics belongs to it.
     """
 
     robot: str

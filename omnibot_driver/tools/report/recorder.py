@@ -50,8 +50,8 @@ def _wheels(message: Any) -> Row:
 class Role:
     """How the messages of a topic are converted.
 
-    ``width``: how many values a row has. None means as many as the robot has wheels, which
-    ``joint_states`` tells.
+    ``width``: how many values a row has. None means one value for each wheel. The names in
+    ``joint_states`` show how many wheels the robot has.
 
     ``read``: for each message type, the function that returns the row.
     """
@@ -142,7 +142,7 @@ class Recorder:
         self.count += 1
 
     def _rates(self, message: Any) -> Row:
-        """Return the rates of the wheels, in the order of the first message."""
+        """Return the rates of the wheels, in the order of the names in the first message."""
         self._wheels = self._wheels or tuple(name for name in message.name if WHEEL in name)
         rates = dict(zip(message.name, message.velocity, strict=False))
         return tuple(rates.get(wheel, math.nan) for wheel in self._wheels)

@@ -30,8 +30,8 @@ FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
 """Longest time in s in which short steps can compensate a long step of the timestamps.
 
-After a long step, later steps may be short, so that the timestamps are right again. If this takes
-longer, messages are missing.
+After a long step, several short steps may follow, until the timestamps are right again. If they do
+not become right within this time, messages are missing.
 """
 
 
@@ -172,8 +172,8 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the end of the steps that may compensate it.
 
-    They end before the next long step, and after at most ``most`` steps. ``wide``: indices of the
-    long steps.
+    The compensating steps end before the next long step, and after at most ``most`` steps.
+    ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
@@ -317,8 +317,8 @@ def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
     The growth is unknown if no count has two values in the log, or if several robots share
-    /diagnostics. If a count becomes smaller, a driver has started again and counts from zero. The
-    new count is then added.
+    /diagnostics. If a count becomes smaller, a driver has started again and counts from zero. In
+    this case the new count is added to the growth.
     """
     if not log.alone:
         return None

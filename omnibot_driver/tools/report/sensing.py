@@ -36,7 +36,7 @@ TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
 """Fraction of the time between two odometry messages that gyro readings must cover.
 
-Otherwise this time is left out when the turns by gyro and by odometry are compared.
+If they cover less, this time is left out of the comparison of the turns by gyro and by odometry.
 """
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
@@ -154,7 +154,7 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def longest_same(values: Array) -> int:
-    """Return how many equal rows follow each other at most."""
+    """Return the length of the longest run of equal rows."""
     changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1)) + 1
     return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
 
@@ -210,7 +210,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Return the ratio of turns by gyro to turns by odometry, and how far the robot turned, in rad.
+    """Return the turns by gyro divided by those by odometry, and how far the robot turned, in rad.
 
     The second value adds all turns by odometry, to the left and to the right. Gaps of the odometry
     are left out, and so are steps without gyro readings.

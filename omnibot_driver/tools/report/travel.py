@@ -15,17 +15,18 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: how far a pose may be from where the twist leads, in m and in rad.
+"""``LEAP_M``, ``LEAP_RAD``: largest difference between a pose and where the twist leads.
 
-A larger difference is a leap. The driver's own corrections of odom are smaller in each step,
-because fastest_linear_speed limits them.
+The units are m and rad. A larger difference is a leap. The driver's own corrections of odom are
+smaller in each step, because fastest_linear_speed limits them.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Length in s from which a step between two messages is a gap.
+"""A step between two messages that takes at least this time, in s, is a gap.
 
-The twist does not show the motion during a gap. So a gap is a leap only if it ends at zero.
+The twist does not show the motion during a gap. So a gap is a leap only if the pose after the gap
+is zero.
 """
 
 
@@ -42,7 +43,8 @@ class Steps:
 
     ``off_m``, ``off_rad``: difference between the pose and where the twist leads.
 
-    ``leap``: whether this difference is too large. A gap is a leap only if it ends at zero.
+    ``leap``: whether this difference is too large. A gap is a leap only if the pose after it is
+    zero.
 
     ``reset``: whether the step is a leap to zero.
     """
