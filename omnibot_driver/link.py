@@ -35,8 +35,8 @@ STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board needs more time
 for a proof, the driver waits for that time. If no proof comes, the guard repeats Stop."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, if no guard process can repeat Stop. It replaces
-``STANDS_WITHIN_S``."""
+"""Longest wait at shutdown, in s, if no guard process can repeat Stop. In this case ``UNGUARDED_S``
+replaces ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
 """Longest wait, in s, for a second proof that the robot is at rest. If a board needs more time for
 a proof, the driver waits for that time. The driver sends nothing during this wait. So the second

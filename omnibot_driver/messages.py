@@ -209,7 +209,7 @@ def is_planar(twist: Any) -> bool:
 
 
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
-    """Return the planar pose of a geometry_msgs/PoseStamped. Its z must be finite, but is ignored.
+    """Return the planar pose of a geometry_msgs/PoseStamped; z must be finite, but is ignored.
 
     Raises CommandRefused in these cases:
 
@@ -271,9 +271,9 @@ def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> 
     """Return the time of the wall clock minus that of the steady clock, in ns.
 
     The caller has read three clocks in this order: the steady clock (``before_ns``), the wall clock
-    (``wall_ns``), and the steady clock again (``after_ns``). If these readings allow the old offset
-    ``known_ns``, it is returned unchanged. So a pause of the thread between the readings does not
-    change the offset, but a step of the wall clock changes it at once.
+    (``wall_ns``), and the steady clock again (``after_ns``). If the old offset ``known_ns`` is
+    consistent with these readings, it is returned unchanged. So a pause of the thread between the
+    readings does not change the offset, but a step of the wall clock changes it at once.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -3,10 +3,10 @@
 """A queue of calls to listeners, which several threads fill and empty.
 
 The calls are made in the order of the events that caused them. A thread queues a call while it
-holds the lock under which the event occurred. It makes the queued calls after it has released that
-lock, so a slow listener does not delay commands. Only one thread makes calls at a time. A second
-thread that wants to make calls leaves its calls to the first one. This module knows threads; it
-does not know what is delivered.
+holds the lock under which the event occurred. The thread makes the queued calls after it has
+released that lock. So a slow listener does not delay commands. Only one thread makes calls at a
+time. A second thread that wants to make calls leaves its calls to the first one. This module knows
+threads; it does not know what is delivered.
 """
 
 import threading

@@ -4,9 +4,9 @@
 
 rclpy holds the interpreter's lock while it writes a log line. If the user stops the terminal with
 ctrl-S, or if nothing reads a pipe, this write would block every thread, even the watchdog. The
-robot would continue with its last command. So all output passes through a pipe that drops lines
-when it is full, instead of blocking. This module knows descriptors; it does not know what is
-printed.
+robot would continue with its last command. So all output passes through a pipe. When the pipe is
+full, lines are lost, and the process is not blocked. This module knows descriptors; it does not
+know what is printed.
 """
 
 import contextlib

@@ -3,8 +3,8 @@
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
 The reader delivers measurements at once, on its own thread, so no timer and no other thread delays
-them. It opens a lost port again, with a new guard process. Before it ends the use of a port, for
-any reason, it stops the robot.
+them. The reader opens a lost port again, with a new guard process. Before the reader ends the use
+of a port, for any reason, it stops the robot.
 """
 
 import math

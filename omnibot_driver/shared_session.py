@@ -129,7 +129,7 @@ class SharedSession:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets and will be opened again.
+        """Whether the port did not accept the last packets, so that it will be opened again.
 
         This is True only for a moment, because the reader is already awake and opens the port
         again.

@@ -2,21 +2,22 @@
 
 """Transit time of a command without a stamp, from the time at which the middleware sent it.
 
-The sender's clock may be off by any amount, so a single message does not show its delay. Messages
-of one sender must be compared. For each message, this module computes a difference: the time of our
-clock when the message arrived, minus the time of the sender's clock when it was sent. The message
-with the smallest difference was in transit for the shortest time. Its difference is taken as the
-offset of the two clocks. The delay of any other message is its difference minus this offset. The
-time that a message waited in this process is known exactly, by our own clock.
+The sender's clock may be off by any amount, so a single message does not show its delay. This
+module compares the messages of one sender. For each message, it computes a difference: the time of
+our clock when the message arrived, minus the time of the sender's clock when the message was sent.
+The smallest difference belongs to the message that was in transit for the shortest time. This
+difference is taken as the offset of the two clocks. The delay of any other message is its
+difference minus this offset. Our own clock measures exactly how long a message then waits in this
+process.
 
 Clocks can step. So each difference is computed twice, by our time of day and by our steady clock,
-and the smaller of the two delays is used. If our time of day and the sender's clock step together
-(one host, or NTP everywhere), the difference by our time of day does not change. If our time of day
-steps alone, the difference by our steady clock does not change.
+and the smaller of the two delays is used. A common step of our time of day and the sender's clock
+(one host, or NTP everywhere) does not change the difference by our time of day. A step of our time
+of day alone does not change the difference by our steady clock.
 
 If a sender's clock alone is set back, all later messages of that sender seem to be late. When all
-of its messages have been late for ``HEALS_AFTER_S``, the smallest difference among them becomes its
-offset. A real delay that lasts as long cannot be distinguished from this case.
+messages have been late for ``HEALS_AFTER_S``, the smallest difference among them becomes the
+sender's offset. A real delay that lasts as long has the same effect, because it looks the same.
 
 The middleware numbers the messages of each sender, but does not report who sent a message. A
 message whose number is not above a sender's last number must come from another sender. This module

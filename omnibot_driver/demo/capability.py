@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo must know about a board. It comes from the board's profile; nothing has to run.
+"""What the demo must know about a board. The board's profile has it, so nothing has to run.
 
 This module must not name a board, and must not use ROS or processes.
 """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Runs a module of this package as a separate process. It must not know what the process does."""
+"""Runs a module of this package as a process. This code must not know what the process does."""
 
 import ctypes
 import os

@@ -39,7 +39,7 @@ class Parameter:
     items as the default.
 
     ``unset``: whether the value is None if the user gives none, because the board keeps its own
-    value. Then the default only defines the type.
+    value. For such a parameter, the default only defines the type.
     """
 
     name: str
@@ -56,7 +56,7 @@ class Parameter:
 
     @property
     def initial(self) -> Value:
-        """Value when none is given; None if the parameter is unset."""
+        """Value if the user gives none: the default, or None for an ``unset`` parameter."""
         return None if self.unset else self.default
 
     @property

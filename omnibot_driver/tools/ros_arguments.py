@@ -8,7 +8,8 @@ from collections.abc import Sequence
 def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the arguments for the program, and those for ROS.
 
-    Those for ROS are between ``--ros-args`` and ``--``, or the end. They include both markers.
+    The arguments for ROS are those from ``--ros-args`` to ``--``, or to the end. Both markers are
+    included.
     """
     own: list[str] = []
     ros: list[str] = []

@@ -2,8 +2,8 @@
 
 """One open serial port or pyserial URL: the only module that knows pyserial.
 
-It reads and writes bytes. Every failure is a LinkError whose sentence says what to do. This module
-knows ports; it knows neither threads nor boards.
+The port reads and writes bytes. Every failure is a LinkError whose sentence says what to do. This
+module knows ports; it knows neither threads nor boards.
 """
 
 import contextlib

@@ -84,9 +84,9 @@ class Several:
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes of the open lines, all lines added.
+        """How often the kernel has lost bytes, added over all open lines.
 
-        It is None if the kernel does not count this for one of the lines.
+        The result is None if the kernel does not count this for one of the lines.
         """
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))

@@ -126,8 +126,8 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """Where the last read ended in the stream of IMU samples; None if this is unknown.
 
-        The bytes that were received after the last decoded frame show it. These bytes may begin
-        with an IMU frame, complete or not. Other bytes may follow the IMU frame.
+        The bytes that were received after the last decoded frame show this place. These bytes may
+        begin with an IMU frame, complete or not. Other bytes may follow the IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)

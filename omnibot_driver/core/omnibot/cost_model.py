@@ -40,8 +40,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of assuming that a frame gained bytes, if a header is found where an undamaged frame
-would end."""
+"""Extra cost of a frame with added bytes, if a header begins where the frame would end without
+them."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 

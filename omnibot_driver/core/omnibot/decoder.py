@@ -8,8 +8,8 @@ accepts it:
 
 * *In step* means that the frame begins right after an accepted one. If no evidence speaks against
   the frame, the decoder returns it as soon as its last byte arrives. Four kinds of evidence speak
-  against a frame. The bytes after the frame do not begin like a frame. Its content is a spike. The
-  line was idle within the frame. Its last byte may belong to the next header.
+  against a frame. The bytes after the frame do not begin like a frame. The content of the frame is
+  a spike. The line was idle within the frame. Its last byte may belong to the next header.
 * *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
   cost, which is the sum of the evidence against it (``cost_model``). The decoder returns a frame of
   the cheapest interpretation when every interpretation without this frame costs clearly more.
@@ -231,7 +231,7 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether arrival times allow that the last byte held begins another frame.
+        """Return whether, by the arrival times, the last byte held may begin another frame.
 
         ``start``, ``length``: position and length in bytes of the last frame held. ``due``: whether
         the board may send another frame right after it.

@@ -54,7 +54,7 @@ LEARN_EVERY: Final = 8
 
 
 class Walk:
-    """Consecutive frames, beginning with the first byte held, that no evidence speaks against.
+    """Consecutive frames from the first byte held on. No evidence speaks against these frames.
 
     ``ends``: the position after each frame.
 

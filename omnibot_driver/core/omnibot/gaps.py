@@ -4,8 +4,8 @@
 
 A board sends all frames of a tick at once, so it pauses only between frames. But an adapter that
 collects bytes, or a reader that is scheduled late (``late_reads``), causes pauses anywhere. This
-module finds out what causes the pauses of this line: it counts how often they were between accepted
-frames.
+module finds out what causes the pauses of this line: it counts how often the pauses were between
+accepted frames.
 
 This module knows positions and times; it does not know what a frame contains, nor which frames are
 accepted (``decoder``).

@@ -90,8 +90,8 @@ class Gap(NamedTuple):
 
     ``first``, ``before``: the pause is before one of the bytes from ``first`` to ``before`` - 1.
 
-    ``price``: cost of assuming that a frame was sent partly before and partly after the pause. It
-    applies only if the line was idle.
+    ``price``: cost of assuming that a frame was sent partly before and partly after the pause. This
+    cost applies only if the line was idle.
 
     ``pause_s``: time in s between the two reads.
     """

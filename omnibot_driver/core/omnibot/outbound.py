@@ -2,29 +2,28 @@
 
 """The encoding of frames and letters for a line that loses bytes, and for unknown firmware.
 
-The frames are the manual's. This module decides which bytes precede them, and which of two
+The frames are the manual's. This module decides which bytes precede a frame, and which of two
 neighbouring values a word takes. It knows bytes; it does not know what is commanded, nor when.
 
 A control frame has no checksum, and the board's parser is unknown. The worst possible parser counts
 seven bytes after ``FF FE``, however long they take. If a frame lost a byte, that parser completes
 the frame with the next byte that is sent. So the encoding has four rules.
 
-1. *Zeros precede everything.* A zero is neither a letter nor a header, and seven zeros end any
-   frame that was begun. An eighth zero replaces one that is lost. If a Stop or an emergency stop
-   lost bytes, the zeros complete it: it is still a stop, or becomes a frame in mode 0, which is not
-   a command. A begun frame swallows zeros instead of a letter, and a header never follows an
-   ``FF``. Before a motion frame, four zeros are enough. Only a frame that lost five or more bytes
-   of its payload could swallow the header after four zeros, and such a frame commands motion as
-   well.
+1. *Zeros precede everything.* A zero is neither a letter nor a header. A frame that lost bytes
+   swallows zeros instead of a letter, and a header never follows an ``FF``. Seven zeros end any
+   such frame, and an eighth replaces one that is lost. A Stop that zeros complete is still a stop,
+   or becomes a frame in mode 0, which is not a command. The same is true of an emergency stop.
+   Before a motion frame, four zeros are enough. Only a frame that lost five or more bytes of its
+   payload could swallow the header after four zeros. Such a frame commands motion as well.
 2. *Nothing follows a motion frame.* A motion frame that lost bytes has no effect until the next
-   transmission. The zeros of that transmission complete it, but the next frame replaces it 12 bytes
-   later (1.0 ms at 115200 baud). If zeros followed a motion frame directly, they would complete it
-   at once, and the wrong command would last until the next repetition. Even a parser that discards
-   an incomplete frame after a pause would accept it.
+   transmission. The zeros of that transmission complete it. The next frame replaces it 12 bytes
+   later (1.0 ms at 115200 baud). Zeros directly after a motion frame would complete the damaged
+   frame at once, even in a parser that discards an incomplete frame after a pause. The wrong
+   command would last until the next repetition.
 3. *A payload without its header is harmless.* If the header is lost, a parser looks for letters and
    headers in the payload. So no byte of a payload is ``S``, ``P`` or ``R``, and ``FE`` never
-   follows ``FF``. Each word takes the nearest value for which this is true. That value is one LSB
-   away, unless the high byte of the word is a letter.
+   follows ``FF``. Each word takes the nearest value for which this is true. That value is at most
+   one LSB away, unless the high byte of the word is a letter.
 4. *What is lost is sent again.* Each of these frames and letters is repeated, or the board's data
    confirms it.
 

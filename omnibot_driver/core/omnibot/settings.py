@@ -24,8 +24,8 @@ class OmniBotSettings:
     earth frame. "body": motion along the board's own axes. "wheel_counts": encoder counts of the
     wheels A, B and C, as older firmware sends them.
 
-    ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``. It must
-    not change while the ``OmniBot`` exists.
+    ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``. This
+    period must not change while the ``OmniBot`` exists.
     """
 
     baudrate: int = 115200

@@ -2,18 +2,18 @@
 
 """The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
-The search looks for the shortest path in a graph. A node is a place between two bytes. Each place
-has two nodes: at one, a frame ends or begins; the other is within a run of unexplained bytes (a bad
-run). An edge is a complete frame, a damaged frame, or one or more unexplained bytes. Its price
-comes from ``cost_model``. The shortest path is the best interpretation. A frame on this path is
-sure if every other interpretation of its first byte costs more by at least ``SURE``.
+The search looks for the shortest path in a graph. Each place between two bytes has two nodes. At
+the first node, a frame ends or begins. The second node is within a run of unexplained bytes (a bad
+run). An edge is a complete frame, a damaged frame, or one or more unexplained bytes. The price of
+an edge comes from ``cost_model``. The shortest path is the best interpretation. A frame on this
+path is sure if every other interpretation of its first byte costs more by at least ``SURE``.
 
 The price of content depends on the context, that is, on what earlier frames show. The context of a
 node is the context at the end of the cheapest path to that node.
 
-To save time, the search has a cost limit. It omits every edge that must lead to a path above this
-limit (``lower_bound``). The search raises the limit until no omitted edge can change the result.
-Work and memory are proportional to the length of the stretch.
+To save time, the search has a cost limit. The search omits every edge that must lead to a path
+above this limit (``lower_bound``). The search raises the limit until no omitted edge can change the
+result. Work and memory are proportional to the length of the stretch.
 
 This module knows how a line damages the shapes of frames; it does not know which frames are
 accepted (``decoder``).

@@ -2,9 +2,9 @@
 
 """Sampling times from arrival times: the board's clock, as seen by the host's clock.
 
-The board samples once a tick, controlled by its own crystal. Its bytes arrive with a delay that is
-unknown and always changes, but never before they were sent. For each reading, two questions must be
-answered.
+The board samples once a tick, controlled by its own crystal. The bytes from the board arrive with a
+delay that is unknown and always changes. They never arrive before they were sent. For each reading,
+two questions must be answered.
 
 *Which tick is it?* Each IMU reading is one tick. IMU readings that are reported as lost are counted
 too. Some IMU readings are lost without a report. The counter in the displacements shows how many.

@@ -6,13 +6,13 @@ The firmware receives bytes, advances by one tick, and returns bytes. The same s
 always give the same output. This module knows the manual's state machine and control equations. It
 must not know ports or real time.
 
-In some places the manual says nothing, or contradicts itself. There, this module assumes:
+Where the manual says nothing, or contradicts itself, this module assumes:
 
 - The control loop runs from the end of the boot, and also while the board is paused (motors off).
   So the first 25 Hz difference after a pause includes motion during the pause. The output periods
   are counted from the end of the boot.
-- For the difference frame, the list of modes has 10 Hz, but the frame table has 25 Hz. The setting
-  ``delta_period_s`` decides.
+- For the difference frame, the manual's list of modes has 10 Hz, but its frame table has 25 Hz. The
+  setting ``delta_period_s`` selects one of them.
 - Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
 - The number in the paused text starts from zero each time the board becomes paused.
 - With the switch on positional control, the goal determines the wheels' targets (``position``).

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's output other than IMU frames: odometry frames, and the text while it is paused.
+"""The board's output other than IMU frames: odometry frames, and the text of a paused board.
 
 This module knows periods, sequence numbers and the number in the text. It must not know the board's
 modes.

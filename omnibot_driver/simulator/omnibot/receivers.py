@@ -9,8 +9,8 @@ control frames, letters and the time of a byte. It must not know modes or motion
 - A ``Framing`` is a function without state. Its arguments are the bytes held so far, a new byte,
   and the pause before this byte in s. It returns the bytes held now, the control frame that the
   byte completes (or None), and whether the byte may belong to a frame.
-- A setting decides whether state letters act only between control frames, or anywhere. If anywhere,
-  each byte that is a letter acts, and the frame around it continues.
+- A setting decides whether state letters act only between control frames, or anywhere. A letter
+  within a control frame does not end the frame.
 - After power-up the receiver discards three arbitrary bytes as its wake-up. A setting decides
   whether bytes that arrive during the boot are lost, or count as wake-up bytes.
 """

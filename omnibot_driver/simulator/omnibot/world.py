@@ -166,8 +166,8 @@ class World:
     def _wander(self, slip: float, rim_m: float) -> float:
         """Return the wheel's slip after ``rim_m`` of rim motion.
 
-        The slip varies around the mean slip, with a standard deviation of half the mean. It stays
-        within 0 and 1.
+        The slip varies around the mean slip, with a standard deviation of half the mean. The slip
+        stays within 0 and 1.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)

@@ -132,7 +132,7 @@ class Client:
     def call(self, service: str, on: bool | None = None) -> str:
         """Call a service of the driver; return the message in its response.
 
-        ``on``: the data for a service of type SetBool. It is None for a service of type Trigger.
+        ``on``: the data for a service of type SetBool, or None for a service of type Trigger.
         Raises ToolError if the driver reports a failure.
         """
         kind = Trigger if on is None else SetBool

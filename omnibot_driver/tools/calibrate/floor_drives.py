@@ -41,8 +41,8 @@ def measured(
 
     ``go``: a function that runs a drive and returns the poses of the robot by the odometry.
 
-    ``measure``: a function that asks the user. It receives the drive and these poses, and returns
-    the measurement.
+    ``measure``: a function that asks the user for a measurement and returns it. Its arguments are
+    the drive and these poses.
 
     Raises ToolError if the user does not confirm that there is room, or if a drive fails.
     """

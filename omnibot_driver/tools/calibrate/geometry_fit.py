@@ -132,8 +132,8 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
     ``path``: the path that was computed with the assumed radii.
 
-    ``factors``: ratio of the new to the assumed radius for each wheel, (3,). It may also be given
-    for each step, (n - 1, 3).
+    ``factors``: ratio of the new to the assumed radius for each wheel, (3,). The ratios may also
+    differ from step to step, (n - 1, 3).
 
     ``base``: ratio of the new to the assumed base radius.
 

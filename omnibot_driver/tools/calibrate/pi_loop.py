@@ -3,10 +3,10 @@
 """The simulation of a wheel with a PI controller, after a step of the set-point.
 
 The controller is band-limited: G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to
-the duty in percent. It is discretised by the trapezoidal rule. The board computes its coefficients
-for the control period ``NOMINAL_S``, even if the real control period differs. The board computes
-the measured speed, in whole RPM, from the time between the last two encoder ticks. All candidates
-for the gains are simulated at the same time, as arrays.
+the duty in percent. The controller is discretised by the trapezoidal rule. The board computes its
+coefficients for the control period ``NOMINAL_S``, even if the real control period differs. The
+board computes the measured speed, in whole RPM, from the time between the last two encoder ticks.
+All candidates for the gains are simulated at the same time, as arrays.
 
 This module knows the plant, the controller and the encoder; it does not know how plant and gains
 were found.
@@ -167,8 +167,8 @@ class Traits:
 
     ``overshoot``: fraction of the final speed, or of the target if the target is higher.
 
-    ``settled_s``: time after which the speed stays in the band around its final value. It is
-    infinite if the speed does not stay there, or if the final value is not the target.
+    ``settled_s``: time after which the speed stays in the band around its final value. This time is
+    infinite if the speed does not stay in the band, or if the final value is not the target.
 
     ``error_s``: integral of the absolute error divided by the target, in s.
     """

@@ -34,7 +34,7 @@ class Rest:
 
     ``bias_radps``: mean rate of rotation.
 
-    ``bias_sigma``: standard deviation of ``bias_radps``. It includes the random walk of the bias
+    ``bias_sigma``: standard deviation of ``bias_radps``, including the random walk of the bias
     until the end of the measurement.
 
     ``force_mps2``: mean specific force.

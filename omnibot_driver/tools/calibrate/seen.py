@@ -2,8 +2,8 @@
 
 """The meaning of the user's answers about the directions in which the wheels turn.
 
-A pattern has one number for each of the wheels A, B and C, as seen from outside. It is 1 for
-counter-clockwise (positive in the manual's equations), -1 for clockwise, and 0 for still.
+A pattern has one number for each of the wheels A, B and C, as seen from outside. The number is 1
+for counter-clockwise (positive in the manual's equations), -1 for clockwise, and 0 for still.
 """
 
 from collections.abc import Sequence

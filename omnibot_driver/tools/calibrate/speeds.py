@@ -5,7 +5,7 @@
 A *count* is the unit of the board's commands. The board accepts only whole counts. The tool
 commands only whole counts, so that a command has no rounding error. A speed is measured as the
 slope of the odometry's pose, in which rounding errors do not accumulate. The odometry's twist is
-not used, because it comes from a single displacement, whose rounding error does not average out.
+not used. Each twist comes from a single displacement, whose rounding error does not average out.
 This module knows logs; it does not know the robot.
 """
 
@@ -63,8 +63,8 @@ class Scale:
 
     ``sigma``: standard deviation of ``value``.
 
-    ``excess``: ratio of the scatter of the speeds to their uncertainties. It is 1 if the scatter is
-    as expected.
+    ``excess``: ratio of the scatter of the speeds to their uncertainties. The ratio is 1 if the
+    scatter is as expected.
     """
 
     value: float

@@ -4,8 +4,8 @@
 
 The plant, from duty to speed, is of first or second order, whichever fits the records better. A
 record begins with the first tick after its request, so it does not show when the duty was applied.
-It shows how the times between ticks become shorter, but not the dead time. The positions of the
-encoder's marks are fitted as well (``tick_marks``).
+Therefore a record does not show the dead time. It shows only how the times between ticks become
+shorter. The positions of the encoder's marks are fitted as well (``tick_marks``).
 
 This module knows times between ticks; it does not know how they were recorded.
 """

@@ -207,8 +207,9 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        The covariance follows from all residuals. It is increased if the scatter between records is
-        larger, because a slowly changing load affects a whole record.
+        The covariance follows from all residuals. If the scatter between records is larger, the
+        covariance is increased. The reason for such a scatter is a slowly changing load, which
+        affects a whole record.
         """
         own = 1 + self.order
         found = self._search(values)

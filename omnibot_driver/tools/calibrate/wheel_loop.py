@@ -3,8 +3,8 @@
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
 Speeds are in encoder counts per control tick of 10 ms, efforts in PWM steps, and times in ticks.
-The loop is linear. It is valid for changes between two speeds in the same direction, because dry
-friction is then constant and has no effect. This module knows the motor and the control law; it
+The loop is linear. This model is valid for changes between two speeds in the same direction: dry
+friction is constant there, and has no effect. This module knows the motor and the control law; it
 does not know measurements or radians.
 """
 

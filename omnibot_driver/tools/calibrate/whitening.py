@@ -18,8 +18,8 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the autocorrelation of residuals, for lags from 0 to ``lags``.
 
     If ``lags`` is larger than 1, the estimate decreases linearly to the last lag (taper). If
-    ``lags`` is 1, the value at lag 1 shows the cause of the residuals. It is nearly -0.5 for
-    displaced marks, and 0 for independent errors of successive times.
+    ``lags`` is 1, the value at lag 1 shows the cause of the residuals. A value of nearly -0.5 shows
+    displaced marks. A value of 0 shows independent errors of successive times.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

@@ -3,7 +3,7 @@
 """The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
 The model stores values as received, even NaN and infinity, because the user should see that they
-are invalid. It must not know ROS, terminals or the clock.
+are invalid. The model must not know ROS, terminals or the clock.
 """
 
 import math

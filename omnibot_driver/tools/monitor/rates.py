@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measures how often messages arrive. It must not know the messages, and does not read a clock."""
+"""Measures how often messages arrive.
+
+This module must not know the messages, and does not read a clock.
+"""
 
 from collections import deque
 from typing import Final
@@ -30,7 +33,7 @@ class Rate:
         self._seconds[-1] += 1
 
     def hz(self, now_s: float) -> float:
-        """Return the rate over the last ``WINDOW_S``, or since ``began_s`` if this is shorter."""
+        """Return the rate over the last ``WINDOW_S``, or since ``began_s`` if that was later."""
         self._forget(now_s)
         span_s = min(WINDOW_S, now_s - self._began_s)
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0

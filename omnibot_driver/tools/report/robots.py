@@ -39,8 +39,8 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
     """Return the roles that the name of a topic allows.
 
     For each role, the first value is the namespace of the robot. The second value is whether the
-    topic fits the role. It fits if ``kind`` is the right message type. A topic below the name of a
-    driver's node, such as ``state``, also needs this node in ``drivers``.
+    topic fits the role. A topic fits if ``kind`` is the right message type. A topic below the name
+    of a driver's node, such as ``state``, also needs this node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
