@@ -2,13 +2,13 @@
 
 """Serialise measurements to CDR as rclpy does, and parse velocity commands from CDR.
 
-CDR is the format in which DDS sends messages. This module writes it without ROS message objects,
+CDR is the format in which DDS sends messages. This module writes CDR without ROS message objects,
 which saves processor time.
 
 CDR aligns every number to its own size, like a C struct on a 64-bit machine. So Python's ``struct``
-with native alignment can write it. A string is its length, then its bytes and a NUL. A sequence is
-its length, then its elements. ``difference`` compares the result with rclpy's own bytes, because
-this layout may not be right on every machine.
+with native alignment can write CDR. A string is its length, then its bytes and a NUL. A sequence is
+its length, then its elements. On some machines this layout may be wrong, so ``difference`` compares
+the result with rclpy's own bytes.
 """
 
 import itertools

@@ -90,8 +90,9 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        The executor would check each of these callbacks before it takes a command. Without them,
-        only the subscriber logs a warning if its quality of service is incompatible.
+        The executor would check each of these callbacks before it takes a command. Without these
+        callbacks, the driver logs no warning about an incompatible quality of service; the
+        subscriber does.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)

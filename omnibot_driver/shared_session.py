@@ -100,8 +100,8 @@ class SharedSession:
         """Pass ``wish``, the motion that a sender wants, to the session by calling ``action``.
 
         * ``sent_ns``: the possible times of day, in ns, at which the command was sent.
-        * ``moves_base``: whether ``wish`` is a motion of the base. Only then does a refusal affect
-          the motion interlock.
+        * ``moves_base``: whether ``wish`` is a motion of the base. Only the refusal of such a
+          motion affects the motion interlock.
 
         Raises CommandRefused for a command that waited while this process was stalled. Each refusal
         is also passed to ``refused``, in the order of the events, unless the outbox is full.

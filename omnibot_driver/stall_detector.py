@@ -18,8 +18,8 @@ STANDSTILL_S: Final = 0.4
 notices every stall in which the guard acts."""
 SETTLE_S: Final = 0.25
 """Time after a stall, in s. A command that arrives within this time is regarded as sent during the
-stall, whatever its send time. A command that was sent within this time is regarded as sent during
-the stall too, because a sender's clock is known only roughly."""
+stall, whatever its send time. The same is true of a command that was sent within this time, because
+a sender's clock is known only roughly."""
 LATEST_S: Final = 10.0
 """Longest assumed time in transit, in s, retransmissions included. A command that seems to be older
 comes from a sender whose clock is wrong."""
@@ -39,8 +39,8 @@ class StallDetector:
     """Knows whether this process is stalled now, and when the last stall ended.
 
     The watchdog's thread calls ``passed`` to show that it runs. Other threads call ``begun`` before
-    they act, to learn of a stall. ``outlived_by`` is never True while ``begun`` would report a
-    stall.
+    they act, to learn of a stall. While ``begun`` would report a stall, ``outlived_by`` returns
+    False for every command.
 
     All times are kept by the steady clock, so a step of the time of day does not change them. Each
     call of ``passed`` measures the difference between the time of day and the steady clock.

@@ -54,9 +54,10 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
 
 
 def require_whole_settings(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if a command to the board lacks one of its values.
+    """Raise ParameterError if only a part of the parameters of one command is set.
 
-    Several parameters are written with one command. So the user must set all of them or none.
+    The driver writes these parameters together, with one command. So the user must set all of them
+    or none.
     """
     _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
     _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")

@@ -84,8 +84,8 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
     """Write the record to ``path``; return whether the file exists afterwards.
 
-    ``wanted``: called when the data is on the disk. If it returns False, no file is left. Raises
-    OSError if the file cannot be written.
+    ``wanted``: a function that is called when the data is on the disk. If it returns False, the
+    written data is discarded. Raises OSError if the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)

@@ -22,7 +22,7 @@ class Program:
     """A module of this package as a child process, which ends at the latest with its parent.
 
     Signals from the terminal do not reach the child process, so ctrl-C does not end it. ``end``
-    does.
+    ends it.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:

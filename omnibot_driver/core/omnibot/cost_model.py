@@ -91,8 +91,8 @@ WEIGHTLESS: Final = 2.5
 LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
 
-Such a frame probably has a wrong start: a gyro word of -6, which has the bytes of an IMU header.
-The gyro words after it are small, and are taken for accelerations.
+The supposed header of such a frame is probably a gyro word of -6, which has the same bytes. The
+gyro words after it are small, and are taken for accelerations.
 """
 JUMP: Final = 2.5
 """Cost of a counter that did not advance by one, because an earlier frame was lost."""

@@ -7,7 +7,7 @@ In nominal mode a delta follows every fourth IMU frame, and a pose every fifth d
 board sends only IMU frames.
 
 So the number of discarded bytes between two frames shows which frames were lost, even if a few of
-their bytes are missing. The result may be wrong. The counters (SEQ) and the arrival times correct
+their bytes are missing. If this result is wrong, the counters (SEQ) and the arrival times correct
 it.
 """
 

@@ -58,7 +58,7 @@ Each of these ticks must be read by a read of its own, and must be as late as th
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Number of bytes after a frame within which the cause of a pause in the frame is decided.
 
-If they do not prove an idle line, the reader is assumed to have been late.
+If these bytes do not prove an idle line, the reader is assumed to have been late.
 """
 
 

@@ -4,10 +4,10 @@
 
 Three settings are checked:
 
-* the byte order of the poses: they may be plausible only in the other order;
-* the frame of the deltas, earth or body: their sum may lead to the next pose only in the other
-  frame;
-* the period of the deltas: they may arrive at another rate.
+* The byte order of the poses. It is wrong if the poses are plausible only in the other order.
+* The frame of the deltas, earth or body. It is wrong if the sum of the deltas leads to the next
+  pose only in the other frame.
+* The period of the deltas. It is wrong if the deltas arrive at another rate.
 
 This module knows what the data means under each setting; it does not know how the user is informed.
 """

@@ -48,7 +48,7 @@ def picture_file(given: str | None, subcommand: str) -> Path:
     """Return the path of the picture.
 
     If ``given`` is a folder, the picture is the file ``calibrate_<subcommand>.png`` in this folder.
-    If ``given`` is None, it is the file of that name in the current folder.
+    If ``given`` is None, the picture is the file of that name in the current folder.
 
     Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """

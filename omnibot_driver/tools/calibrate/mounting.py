@@ -2,11 +2,12 @@
 
 """Find how the IMU is mounted, from gravity in three postures of the robot.
 
-The postures are level, front raised and left side raised. In each, the sensor measures the upward
-direction in its own axes. A tilt is the angle between this direction in the level and in another
-posture. From the tilts, the upward directions in the body's axes are computed. The mounting is the
-rotation that fits the measured to the computed directions best (Wahba's problem, solved by a
-singular value decomposition). Finally, a turn to the left shows whether gyro and gravity agree.
+The postures are level, front raised and left side raised. In each posture, the sensor measures the
+upward direction in its own axes. A tilt is the angle between two such directions: in the level
+posture and in another posture. From the tilts, the upward directions in the body's axes are
+computed. The mounting is the rotation that fits the measured to the computed directions best
+(Wahba's problem, solved by a singular value decomposition). Finally, a turn to the left shows
+whether gyro and gravity agree.
 
 This module knows IMU readings; it does not know who holds the robot.
 """

@@ -103,10 +103,10 @@ def answer(
     ``begun``: starting position of the wheel between two marks of the encoder, as a fraction of
     their distance.
 
-    ``sent_s``: time at which the board first sends ticks, or None if it does not send.
+    ``sent_s``: time at which the board first sends ticks, or None if the board does not send.
 
-    If a tick comes while the board sends, the board notices this tick only afterwards. The measured
-    speed is then too low at this tick, and too high at the next tick.
+    If a tick comes while the board sends, the board notices this tick only afterwards. So the
+    measured speed is too low at this tick, and too high at the next tick.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(

@@ -276,7 +276,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 
 
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps that fit a common model well; the others are rejected.
+    """Return the steps that fit a common model well, and leave out the other steps.
 
     A step fits well if its misfit is at most ``UNLIKE`` times the median misfit.
     """

@@ -187,8 +187,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals at these values, and remove it from now on.
 
-        The correlation comes from the marks while their positions are not known. Once they are
-        known, it comes from the changing load.
+        While the positions of the marks are not known, the correlation comes from the marks.
+        Afterwards, it comes from the changing load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)

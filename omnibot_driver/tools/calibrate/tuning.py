@@ -4,8 +4,8 @@
 
 The gains are compared by the integral of the absolute error: after a step of the command, and after
 a step of the load. Examples of a load are a floor, a sagging battery and dry friction. Each
-integral is divided by its value with the present gains, and both have the same weight. The limits
-are:
+integral is divided by its value with the present gains. Both quotients have the same weight. The
+limits are:
 
 - Ms, the peak of the sensitivity, is at most 1.6. With this limit, the loop tolerates an error of a
   factor 2.6 in gain, or of 36° in phase.

@@ -147,7 +147,7 @@ def _gather(feed: "Feed", timeout_s: float) -> View:
     """Wait until the view is complete, and return it.
 
     The view is complete if each topic that the driver publishes in its present state has sent a
-    message. The monitor waits for this until ``timeout_s`` is over. It measures rates over
+    message. The monitor waits for this until ``timeout_s`` is over. The rates are measured over
     ``WINDOW_S``.
     """
     began_s = time.monotonic()

@@ -58,8 +58,8 @@ class Feed:
     ``dead_man``: the dead man's switch. With it, the monitor publishes ``cmd_vel`` while a key is
     held. Without it, the monitor never publishes ``cmd_vel``.
 
-    Any thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``. Their
-    result appears in the view. Raises ToolError for invalid names.
+    Any thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``. The
+    result of such a call appears in the view. Raises ToolError for invalid names.
     """
 
     def __init__(

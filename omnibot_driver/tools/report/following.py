@@ -68,8 +68,8 @@ def twists(log: Log) -> Pair:
 def _scales(log: Log) -> tuple[str, str]:
     """Return the names of the parameters that scale linear and angular speed.
 
-    The user must change them if the measured speeds are wrong. On a robot with two wheels, they
-    scale the odometry. On other robots, they scale the commands.
+    The user must change these parameters if the measured speeds are wrong. On a robot with two
+    wheels, the parameters scale the odometry. On other robots, they scale the commands.
     """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
