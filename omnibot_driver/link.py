@@ -80,7 +80,7 @@ class Link:
         on_write: Callable[[Packet], None] | None = None,
     ) -> None:
         self.unstopped = False
-        """Whether ``close`` could not send Stop to a robot that may be moving."""
+        """Whether ``close`` failed to send Stop although the robot may be moving."""
         self._name, self._failed = port, failed
         shared = self._shared = SharedSession(session, deliver, refused, on_write)
         self._session = session

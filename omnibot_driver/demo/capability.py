@@ -24,8 +24,8 @@ class Capability:
 
     ``sideways``: whether the robot can drive along its y axis.
 
-    ``ports``: the driver's parameter for each address that the simulator prints. The name is empty
-    if the driver derives the address from another one.
+    ``ports``: names of the driver's parameters, one for each address that the simulator prints. A
+    name is empty if the driver derives this address from another one.
 
     ``real``: arguments of the driver for the real robot.
 

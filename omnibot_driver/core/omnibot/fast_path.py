@@ -100,7 +100,7 @@ def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
 
     If a frame follows, odd content before ``at`` is a shock, not damage. The frame must be
     complete, and the bytes after it must be able to begin another frame. If ``at`` is the end of
-    ``held``, the result is ``closed``: whether the line was closed, so that no frame can follow.
+    ``held``, no bytes can show this. In this case the result is True only if the line was closed.
     """
     if at == len(held):
         return closed

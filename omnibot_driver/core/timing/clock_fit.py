@@ -47,7 +47,7 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Place at which the line touches the hull of the points, as a fraction of their time span.
+"""Place at which the line touches the points' hull, as a fraction of the hull's time span.
 
 The place is late enough to follow recent points, and early enough not to follow the jitter of the
 last second.
@@ -161,8 +161,7 @@ class ClockFit:
         return True
 
     def _lay_under(self) -> None:
-        """Place the line along the lower hull of the latest points, at ``SUPPORT`` of their
-        span."""
+        """Place the line along the edge of the latest points' lower hull that is at ``SUPPORT``."""
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])
         middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])

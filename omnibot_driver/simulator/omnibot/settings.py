@@ -50,16 +50,17 @@ class BoardSettings:
     ``wheel_radius_m``. base_radius_scale: true distance of the wheels from the centre divided by
     ``base_radius_m``. slip: mean fraction of each wheel's rim motion that is lost on the floor. The
     actual fraction varies around this mean, independently for each wheel. slope_pwm: force with
-    which a sloping floor pulls the robot, as an effort at the rim in PWM steps. The force is along
-    the x axis that the robot had at construction. imu_rpy_rad: mounting of the IMU. Roll, pitch and
-    yaw about fixed axes turn the body's axes into the sensor's axes, as in a URDF. gyro_bias_dps,
-    gyro_noise_dps: in the sensor's axes, in °/s. The noise is rms per reading. gyro_walk_dps: rms
-    change of the gyro bias within 1 s, in °/s. The change grows with the square root of time.
-    accel_bias_g, accel_noise_g: in the sensor's axes, in g. The noise is rms per reading.
-    gyro_stuck: raw counts that the gyro always reads, whatever the motion; None if the gyro works.
-    boot_time_s: time from power-up or reset until the board is paused. Until then the board sends
-    and obeys nothing. initial_pose: the board's own pose at construction, for a board that has
-    already driven. running: whether the board is awake and in its running mode at construction.
+    which a sloping floor pulls the robot, in PWM steps: the motor effort at the rim that equals
+    this force. The force is along the x axis that the robot had at construction. imu_rpy_rad:
+    mounting of the IMU. Roll, pitch and yaw about fixed axes turn the body's axes into the sensor's
+    axes, as in a URDF. gyro_bias_dps, gyro_noise_dps: in the sensor's axes, in °/s. The noise is
+    rms per reading. gyro_walk_dps: rms change of the gyro bias within 1 s, in °/s. The change grows
+    with the square root of time. accel_bias_g, accel_noise_g: in the sensor's axes, in g. The noise
+    is rms per reading. gyro_stuck: raw counts that the gyro always reads, whatever the motion; None
+    if the gyro works. boot_time_s: time from power-up or reset until the board is paused. Until
+    then the board sends and obeys nothing. initial_pose: the board's own pose at construction, for
+    a board that has already driven. running: whether the board is awake and in its running mode at
+    construction.
     """
 
     seed: int = 0

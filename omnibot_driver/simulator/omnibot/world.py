@@ -86,7 +86,7 @@ class World:
         self._slope_pwm = settings.slope_pwm
         self.held = Held()
         self.force = Force()
-        """Current force on the robot, caused for example by a person or by a bump in the floor."""
+        """Present force on the robot, for example from a person or from a bump in the floor."""
         self.gripped: Twist | None = None
         """Twist that a person forces on the robot against its motors; None if the robot moves
         freely."""

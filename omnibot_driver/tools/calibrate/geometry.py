@@ -22,7 +22,7 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""Difference between a wheel's radius and the mean, as a fraction, above which the tool warns."""
+"""The tool warns if a wheel's radius differs from the mean by more than this fraction."""
 INTRODUCTION: Final = (
     "You need a tape measure, something to mark the floor with, and a plumb or a fixed point"
     " under the robot's centre. Before each drive mark where the centre is and where the front"

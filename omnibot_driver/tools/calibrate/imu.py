@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
-"""Largest number of readings to draw. More readings enlarge the file, but not what can be seen."""
+"""Largest number of drawn readings. More readings would enlarge the file without a visible
+effect."""
 GRAVITY_SIGMA: Final = 0.01
 """Standard deviation of the user's value for the local gravity, in m/s²."""
 

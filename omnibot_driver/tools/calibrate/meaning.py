@@ -40,7 +40,7 @@ PURE_TURN: Final = 0.5
 The ratio is 0 if the driver interprets the odometry deltas correctly. Otherwise it is 2 or more.
 """
 ALIKE: Final = 0.35
-"""Largest difference of angles that are regarded as equal, as a fraction of the robot's turn."""
+"""Two angles are regarded as equal if they differ by at most this fraction of the robot's turn."""
 
 
 LEAST_M: Final = 1e-3

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SHOWN_S: Final = 2.5
 WORSE: Final = 1.1
-"""Increase of a step's error, as a factor, above which the tool regards new gains as worse."""
+"""New gains are regarded as worse if they increase a step's error by more than this factor."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from omnibot_driver.tools.needs import ToolError
 
 SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
-"""Largest fraction of the times in a record that may be missing."""
+"""Largest accepted fraction of missing times in a record."""
 UNLIKE: Final = 1.5
 """Largest accepted ratio of a time between ticks to the median of these times.
 

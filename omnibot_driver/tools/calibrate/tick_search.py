@@ -45,7 +45,7 @@ LAGS: Final = 60
 Even such distant residuals are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
-"""Sum of the relative errors of two successive times above which the board has missed a mark.
+"""The board has missed a mark if two successive times have a sum of relative errors above this.
 
 If the board only noticed a mark late, the sum is near 0: the first time is too long, and the second
 is too short by the same amount. A time with a missed mark is not twice as long as usual, because

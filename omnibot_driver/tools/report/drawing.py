@@ -21,7 +21,7 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""How many points a line may have. A longer line is drawn as its envelope."""
+"""Largest number of points of a drawn line. A longer line is drawn as its envelope."""
 
 
 def new_figure(height_in: float) -> Figure:
