@@ -82,7 +82,9 @@ class Adjusting(Moves):
         if self.motion is Motion.REVERSE and not told:
             self.odometry.left_over_right = self.loop.left_over_right
             self.odometry.bend = self.loop.bend
-        elif self.motion in (Motion.SPIN, Motion.TURN):
+        elif self.motion is Motion.TURN:
+            self.odometry.left_over_right = -(self._records.balance or self.loop.balance)
+        elif self.motion is Motion.SPIN:
             self.odometry.left_over_right = -self.loop.balance
         else:
             self.odometry.left_over_right = None

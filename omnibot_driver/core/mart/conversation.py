@@ -188,15 +188,13 @@ class Conversation:
     def _owed(self, word: Word, now: float) -> bool:
         return any(self._owed_until_s.get(form, -math.inf) > now for form in word.forms)
 
-    def ask(self, request: Request, now: float, takes_s: float | None = None) -> Packets:
+    def ask(self, request: Request, now: float, patience_s: float | None = None) -> Packets:
         """Return the packets with the request, and begin to wait for its reply.
 
-        ``takes_s``: longest time in s that the server needs. The default is the limit of the
-        command.
+        ``patience_s``: how long to wait, in s. The default follows from the command.
         """
-        patience_s = self._patience_s(request.word)
-        if takes_s is not None:
-            patience_s = takes_s + 2 * self.delay_s
+        if patience_s is None:
+            patience_s = self._patience_s(request.word)
         self.pending = Pending(request, now, now + patience_s)
         return ((request.word.channel, request.data),)
 

@@ -33,6 +33,7 @@ from omnibot_driver.core.mart.states import (
     may_say,
 )
 from omnibot_driver.core.mart.stopping import Stopping
+from omnibot_driver.core.mart.turn_record import TurnRecords
 from omnibot_driver.core.mart.words import Request, Word
 from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
@@ -90,6 +91,7 @@ class Ground:
         self.jobs = Jobs()
         self.proof = StopProof()
         self._surplus = Surplus()
+        self._records = TurnRecords()
         self._turns = SpotTurns(settings, self.odometry, self.loop)
         self._polls = Polls()
         self.readings: list[Reading] = []
@@ -107,6 +109,7 @@ class Ground:
         self._settings = self.odometry.settings = self.loop.settings = settings
         self._turns.settings = settings
         self._turns.keep_lessons()
+        self._records.forget()
         self.conversation.delay_s = settings.network_delay_s
 
     def connect(self) -> None:
@@ -128,10 +131,12 @@ class Ground:
         self._refused = False
         self._moved_last = False
         self._copies_stopped_s = -math.inf
+        self._port_is_free = False
         self._moved_by: Request | None = None
         self._last_move: Request | None = None
         self._recorded: Request | None = None
-        self._unrecorded = 0
+        self._records.connect()
+        self._file_s = -math.inf
         self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._blocked: Motion = Motion.NONE

@@ -23,6 +23,13 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 PIECE: Final = 512
 QUIET_S: Final = 1.0
 """Time in s without a piece after which the driver does not expect further pieces of a file."""
+RECORD_S, RECORD_QUIET_S = 0.25, 0.15
+"""Times in s for which the driver waits for the record of a turn, because it drives on after that.
+
+``RECORD_S``: for the reply, in addition to the average duration of three queries.
+
+``RECORD_QUIET_S``: for each piece.
+"""
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a job in REPEATED."""
 
@@ -77,12 +84,13 @@ class Jobs:
 
     ``moving``: whether the driver has sent the controlled move of the docking job.
 
-    ``turn_record``: pieces of the last TURN_RECORD, perhaps none; None if the job was cancelled.
+    ``turn_record``: name and pieces of the file of the last TURN_RECORD; None if the job was
+    cancelled.
     """
 
     def __init__(self) -> None:
         self.done: list[JobDone] = []
-        self.turn_record: list[bytes] | None = None
+        self.turn_record: tuple[str, list[bytes]] | None = None
         self.forget_log()
         self.moving = False
         self._clear()
@@ -218,10 +226,11 @@ class Jobs:
         """Keep a datagram as a piece of the file if it has the size of a piece."""
         if len(data) in (PIECE, self._size % PIECE):
             self._pieces.append(data)
-            self._piece_s = now + QUIET_S
-            if len(self._pieces) * PIECE >= self._size:
-                waits_for_copies = self.job is not Job.TURN_RECORD
-                self._piece_s = now + (QUIET_S / 3 if waits_for_copies else 0.0)
+            complete = len(self._pieces) * PIECE >= self._size
+            if self.job is Job.TURN_RECORD:
+                self._piece_s = now + (0.0 if complete else RECORD_QUIET_S)
+            else:
+                self._piece_s = now + (QUIET_S / 3 if complete else QUIET_S)
 
     def tick(self, now: float) -> None:
         """End a download that gets no more pieces, or a job that has taken too long."""
@@ -259,7 +268,7 @@ class Jobs:
 
     def _finish(self, success: bool, message: str, content: bytes = b"") -> None:
         if self.job is Job.TURN_RECORD:
-            self.turn_record = self._pieces
+            self.turn_record = self._name, self._pieces
         else:
             self.done.append(JobDone(self._token, success, message, self._name, content))
         self._clear()

@@ -7,7 +7,6 @@ time.
 """
 
 import math
-from typing import Final
 
 from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.errors import RequestRefused
@@ -17,11 +16,7 @@ from omnibot_driver.core.mart.goal import Done, Move, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
-from omnibot_driver.core.mart.turn_record import recorded_deg
 from omnibot_driver.core.mart.words import Request
-
-UNRECORDED: Final = 2
-"""After this number of turns in a row without a usable record, no more records are downloaded."""
 
 
 class Moves(Asking):
@@ -82,16 +77,17 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn by how much a move that has ended goes beyond its target.
 
-        The wheel does not measure a turn exactly, so the driver first downloads the record of the
-        turn. On a network that has just lost or delayed datagrams, the driver skips this download.
+        The wheel does not measure a turn exactly, so the driver may first download the record of
+        the turn. On a network that has just lost or delayed datagrams, it skips this download.
         """
         turns = move.word in (words.MCR, words.MCL)
-        if turns and self._unrecorded < UNRECORDED and not self.conversation.disturbed(now):
+        if turns and self._records.wanted and not self.conversation.disturbed(now):
             try:
                 self.jobs.ask(Job.TURN_RECORD, None, now)
             except RequestRefused:
                 pass  # the user has called a job
             else:
+                self._records.asked()
                 self._recorded = move
                 return
         self._surplus.learn(move, self.odometry.moved_m, self.odometry.turn.spun_rad)
@@ -101,11 +97,16 @@ class Moves(Asking):
         if self._recorded is None or self.jobs.job is Job.TURN_RECORD:
             return
         turn, self._recorded = self._recorded, None
-        if self.jobs.turn_record is not None:
-            degrees = recorded_deg(self.jobs.turn_record, turn)
-            used = degrees is not None and self.odometry.turn_recorded(degrees)
-            self._unrecorded = 0 if used else self._unrecorded + 1
-        self._surplus.learn(turn, 0.0, self.odometry.turn.spun_rad)
+        odometry = self.odometry
+        if self.jobs.turn_record is None:
+            self._records.cancelled()
+        else:
+            spun_rad, ratio = odometry.turn.spun_rad, odometry.left_over_right
+            degrees = self._records.degrees(*self.jobs.turn_record, turn)
+            if degrees is not None and odometry.turn_recorded(degrees):
+                wheel_rad = spun_rad / (2.0 if ratio is None else 1.0 - ratio)
+                self._records.used(odometry.turn.spun_rad, wheel_rad)
+        self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
 
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.

@@ -213,7 +213,7 @@ class Pilot(Hearing):
         controlled move.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
-        if self.state is not State.STILL or not suspected:
+        if self.state is not State.STILL or not suspected or self._port_is_free:
             return math.inf
         apart_s = self._halted_s + self._delay_s
         silent_s = COPY_S

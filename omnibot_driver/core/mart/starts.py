@@ -18,6 +18,7 @@ from omnibot_driver.core.mart.ground import (
     GREET_S,
     STARTS_UP_S,
 )
+from omnibot_driver.core.mart.jobs import RECORD_S, Job
 from omnibot_driver.core.mart.replies import Fail
 from omnibot_driver.core.mart.required_motion import is_turn_ramped
 from omnibot_driver.core.mart.spot_turns import SLOW_UNITS
@@ -30,7 +31,7 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
-from omnibot_driver.core.mart.words import Kind, Request
+from omnibot_driver.core.mart.words import Form, Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 TIMED_OUT_S: Final = 0.5
@@ -163,7 +164,7 @@ class Starts(Adjusting):
         self._require(start.word)
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
-        self._recorded = None
+        self._recorded, self._port_is_free = None, False
         self._start, self._refused = start.word, False
         self._started_s = now
         self.imu.used()
@@ -188,7 +189,7 @@ class Starts(Adjusting):
         else:
             self._turns.begin(twist.yaw_rate_radps)
         self._predict_turn()
-        return self.conversation.ask(start, now, takes_s=_longest_s(start))
+        return self.conversation.ask(start, now, _longest_s(start) + 2 * self._delay_s)
 
     def _started(self, answer: Answer, now: float) -> None:
         if isinstance(answer.reply, Fail):
@@ -273,6 +274,10 @@ class Starts(Adjusting):
                 return NO_PACKETS
             if not self.imu.fresh(now):
                 return self._check(now)
+        if Form.FILE in request.word.forms:
+            if now < self._file_s + 2 * self._delay_s:
+                return NO_PACKETS  # a copy of the last request would bring another file
+            self._file_s = now
         self.jobs.sent(request, now)
         if request.word in STARTS:
             return self._begin(request, now)
@@ -280,7 +285,10 @@ class Starts(Adjusting):
         self.state = State.SERVING
         if request.word in HARMFUL_LATE:
             self._harmful_s = now
-        return self._ask(request, now)
+        patience_s = None
+        if self.jobs.job is Job.TURN_RECORD:
+            patience_s = RECORD_S + 3 * self.conversation.trip_s
+        return self.conversation.ask(request, now, patience_s)
 
 
 def _longest_s(start: Request) -> float:

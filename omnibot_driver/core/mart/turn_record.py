@@ -4,8 +4,11 @@
 
 The reply to MCR and MCL does not contain the angle. The public server writes the angle at the
 beginning of a file, as the integral of the gyro until the robot was at rest. The manual does not
-describe this file, so the driver also works without it. This module knows the form of the file; it
-does not know when the file is downloaded.
+describe this file, so the driver also works without it.
+
+The public server does not close a file that it has sent, and cannot open many more than 1,000. So
+the driver downloads records only until they have shown the ratio of the motors' speeds. This module
+knows the form of the file; it does not know when the file is downloaded.
 """
 
 import re
@@ -15,12 +18,83 @@ from omnibot_driver.core.mart.words import Request
 
 SAME_DEG: Final = 0.5
 """Largest accepted difference between the requested angle in degrees and the one in the file."""
+LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
+"""Sums of the recorded angles, in rad.
+
+From LEAST_RAD on, the driver uses the ratio that the records show. From ENOUGH_RAD on, it downloads
+no more records.
+"""
+MOST: Final = 30
+"""Largest number of records that one run of the driver downloads."""
+UNRECORDED: Final = 3
+"""After this number of downloads in a row without a usable record, the driver downloads no more."""
 _HEAD: Final = re.compile(
     rb"MC Spin sensor data log\r?\n"
     rb".*\nTarget motion \([^)]*\): (?P<asked>\d+\.\d+)\r?\n"
     rb".*\n +@ stop detected - (?P<turned>-?\d+\.\d+)\r?\n",
     re.DOTALL,
 )
+
+
+class TurnRecords:
+    """The records of controlled turns: whether another one is needed, and what they have shown."""
+
+    def __init__(self) -> None:
+        self._downloads = 0
+        self.connect()
+        self.forget()
+
+    def connect(self) -> None:
+        """Begin a new connection, perhaps with another server."""
+        self._failures, self._name = 0, ""
+
+    def forget(self) -> None:
+        """Forget the ratio of the motors' speeds, because the sizes of the robot have changed."""
+        self._told_rad = self._wheel_rad = 0.0
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the record of the next turn is needed."""
+        few = self._downloads < MOST and self._failures < UNRECORDED
+        return few and self._told_rad < ENOUGH_RAD
+
+    @property
+    def balance(self) -> float | None:
+        """The speed of the left motor divided by that of the right one in controlled turns.
+
+        None until the records have shown this ratio.
+        """
+        return self._told_rad / self._wheel_rad - 1.0 if self._told_rad >= LEAST_RAD else None
+
+    def asked(self) -> None:
+        """Record that a download begins. It counts as a failure until ``used`` is called."""
+        self._downloads += 1
+        self._failures += 1
+
+    def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
+        """Return the recorded angle as ``recorded_deg`` does, from the file called ``name``.
+
+        If the server cannot write a new file, it sends that of an earlier turn again. Then the name
+        is the same as before, and the result is None.
+        """
+        again, self._name = name == self._name, name
+        return None if again else recorded_deg(pieces, request)
+
+    def used(self, told_rad: float, wheel_rad: float) -> None:
+        """Learn from a record that the odometry has used.
+
+        ``told_rad``: the recorded turn.
+
+        ``wheel_rad``: the part of the turn that comes from the right wheel. If both motors are
+        equal, this is half the turn.
+        """
+        self._failures = 0
+        self._told_rad += abs(told_rad)
+        self._wheel_rad += abs(wheel_rad)
+
+    def cancelled(self) -> None:
+        """Record that the download has shown nothing, because a command or a job has ended it."""
+        self._failures -= 1
 
 
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:

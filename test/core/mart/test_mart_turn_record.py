@@ -3,6 +3,7 @@
 """The angle of a controlled turn comes from the server's record, if the server has one."""
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -11,11 +12,12 @@ from mart_bench import MartBench
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
-from omnibot_driver.core.mart.jobs import PIECE
-from omnibot_driver.core.mart.moves import UNRECORDED
-from omnibot_driver.core.mart.turn_record import recorded_deg
+from omnibot_driver.core.mart.jobs import PIECE, Job
+from omnibot_driver.core.mart.turn_record import MOST, UNRECORDED, recorded_deg
 from omnibot_driver.core.mart.words import MCL, MCR
 from omnibot_driver.simulator.mart import files
+from omnibot_driver.simulator.mart.board import TICK_S
+from omnibot_driver.simulator.mart.motion import Kind
 
 RECORD = (
     b"MC Spin sensor data log\n"
@@ -28,6 +30,7 @@ RECORD = (
     b"Max speed: 20\n"
 )
 """The beginning of a file of the public server, for a turn to the right."""
+LONGEST_REPLY = 100
 GOALS = [(1.0, 1.0, 3.0), (-1.0, 0.5, -2.0), (0.5, -1.0, 1.5), (0.0, 0.0, 0.0)]
 
 
@@ -35,6 +38,45 @@ def go(bench: MartBench, goal: Pose) -> None:
     """Command the goal and wait until the driver has ended it."""
     bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
     bench.run_until(lambda: bench.board.figures.own["Goal"].startswith("over"), 120.0)
+
+
+def lose_once(bench: MartBench, begins: bytes) -> None:
+    """Lose the next datagram that begins so, in either direction."""
+    lost: list[bytes] = []
+    for way in (bench.robot.network[0].to_board, bench.robot.network[0].from_board):
+
+        def send(data: bytes, at_s: float, real: Any = way.send) -> None:
+            if data.startswith(begins) and not lost:
+                lost.append(data)
+            else:
+                real(data, at_s)
+
+        way.send = send
+    bench.robot._good = False
+
+
+def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
+    """Duplicate the next ``request``; the copy comes ``after_s`` later, its replies ``late_s``.
+
+    Return a list to which the arrival time of the copy is added.
+    """
+    copied_s: list[float] = []
+    there, back = bench.robot.network[0].to_board, bench.robot.network[0].from_board
+
+    def send(data: bytes, at_s: float, real: Any = there.send) -> None:
+        real(data, at_s)
+        if data == request and not copied_s:
+            copied_s.append(at_s + after_s)
+            real(data, at_s + after_s)
+
+    def reply(data: bytes, at_s: float, real: Any = back.send) -> None:
+        of_copy = copied_s and at_s >= copied_s[0] - TICK_S
+        is_file = data.startswith(b"ok MCSpin") or len(data) > LONGEST_REPLY
+        real(data, at_s + (late_s if of_copy and is_file else 0.0))
+
+    there.send, back.send = send, reply
+    bench.robot._good = False
+    return copied_s
 
 
 def downloads(bench: MartBench) -> int:
@@ -50,7 +92,7 @@ def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
     assert recorded_deg([RECORD.replace(b"\n", b"\r\n")], MCR.request(90)) == -91.73
 
 
-def test_the_record_of_another_turn_is_not_used() -> None:
+def test_the_file_of_another_angle_is_not_used() -> None:
     """The driver uses a record only if its target is the angle that the driver has requested."""
     assert recorded_deg([RECORD], MCL.request("SLOW", 89)) is None
 
@@ -90,13 +132,13 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 
 
 @pytest.mark.parametrize("missing", ["angle", "file"])
-def test_a_server_without_records_is_asked_twice(
+def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The manual does not say what the file contains, so a server may give no angle.
 
-    The robot reaches its goals without it. The driver requests the record of two turns, and then no
-    more.
+    The robot reaches its goals without it. The driver requests the record of three turns, and then
+    no more.
     """
     bench = MartBench("source").ready()
     if missing == "angle":
@@ -107,6 +149,80 @@ def test_a_server_without_records_is_asked_twice(
         go(bench, Pose(*goal))
         assert bench.truth.way_to(Pose(*goal)).way_m < 0.1
     assert downloads(bench) == UNRECORDED
+
+
+def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
+    """The public server leaves each file open that it sends, so it must not send many.
+
+    One motor turns 10 % faster. After some turns, the driver measures turns by the right wheel and
+    the ratio that the records have shown.
+    """
+    bench = MartBench("source", motor_inequality=0.1).ready()
+    for _ in range(2):
+        for goal in GOALS:
+            go(bench, Pose(*goal))
+    before = downloads(bench)
+    assert 4 < before <= MOST
+    for goal in GOALS:
+        go(bench, Pose(*goal))
+        assert bench.truth.way_to(Pose(*goal)).way_m < 0.15
+    assert downloads(bench) == before
+
+
+def test_the_record_of_an_earlier_turn_is_not_used() -> None:
+    """The server's file system is full, so LAST TURN sends the file of an earlier turn again.
+
+    The earlier turn was requested with the same angle. The robot turns further this time.
+    """
+    bench = MartBench("source").ready()
+    for yaw_rad in (math.pi / 2, math.pi, -math.pi / 2, 0.0):
+        go(bench, Pose(0.0, 0.0, yaw_rad))
+    bench.server.save = lambda note: None
+    count = downloads(bench)
+    bench.go_to(0.0, 0.0, math.pi / 2)
+    bench.run_until(lambda: not bench.robot.stands, 5.0)
+    bench.server.motions[Kind.CONTROLLED_SPIN].target += 15
+    bench.run_until(lambda: downloads(bench) > count, 20.0)
+    bench.run(0.3)
+    assert abs(bench.error.yaw_rad) < math.radians(3)
+
+
+@pytest.mark.parametrize("lost", [b"LAST TURN", b"ok MCSpin"])
+def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes) -> None:
+    """The request or the reply is lost, so the driver does not wait long for it.
+
+    The user's next command starts a motion at once. The server is not regarded as absent.
+    """
+    bench = MartBench("source").ready()
+    assert bench.job(Job.LOG).success
+    lose_once(bench, lost)
+    bench.go_to(0.0, 1.0, 0.0)
+    bench.run_until(lambda: downloads(bench) == 1, 20.0)
+    from_s = bench.now
+    while not any(data.startswith(b"RM ") for data in bench.said()):
+        bench.try_command(0.2, 0.0)
+        bench.run(0.05)
+    assert bench.now - from_s < 0.6
+    assert not bench.board._pilot.jobs.log_may_be_lost
+
+
+@pytest.mark.parametrize("late_s", [0.1, 0.2, 0.29])
+def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
+    late_s: float,
+) -> None:
+    """The network duplicates the driver's LAST TURN. The copy and its replies are late.
+
+    The user calls ~/download_last_move meanwhile. The driver sends this request only after the
+    replies to the copy can no longer arrive.
+    """
+    bench = MartBench("source").ready()
+    go(bench, Pose(0.5, 0.0, 0.0))
+    copied_s = copy_late(bench, b"LAST TURN", 0.29, late_s)
+    bench.go_to(0.5, 0.0, math.pi / 2)
+    bench.run_until(lambda: bool(copied_s) and bench.board.resting, 30.0)
+    done = bench.job(Job.LAST_MOVE)
+    assert done.success
+    assert done.name.startswith("TLinearMotion")
 
 
 def test_a_new_command_does_not_wait_for_the_record() -> None:
