@@ -30,8 +30,8 @@ def locate(file: str) -> Path:
         return Path(file).expanduser()
     except RuntimeError as error:
         raise ParameterError(
-            f"the calibration_file {file} cannot be found: its home folder does not exist; give"
-            " the full path"
+            f"the calibration_file {file} cannot be found: the home folder in this path does not"
+            " exist; give the full path"
         ) from error
 
 

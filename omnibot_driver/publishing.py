@@ -54,8 +54,9 @@ class Publishing:
         if strange := difference(settings):
             self._maker = Messages
             node.get_logger().warning(
-                f"rclpy serialises {strange} differently on this computer; the driver publishes"
-                " ordinary messages instead, which costs a little processor time"
+                f"on this computer, rclpy serialises {strange} differently from the driver; so"
+                " the driver lets rclpy serialise its messages, which costs a little more"
+                " processor time"
             )
         self.settings = settings
         self._port, self._channels = values["port"], traits.channels

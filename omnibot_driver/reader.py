@@ -92,7 +92,7 @@ class Reader:
     def _attach(self, port: Transport) -> None:
         names = self._session.board.traits.channels
         missing = {
-            f"the line '{names[number]}' is missing": why for number, why in port.missing.items()
+            f"the port '{names[number]}' is missing": why for number, why in port.missing.items()
         }
         self.trouble = "; ".join(f"{which}: {why}" for which, why in missing.items())
         self._tell(partial(self._report, self.trouble or None))
@@ -113,7 +113,7 @@ class Reader:
         with self._lock:
             self._shared.write(self._session.shutdown.broken_off())
             self._session.closed(now := time.monotonic())
-            self._session.opened(now, missing="a line of the board was connected or lost")
+            self._session.opened(now, missing="a port of the board was connected or lost")
             keeper = self._shared.keeper
         try:
             self._attach(port)

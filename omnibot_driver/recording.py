@@ -108,8 +108,8 @@ def _find_topics(url: str, path: Path, wanted: str, channels: Sequence[str]) -> 
         (home,) = found
         return tuple(home + name for name in names)
     if not raw:
-        raise _refusal(url, f"it has no topic {RAW_NAME[1:]}; record with `publish_raw: true`")
-    raise _refusal(url, f"choose one of its topics with topic={' or topic='.join(raw)}")
+        raise _refusal(url, f"the bag has no topic {RAW_NAME[1:]}; record with `publish_raw: true`")
+    raise _refusal(url, f"choose one of the bag's topics with topic={' or topic='.join(raw)}")
 
 
 def _number(url: str, name: str, text: str, low: float, high: float) -> float:

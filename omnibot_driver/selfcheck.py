@@ -93,7 +93,7 @@ def type_conflict(publishers: Iterable[Any], *, stamped: bool) -> str:
     if not unheard:
         return ""
     return (
-        f"{', '.join(unheard)} publishes cmd_vel with a type other than {ours}, so the driver does"
-        f" not receive it; for {other} start the driver with"
+        f"{', '.join(unheard)} publishes cmd_vel with a type other than {ours}, so the driver"
+        f" does not receive it; to receive {other}, start the driver with"
         f" enable_stamped_cmd_vel:={str(not stamped).lower()}"
     )

@@ -120,5 +120,7 @@ def test_a_home_that_nobody_has_is_refused() -> None:
     The home folder of an unknown user is refused.
     """
     assert calibration.locate("~/robot.yaml") == Path.home() / "robot.yaml"
-    with pytest.raises(ParameterError, match="its home folder does not exist; give the full path"):
+    with pytest.raises(
+        ParameterError, match="home folder in this path does not exist; give the full"
+    ):
         calibration.locate("~nosuchuser/robot.yaml")

@@ -125,14 +125,14 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
     lines.link.start()
     lines.drive.read_until(5 * STOPS)
     lines.come_to_state("connecting")
-    with pytest.raises(CommandRefused, match="the line 'sense' is missing"):
+    with pytest.raises(CommandRefused, match="the port 'sense' is missing"):
         command(lines.link)
     (report,) = lines.listener.reports
-    assert str(report).startswith(f"the line 'sense' is missing: {lines.name} does not exist")
+    assert str(report).startswith(f"the port 'sense' is missing: {lines.name} does not exist")
     assert lines.link.figures()[0].trouble == report
     answer = lines.link.call(lambda session, now: session.estop(True, now))
     assert answer.endswith(
-        "the line 'sense' is missing: the driver sends the stop on the other lines only; cut the"
+        "the port 'sense' is missing: the driver sends the stop on the other ports only; cut the"
         " motor power if the robot moves"
     )
     lines.drive.read_until(20 * STOPS)
@@ -179,7 +179,7 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
     os.write(lines.sense.far, b"d 0 0\n")
     lines.listener.wait_for(lambda: lines.estimates)
     assert lines.session.state == "connecting"
-    with pytest.raises(CommandRefused, match="the line 'drive' is missing"):
+    with pytest.raises(CommandRefused, match="the port 'drive' is missing"):
         command(lines.link)
     assert missing.args[0] in str(lines.listener.reports)
 

@@ -80,7 +80,7 @@ def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: P
     assert recording.topics == (f"/b{RX}/two", f"/b{RX}/one")
     expected = {(at_ns, (channel, data)) for at_ns, data in CHUNKS for channel in (0, 1)}
     assert set(recording.chunks()) == expected
-    with pytest.raises(ParameterError, match="choose one of its topics"):
+    with pytest.raises(ParameterError, match="choose one of the bag's topics"):
         open_recording(f"replay://{path}", ("two", "one"))
 
 
@@ -101,7 +101,7 @@ def test_without_options_it_is_played_at_its_own_speed_after_five_seconds(tmp_pa
         ("?speed=nan", "speed must be 0.01 to inf, not 'nan'"),
         ("?delay=-1", "delay must be 0 to 3600, not '-1'"),
         ("?rate=2", "there is no option 'rate', only speed, delay and topic"),
-        ("?topic=/odom", f"choose one of its topics with topic={RX}"),
+        ("?topic=/odom", f"choose one of the bag's topics with topic={RX}"),
     ],
 )
 def test_options_that_make_no_sense_are_refused(tmp_path: Path, query: str, why: str) -> None:

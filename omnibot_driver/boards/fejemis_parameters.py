@@ -31,8 +31,9 @@ WHEELS: Final = (
         "wheel_radii",
         [0.0775, 0.0775],
         "m",
-        "Radius of the left and the right driving wheel, written to the board together with gear,"
-        " encoder_ticks and track (confw). Unset: the board keeps its own values.",
+        "Radius of the left and the right driving wheel. The driver writes it, `gear`,"
+        " encoder_ticks and `track` to the drive board, with the command `confw`. Unset: the"
+        " board keeps its own values.",
         low=0.001,
         high=1.0,
         unset=True,
@@ -41,8 +42,8 @@ WHEELS: Final = (
         "gear",
         19.0,
         "",
-        "Turns of the motor for one turn of a driving wheel (confw). Unset: the board keeps its"
-        " own value.",
+        "Turns of the motor for one turn of a driving wheel. The driver writes the value with"
+        " the command `confw`. Unset: the board keeps its own value.",
         low=1.0,
         high=1000.0,
         unset=True,
@@ -51,7 +52,8 @@ WHEELS: Final = (
         "encoder_ticks",
         68,
         "ticks",
-        "Encoder ticks of one turn of the motor (confw). Unset: the board keeps its own value.",
+        "Encoder ticks of one turn of the motor. The driver writes the value with the command"
+        " `confw`. Unset: the board keeps its own value.",
         low=1,
         high=100_000,
         unset=True,
@@ -60,8 +62,8 @@ WHEELS: Final = (
         "track",
         0.4,
         "m",
-        "Distance between the driving wheels, B in the manual (confw, confs). Unset: the boards"
-        " keep their own values.",
+        "Distance between the driving wheels. The manual calls it B. The driver writes it with"
+        " the commands `confw` and `confs`. Unset: the boards keep their own values.",
         low=0.01,
         high=10.0,
         unset=True,
@@ -70,9 +72,9 @@ WHEELS: Final = (
         "steering_distance",
         0.42,
         "m",
-        "Distance from the axle of the driving wheels to the steered wheel. The manual calls it F"
-        " or S. The driver writes it to both boards together with track (confs). Unset: the boards"
-        " keep their own values.",
+        "Distance from the axle of the driving wheels to the steered wheel. The manual calls it"
+        " F or S. The driver writes it and `track` to both boards, with the command `confs`."
+        " Unset: the boards keep their own values.",
         low=0.01,
         high=10.0,
         unset=True,
@@ -81,8 +83,9 @@ WHEELS: Final = (
         "front_wheel_offset",
         0.0,
         "rad",
-        "Reading of the angle sensor when the front wheel is straight, written to the board"
-        " together with front_wheel_inverted (fwoffset). Unset: the board keeps its own value.",
+        "Reading of the angle sensor when the front wheel is straight. The driver writes it and"
+        " front_wheel_inverted to the front board, with the command `fwoffset`. Unset: the board"
+        " keeps its own value.",
         low=-math.pi,
         high=math.pi,
         unset=True,
@@ -91,17 +94,19 @@ WHEELS: Final = (
         "front_wheel_inverted",
         False,
         "",
-        "Whether the angle sensor is positive to the right (fwoffset). Unset: the board keeps its"
-        " own value.",
+        "True if the angle sensor gives a positive reading when the front wheel is turned to the"
+        " right. The driver writes the value with the command `fwoffset`. Unset: the board keeps"
+        " its own value.",
         unset=True,
     ),
     Parameter(
         "steering_gains",
         [1.0],
         "",
-        "Parameters of the steering controller in the order of cpsteer (cssteer): use, Kp, useI,"
-        " taui, ilimit, 1, useLeadf, tz, tp, useLeadb, tz, tp, usePre, tz, tp, useULim, Ulim."
-        " Unset: the board keeps its own values.",
+        "Numbers of the steering controller, in this order: use, Kp (proportional part), useI,"
+        " taui, ilimit, 1 (integral part), useLeadf, tz, tp (lead filter), useLeadb, tz, tp"
+        " (second lead filter), usePre, tz, tp (prefilter), useULim, Ulim (output limit). The"
+        " driver writes them with the command `cssteer`. Unset: the board keeps its own values.",
         length=(1, MOST_GAINS),
         low=-1e6,
         high=1e6,
@@ -114,15 +119,16 @@ DRIVING: Final = (
         "allow_reverse",
         False,
         "",
-        "Send negative speeds to the board. The manual does not say how the steering behaves"
-        " then: test it first with the wheels off the ground (docs/boards/fejemis.md).",
+        "Send negative speeds to the board. The manual does not say how the board steers at a"
+        " negative speed. So test it first with the wheels off the ground"
+        " (docs/boards/fejemis.md).",
     ),
     Parameter(
         "line_sums",
         "auto",
         "",
-        "Whether each line begins with a checksum (;NN). auto: if the Teensy's heartbeats do;"
-        " on: always; off: never.",
+        "Whether each line begins with a checksum (;NN). auto: if the Teensy's heartbeats begin"
+        " with one; on: always; off: never.",
         choices=("auto", "on", "off"),
         fixed=True,
     ),
@@ -131,9 +137,10 @@ DRIVING: Final = (
         10.0,
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
-        " the board supplies it. The driver sends whole seconds. It replaces a number that could"
-        " lose two digits on the line without a wrong checksum by a larger one: for example, 120"
-        " by 131. The answer of ~/power_off states the time in use.",
+        " the board supplies it. The driver sends whole seconds. On a bad line, some numbers"
+        " could lose two digits without a wrong checksum. The driver sends a larger number"
+        " instead: for example, 131 instead of 120. The answer of ~/power_off states the time in"
+        " use.",
         low=1.0,
         high=3600.0,
     ),
@@ -152,7 +159,7 @@ SENSORS: Final = (
         "acceleration_unit",
         "m/s^2",
         "",
-        "Unit of the board's acc lines; some firmware sends g.",
+        "Unit of the accelerations that the board sends (`acc`). Some firmware sends g.",
         choices=("m/s^2", "g"),
         fixed=True,
     ),
@@ -160,8 +167,8 @@ SENSORS: Final = (
         "ir_calibration",
         [46000.0, 14000.0, 46000.0, 14000.0],
         "",
-        "Raw readings of infrared sensor 1 at 13 cm and 50 cm, then of sensor 2 (irc). Unset: the"
-        " board keeps its own values.",
+        "Raw readings of infrared sensor 1 at 13 cm and at 50 cm, then those of sensor 2. The"
+        " driver writes them with the command `irc`. Unset: the board keeps its own values.",
         low=0.0,
         high=1e6,
         unset=True,
@@ -170,8 +177,9 @@ SENSORS: Final = (
         "mag_calibration",
         [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         "µT",
-        "Offsets of the magnetometer, then a matrix by rows (magcal). Unset: the board keeps its"
-        " own values.",
+        "Offsets of the magnetometer's three axes, then the rows of its 3 x 3 matrix of rotation"
+        " and scale. The driver writes them with the command `magcal`. Unset: the board keeps"
+        " its own values.",
         low=-1e4,
         high=1e4,
         unset=True,
@@ -180,8 +188,8 @@ SENSORS: Final = (
         "accel_calibration",
         [0.0, 0.0, 0.0, 1.0, 1.0, 1.0],
         "m/s²",
-        "Offsets of the accelerometer, then scales (acccal). Unset: the board keeps its own"
-        " values.",
+        "Offsets of the accelerometer's three axes, then their scales. The driver writes them"
+        " with the command `acccal`. Unset: the board keeps its own values.",
         low=-100.0,
         high=100.0,
         unset=True,

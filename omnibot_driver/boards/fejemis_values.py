@@ -48,8 +48,9 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
     port, front = (str(values[name]) for name in ("port", "front_port"))
     if port == front or (port.startswith("/") and _same(port, front)):
         raise ParameterError(
-            f"parameter 'front_port' must not be '{front}', the value of 'port': the drive"
-            " and the front Teensy have a port each; `ls /dev/serial/by-id/` shows the ports"
+            f"parameter 'front_port' must differ from 'port', but both lead to '{front}': the"
+            " drive Teensy and the front Teensy each have their own port;"
+            " `ls /dev/serial/by-id/` shows the ports"
         )
 
 

@@ -89,9 +89,9 @@ DRIVING: Final = (
         "low_pass",
         1.0,
         "",
-        "Low-pass of the commanded RPM: the fraction of a change that the speed controller"
-        " applies in each of its steps (0x23). The driver always writes it, because the wheels"
-        " never turn with the public firmware's default of 0.",
+        "Low-pass filter of the commanded RPM (0x23): the fraction of a change that the speed"
+        " controller applies in each of its steps. The driver always writes it, because with 0,"
+        " the default of the public firmware, the wheels never turn.",
         low=0.001,
         high=1.0,
     ),
@@ -108,7 +108,8 @@ DRIVING: Final = (
         "magnetic_declination",
         0.0,
         "rad",
-        "Declination of magnetic north from true north, east positive, for imu/heading.",
+        "Magnetic declination, for imu/heading: the angle from true north to magnetic north,"
+        " positive to the east.",
         low=-3.15,
         high=3.15,
     ),
@@ -192,8 +193,12 @@ _WORDS: Final = {
     "kp": "Gain Kp of the {} wheel's speed controller",
     "tn": "Integral time Tn of the {} wheel's speed controller",
     "td": "Time constant Td of the {} wheel's speed controller",
-    "short_correction": "Factor for the short level of the {} encoder",
-    "long_correction": "Factor for the long level of the {} encoder",
+    "short_correction": (
+        "Correction factor for the measured duration of the {} encoder's short signal level"
+    ),
+    "long_correction": (
+        "Correction factor for the measured duration of the {} encoder's long signal level"
+    ),
     "feed_forward": "Feed-forward of the {} wheel's speed controller",
 }
 WRITTEN: Final = tuple(

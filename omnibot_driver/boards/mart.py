@@ -33,7 +33,7 @@ PARAMETERS: Final = table(
     ),
     changed={
         "command_rate": {
-            "description": "Not used by this board: a motion needs no repetition of its command."
+            "description": "Not used by this board: a motion continues without repeated commands."
         },
         "port": {
             "default": "udp://192.168.1.50:5000",

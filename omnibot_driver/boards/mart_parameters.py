@@ -52,8 +52,9 @@ DRIVING: Final = (
         "linear_scale",
         128.0,
         "unit/(m/s)",
-        "Units of motor speed (RM) for 1 m/s at nominal_voltage. It need not be exact: the"
-        " driver controls the speed by the encoder.",
+        "Motor speed, in units of the command RM, at which the robot drives at 1 m/s at"
+        " nominal_voltage. The value need not be exact: the driver controls the speed by the"
+        " encoder.",
         low=10.0,
         high=10_000.0,
         calibrated=True,
@@ -62,9 +63,9 @@ DRIVING: Final = (
         "motor_balance",
         1.0,
         "",
-        "Speed of the left motor divided by that of the right one at equal units. The driver uses"
-        " this value until the first drive forward has measured the ratio, which is then shown in"
-        " /diagnostics.",
+        "Speed of the left motor divided by the speed of the right motor when both receive the"
+        " same command. The first drive forward measures this ratio. From then on, the driver"
+        " uses the measured ratio and shows it in /diagnostics.",
         low=0.8,
         high=1.25,
         fixed=True,
@@ -91,8 +92,9 @@ DRIVING: Final = (
         "network_delay",
         0.3,
         "s",
-        "Longest time that a datagram may take in either direction. The driver waits for this time"
-        " before a command that a late copy of an earlier command could disturb.",
+        "Longest time that a datagram takes in either direction. If a late copy of an earlier"
+        " command could disturb a new command, the driver waits for this time before it sends"
+        " the new one.",
         low=0.01,
         high=0.3,
     ),
@@ -178,7 +180,7 @@ SENSORS: Final = (
         "record_directory",
         "~/.ros/mart_records",
         "",
-        "Where downloads are written.",
+        "Folder in which the driver saves downloads.",
         fixed=True,
     ),
 )

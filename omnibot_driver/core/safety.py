@@ -112,8 +112,8 @@ class SafetyStops:
                 return "e-stop latched; the port is not open; the stop will be sent when it opens"
             if missing := self._reporter.missing:
                 return (
-                    f"e-stop latched; {missing}: the driver sends the stop on the other lines only;"
-                    " cut the motor power if the robot moves"
+                    f"e-stop latched; {missing}: the driver sends the stop on the other ports"
+                    " only; cut the motor power if the robot moves"
                 )
             if self._board.mode is Mode.UNKNOWN:
                 return (

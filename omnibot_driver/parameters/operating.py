@@ -56,8 +56,9 @@ LINE: Final = (
         "reconnect_interval",
         0.5,
         "s",
-        "Time until the driver opens a lost port again. It grows by half with each failure, up to"
-        " 2 s. A time above 2 s does not grow.",
+        "Time until the driver tries to open a lost port again. After each failure, the driver"
+        " makes the time longer by a half, up to 2 s. If you set more than 2 s, the time stays"
+        " as you set it.",
         low=0.05,
         high=60.0,
     ),

@@ -23,8 +23,8 @@ ROBOT: Final = (
         "odom_linear_scale",
         1.0,
         "m/m",
-        "True distance divided by the distance that the board reports for nominal wheels."
-        " calibrate geometry measures this ratio.",
+        "True distance divided by the distance that the board computes with the nominal size of"
+        " its wheels. The command `calibrate geometry` measures this ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -33,8 +33,8 @@ ROBOT: Final = (
         "odom_angular_scale",
         1.0,
         "rad/rad",
-        "True angle divided by the angle that the board reports for nominal wheels."
-        " calibrate geometry measures this ratio.",
+        "True angle of a turn divided by the angle that the board computes with the nominal size"
+        " of its wheels. The command `calibrate geometry` measures this ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -62,8 +62,9 @@ ROBOT: Final = (
         "fastest_linear_acceleration",
         15.0,
         "m/s²",
-        "Highest linear acceleration that the robot can reach, even in a collision. The driver"
-        " rejects a displacement that exceeds this value for a single sample.",
+        "Highest linear acceleration that the robot can reach, even in a collision. If one"
+        " displacement jumps by more than this acceleration and the next one jumps back, the"
+        " driver rejects the first.",
         low=0.1,
         high=1000.0,
     ),
@@ -71,8 +72,9 @@ ROBOT: Final = (
         "fastest_angular_acceleration",
         50.0,
         "rad/s²",
-        "Highest angular acceleration that the robot can reach, even in a collision. The driver"
-        " rejects a displacement or gyro reading that exceeds this value for a single sample.",
+        "Highest angular acceleration that the robot can reach, even in a collision. If one"
+        " displacement or gyro reading jumps by more than this acceleration and the next one"
+        " jumps back, the driver rejects the first.",
         low=1.0,
         high=10_000.0,
     ),
@@ -80,8 +82,9 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest spike of one accelerometer axis that the driver publishes. The driver rejects"
-        " a larger spike that lasts one reading, if its size is that of a flipped bit.",
+        "Largest spike of one accelerometer axis that the driver always publishes. The driver"
+        " rejects a larger spike if it lasts for one reading and a flipped bit can explain its"
+        " size.",
         low=0.1,
         high=1000.0,
     ),
@@ -157,7 +160,8 @@ NOISE: Final = (
         "odom_wheel_scale",
         0.01,
         "m/m",
-        "Standard deviation of a wheel's relative size error. It applies to the whole distance.",
+        "Standard deviation of a wheel's relative size error. The error is constant, so its"
+        " effect grows in proportion to the distance driven.",
         low=0.0,
         high=1.0,
     ),
@@ -165,8 +169,8 @@ NOISE: Final = (
         "odom_wheel_slip",
         0.02,
         "m/m",
-        "Mean fraction of the distance that all wheels lose to slip. It applies to the whole"
-        " distance.",
+        "Mean slip of the wheels, as a fraction of the distance driven. All wheels slip by this"
+        " fraction, all the time.",
         low=0.0,
         high=1.0,
     ),

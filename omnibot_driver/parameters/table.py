@@ -121,7 +121,8 @@ class Table:
             if name not in self.by_name:
                 raise ParameterError(
                     f"there is no parameter '{name}'; the nearest is"
-                    f" '{nearest(name, self.by_name)}' (config/{self.board}.yaml has them all)"
+                    f" '{nearest(name, self.by_name)}' (config/{self.board}.yaml lists all"
+                    " parameters)"
                 )
         values = {row.name: row.check(given.get(row.name, row.initial)) for row in self.rows}
         for check in self.checks:

@@ -53,7 +53,9 @@ class Several:
         try:
             self._wake_up = WakeUp()
         except OSError as error:
-            raise LinkError(f"cannot open a line: {error.strerror or error}") from error
+            raise LinkError(
+                f"cannot open a pipe inside the driver: {error.strerror or error}"
+            ) from error
         self._arrivals.register(self._wake_up.descriptor, select.POLLIN)
         try:
             self._open_missing()
@@ -182,8 +184,8 @@ class Several:
             if port.descriptors is None or len(port.descriptors) != 1:
                 port.close()
                 raise LinkError(
-                    "this kind of port does not work for a board with several lines; use a device"
-                    " like /dev/ttyACM0, or sim:// for all lines"
+                    "this kind of port does not work for a board with several ports; use a"
+                    " device like /dev/ttyACM0, or sim:// for all ports"
                 )
             with self._writing:
                 line.begin(port)

@@ -49,9 +49,9 @@ class SimulatedTransport:
             )
         except options.OptionError as error:
             raise LinkError(
-                f"port '{url}' is not valid: {error}; the options are those of"
-                f" `ros2 run omnibot_driver {options.command(simulator)} --help`,"
-                " as in sim://?seed=1&lose=0.001"
+                f"port '{url}' is not valid: {error}; `ros2 run omnibot_driver"
+                f" {options.command(simulator)} --help` lists the options; an example is"
+                " sim://?seed=1&lose=0.001"
             ) from error
         self._board.start()
 
@@ -61,13 +61,13 @@ class SimulatedTransport:
         Raises LinkError after ``close``.
         """
         if self._board is None:
-            raise LinkError(f"lost {self._url} while reading: it is closed")
+            raise LinkError(f"lost {self._url} while reading: the driver has closed it")
         return self._board.read(READ_TIMEOUT_S)
 
     def write(self, packets: Iterable[Packet]) -> None:
         """Write all bytes at once. Raises LinkError after ``close``."""
         if self._board is None:
-            raise LinkError(f"lost {self._url} while writing: it is closed")
+            raise LinkError(f"lost {self._url} while writing: the driver has closed it")
         for packet in packets:
             self._board.write(packet)
 

@@ -194,7 +194,7 @@ def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)
-    driver.wait_for_line("the line 'sense' is missing: /dev/no-such-port does not exist")
+    driver.wait_for_line("the port 'sense' is missing: /dev/no-such-port does not exist")
     probe_of(driver).wait_for_state("connecting")
     toy.wait_for(lambda robot: robot.heard[-2:] == 2 * [b"v 0 0"])
     with toy.served.lock:

@@ -76,9 +76,9 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
     transport.close()
     transport.close()
     transport.interrupt()
-    with pytest.raises(LinkError, match="lost sim:// while reading: it is closed"):
+    with pytest.raises(LinkError, match="lost sim:// while reading: the driver has closed it"):
         transport.read()
-    with pytest.raises(LinkError, match="lost sim:// while writing: it is closed"):
+    with pytest.raises(LinkError, match="lost sim:// while writing: the driver has closed it"):
         transport.write([(0, b"S")])
 
 

@@ -111,5 +111,5 @@ class CommandShaper:
     def _at_odds(self, authority: Authority) -> CommandRefused:
         return CommandRefused(
             f"{authority.value} refused: the parameter `control_method` is '{self._control}';"
-            " set it to the position of the board's switch"
+            " make it match the control switch on the board"
         )

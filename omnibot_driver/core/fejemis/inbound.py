@@ -80,8 +80,8 @@ class Inbound:
             )
         if half.decoder.changed:
             half.decoder.changed = False
-            ended = "now have checksums" if half.decoder.sums else "no longer have checksums"
-            self._told.halt(f"the lines of the {half.role} board {ended}; robot stopped", now)
+            ended = "now sends checksums" if half.decoder.sums else "no longer sends checksums"
+            self._told.halt(f"the {half.role} board {ended}; robot stopped", now)
 
     def look(self, now: float, *, driving: bool) -> None:
         """Check the timeouts and update the mode; ``driving``: whether a motion is commanded."""

@@ -208,7 +208,10 @@ class Jobs:
                 )
         elif job is Job.LOAD and isinstance(message, WheelConfiguration):
             if now - self._begun_at > SAID * AGAIN_S:
-                self._finish(True, "the saved configuration is loaded and read again")
+                self._finish(
+                    True,
+                    "the saved configuration is loaded; the driver now reads it from the boards",
+                )
         elif job in OFFSETS and isinstance(message, Status) and message.keyword == OFFSETS[job][2]:
             self._offsets(job, message.numbers, now)
 

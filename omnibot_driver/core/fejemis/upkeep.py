@@ -137,8 +137,8 @@ class Upkeep:
         for half in self._ports.halves:
             if half.decoder.contradicted:
                 return (
-                    f"the lines of the {half.role} board contradict the parameter `line_sums`"
-                    f" ({self._settings.line_sums}): set `line_sums` to auto"
+                    f"the parameter `line_sums` is {self._settings.line_sums}, but the lines of"
+                    f" the {half.role} board show the opposite: set `line_sums` to auto"
                 )
             if unknown := half.unknown_streams:
                 return (

@@ -149,8 +149,8 @@ class GyroCalibration:
         """End a running measurement as failed if its deadline has passed."""
         if now >= self.wake_at:
             self.give_up(
-                "two seconds of IMU readings without a gap are needed, and did not come; check"
-                " ~/state, then call again"
+                "the calibration needs two seconds of IMU readings without a gap, but did not"
+                " receive them; check ~/state, then call again"
             )
 
     def hear(self, rate: Vector3, force: Vector3, stamp_s: float) -> None:

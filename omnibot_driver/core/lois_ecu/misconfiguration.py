@@ -26,7 +26,7 @@ GAINS: Final = (
 OWN_GAINS: Final = (
     "the speed controllers run with the board's own {}. With the gains of the public firmware a"
     " wheel oscillates, so the robot does not hold its course. After 5 m, odometry is wrong by"
-    " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run calibrate step, or set these"
+    " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run `calibrate step`, or set these"
     " parameters"
 )
 """Advice if the user has not set all gains. The numbers in the text are from 150 forward drives

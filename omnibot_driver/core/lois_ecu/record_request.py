@@ -47,7 +47,8 @@ def command_of(kind: RecordKind, samples: int) -> Command:
     """
     if not 0 < samples <= MOST_SAMPLES:
         raise RequestRefused(
-            f"record refused: {samples} samples; the board completes 1 to {MOST_SAMPLES}"
+            f"record refused: {samples} samples are requested, but the board can complete only 1"
+            f" to {MOST_SAMPLES}"
         )
     match kind:
         case RecordKind.RPM:

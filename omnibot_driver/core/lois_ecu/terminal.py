@@ -83,7 +83,7 @@ class ModeChange:
                 " set terminal_mode to host"
             )
         if self._told is not None:
-            return "the board has not left its terminal mode yet; wait for its data"
+            return "the board has not left its terminal mode yet; wait until its data arrives"
         return self._stopping and f"{self._stopping}, and the robot is being stopped first; wait"
 
     @property

@@ -229,8 +229,8 @@ class Health:
             )
         if self.outlived:
             return (
-                "the server was lost and answers again without a restart, so a stop of its next"
-                " motion can fail: restart the server, then the driver"
+                "the server was lost, and now answers again although it was not restarted; it"
+                " could fail to stop its next motion: restart the server, then the driver"
             )
         if self._defective:
             return "this server answers 'fail' to RM although the robot moves: update the server"

@@ -75,8 +75,9 @@ JUST_SET_S: Final = 2.0
 SLOW_UNITS: Final = 20
 """Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 SETTING_REFUSED: Final = (
-    "the server does not set the speed of turns on the spot; as with `spin_speed: fixed`,"
-    " all of them use the server's speed SLOW, which is faster than most commands (reported once)"
+    "the server does not accept a speed for turns on the spot, so it makes all of them at its"
+    " own speed SLOW, which is faster than most commands; `spin_speed: fixed` has the same"
+    " effect (reported once)"
 )
 
 

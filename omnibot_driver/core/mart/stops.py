@@ -38,8 +38,8 @@ NO_START_S: Final = 1.5
 """Time in s after a start within which the robot must begin to move."""
 LATE: Final = " while the robot drives: check the network"
 STUCK: Final = (
-    "the robot is commanded to move and does not: check motors, wheels and power, and whether"
-    " another program stops it"
+    "the robot is commanded to move, but does not move: check motors, wheels and power, and"
+    " whether another program stops it"
 )
 HALF_STUCK: Final = (
     "one wheel does not turn: check its motor, wiring and power; forward motion is refused until"

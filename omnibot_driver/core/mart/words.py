@@ -45,7 +45,9 @@ class Kind(Enum):
     CHANGE = "changes a motion"
     MOVE = "starts a controlled move, and answers when it is over"
     HALT = "stops a motion"
-    SERVICE = "takes some time, while the robot is at rest"
+    SERVICE = (
+        "keeps the server busy for some time; the driver sends it only while the robot is at rest"
+    )
 
 
 @dataclass(frozen=True, slots=True)

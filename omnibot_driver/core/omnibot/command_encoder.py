@@ -134,9 +134,9 @@ class CommandEncoder:
         if any(map(begins_with_a_letter, nearest(*counts))):
             raise CommandRefused(
                 f"cmd_pose refused: the goal (in the board's own frame: x {pose.x_m:.2f} m, y"
-                f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad) has a byte that the board could"
-                " obey as a start, pause or reset if the line loses bytes; choose another goal, or"
-                " call ~/reset to begin a new frame at the robot's position"
+                f" {pose.y_m:.2f} m, yaw {pose.yaw_rad:.2f} rad) contains a byte that the board"
+                " could mistake for a start, pause or reset if the line loses bytes; choose"
+                " another goal, or call ~/reset to begin a new frame at the robot's position"
             )
         return ZEROS_BEFORE_MOTION + frames.command(frames.VELOCITY_MODE, *harmless(counts))
 

@@ -116,7 +116,7 @@ class Diagnosis:
             "nominal": (Level.OK, "running"),
         }[session.state]
         if session.state == "connecting" and link.trouble:
-            level, message = Level.STALE, "unknown while a line of the board is missing"
+            level, message = Level.STALE, "unknown while a port of the board is missing"
         if self._recent.grew("restarts", restarts, now) and level is Level.OK:
             level = Level.WARN
             message = "the board has restarted; if you did not reset it, check its power supply"

@@ -123,7 +123,7 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
     channel = HALVES[half]
     bench.close()
     bench.hears = bench.speaks = {1 - channel}
-    bench.open(missing=f"the line '{half}' is missing")
+    bench.open(missing=f"the port '{half}' is missing")
     bench.run(0.5)
     assert "rc 2 0 0" in bench.lines(1 - channel, mark)
     assert bench.session.state == "connecting"
@@ -231,7 +231,7 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
     bench.run_until(lambda: bench.session.state == "nominal")
     bench.drive_on()
     assert not bench.robot.standing
-    words = "now have checksums" if begins else "no longer have checksums"
+    words = "now sends checksums" if begins else "no longer sends checksums"
     assert sum(words in text for text in bench.notices) == 2
 
 

@@ -33,7 +33,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
     """
     bench = opened(LoisEcuSettings())
     (sentence,) = told(bench)
-    assert "by 0.2 to 2 m in a few drives. Run calibrate step" in sentence
+    assert "by 0.2 to 2 m in a few drives. Run `calibrate step`" in sentence
     assert bench.session.board.figures.own["Gains"].startswith(
         "left_kp, left_tn, left_td, right_kp"
     )

@@ -140,14 +140,14 @@ def test_each_fault_alone_raises_its_own_status(
 
 
 def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
-    """One line of the board is missing. The status says so, and does not call the board silent."""
+    """One port of the board is missing. The status says so, and does not call the board silent."""
     robot = Robot()
-    robot.connect(trouble="the line 'front' is missing: unplugged")
+    robot.connect(trouble="the port 'front' is missing: unplugged")
     robot.set(state="connecting")
     robot.seconds(1)
     assert robot.troubles["Link"] is Level.ERROR
     assert robot.statuses["Board"].level is Level.STALE
-    assert "a line of the board is missing" in robot.statuses["Board"].message
+    assert "a port of the board is missing" in robot.statuses["Board"].message
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:

@@ -116,7 +116,7 @@ def test_it_drives_without_sums(
 def test_the_same_port_twice_ends_the_start(robot: TwoPorts, start_driver: Start) -> None:
     """The user gives the same port twice. The driver asks for two ports and exits with code 2."""
     driver: Driver = start_driver(robot.ports[0], board="fejemis", front_port=robot.ports[0])
-    driver.wait_for_line("'front_port' must not be .* have a port each")
+    driver.wait_for_line("'front_port' must differ from 'port', .* their own port")
     assert driver.end() == 2
 
 
