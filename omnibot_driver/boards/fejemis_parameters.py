@@ -198,7 +198,8 @@ SENSORS: Final = (
         "orientation_stddev",
         [0.02, 0.02, 0.2],
         "rad",
-        "Standard deviation of roll, pitch and yaw in imu/data. The yaw drifts with the gyro.",
+        "Standard deviation of roll, pitch and yaw in imu/data. A bias of the gyro makes the yaw"
+        " drift.",
         low=1e-6,
         high=10.0,
     ),

@@ -205,7 +205,10 @@ class FejemisTopics:
         on = bool(request.data)
         trouble = self._say("brush", lambda services, now: services.set_brush(on, now), off=not on)
         response.success = not trouble
-        sent = f"brush {'on' if on else 'off'} sent; the board does not confirm it"
+        sent = (
+            f"command to switch the brush {'on' if on else 'off'} sent; the board does not"
+            " confirm it"
+        )
         response.message = trouble or sent
         return response
 

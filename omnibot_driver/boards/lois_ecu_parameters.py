@@ -125,9 +125,9 @@ DRIVING: Final = (
         "terminal_mode",
         "host",
         "",
-        "What the board sends: its own messages (host), or the text lines of its GPS or compass,"
-        " which the driver publishes on ~/terminal (0x11). The driver stops the robot before it"
-        " changes the mode. It refuses motion in every mode except host.",
+        "What the board sends (0x11): its own messages (host), or the text lines of its GPS or"
+        " compass. The driver publishes these lines on ~/terminal. The driver stops the robot"
+        " before it changes the mode. It refuses motion in every mode except host.",
         choices=("host", "gps", "compass"),
     ),
     Parameter(

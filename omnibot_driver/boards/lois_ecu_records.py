@@ -73,7 +73,10 @@ def remark(reading: RecordReading) -> str:
         return ""
     longest_s = SATURATED * reading.count_s
     ticks = f"{slow} tick{'' if slow == 1 else 's'}"
-    return f"{ticks} of the record took longer than the {longest_s:.4g} s that the board can report"
+    return (
+        f"{ticks} of the record took longer than {longest_s:.4g} s, the longest time that the"
+        " board can report"
+    )
 
 
 def file_name(kind: RecordKind, at_s: float) -> str:

@@ -145,7 +145,8 @@ class LoisEcuTopics:
         on = bool(request.data)
         return self._say(
             lambda board, now: board.set_led(on, now),
-            f"LED {'on' if on else 'off'} sent; the board does not confirm it",
+            f"command to switch the LED {'on' if on else 'off'} sent; the board does not confirm"
+            " it",
             response,
         )
 

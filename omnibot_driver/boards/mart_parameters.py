@@ -102,9 +102,9 @@ DRIVING: Final = (
         "spin_speed",
         "custom",
         "",
-        "Speed of turns on the spot. With custom, it is the commanded speed, set by the"
-        " undocumented commands SSP and R CUSTOM. With fixed, it is the controller's own speed"
-        " SLOW, which is faster than most commands.",
+        "Speed of turns on the spot. custom: the commanded speed. The driver sets it with the"
+        " undocumented commands SSP and R CUSTOM. fixed: the controller's own speed SLOW, which"
+        " is faster than most commanded speeds.",
         choices=("custom", "fixed"),
         fixed=True,
     ),

@@ -215,7 +215,7 @@ class CommandPipeline:
             seen = "" if fault is Fault.BEYOND_LIMITS else self._seen()
             until = self.interlock.until.value
             if self._board.advice:
-                advice = f"{self._board.advice}; otherwise {advice}"
+                advice = f"{self._board.advice}; if this does not help, {advice}"
             return [
                 f"{fault.value}{seen}; robot stopped: {advice}; if the fault comes and goes, check"
                 f" the cable to the board. {until}"

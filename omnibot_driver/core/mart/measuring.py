@@ -80,7 +80,9 @@ class Measuring(Starts):
         """Process a reported heading; return whether it is plausible and has changed."""
         changed = self.odometry.turned(degrees, when)
         if self.state is State.DRIVING and not abs(math.radians(degrees)) < MOST_RAD:
-            self._halt(now, "the relative heading is not usable: the controller's clock was set")
+            self._halt(
+                now, "the controller's clock was set, so its relative heading cannot be used"
+            )
         return changed
 
     def _counted(self, count: int, when: Moment, now: float) -> None:

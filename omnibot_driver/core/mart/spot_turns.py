@@ -76,8 +76,8 @@ SLOW_UNITS: Final = 20
 """Speed of B SLOW, R SLOW and L SLOW, in motor units."""
 SETTING_REFUSED: Final = (
     "the server does not accept a speed for turns on the spot, so it makes all of them at its"
-    " own speed SLOW, which is faster than most commands; `spin_speed: fixed` has the same"
-    " effect (reported once)"
+    " own speed SLOW, which is faster than most commanded turns; `spin_speed: fixed` has the"
+    " same effect (reported once)"
 )
 
 

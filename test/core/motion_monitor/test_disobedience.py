@@ -182,7 +182,10 @@ def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> N
     bench.run(2.0)
     try_to_drive(bench, 2.0)
     (text,) = (text for text in bench.notices if "robot stopped" in text)
-    assert "set the parameter `delta_period` to 0.1; otherwise check `control_method`" in text
+    assert (
+        "set the parameter `delta_period` to 0.1; if this does not help, check `control_method`"
+        in text
+    )
 
 
 def test_what_board_and_driver_agree_on_is_not_noticed() -> None:

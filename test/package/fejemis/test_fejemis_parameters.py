@@ -79,7 +79,7 @@ def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
     link = tmp_path / "front"
     link.symlink_to("/dev/ttyACM0")
     for front in ("/dev/ttyACM0", str(link)):
-        with pytest.raises(ParameterError, match="have a port each"):
+        with pytest.raises(ParameterError, match="each have their own port"):
             check(port="/dev/ttyACM0", front_port=front)
 
 
