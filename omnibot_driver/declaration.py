@@ -84,8 +84,7 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
             for name in unread
         ]
         node.get_logger().warning(
-            f"calibration_file {path} has names that the driver does not read from it:"
-            f" {', '.join(nearest)}"
+            f"calibration_file {path} contains names that the driver ignores: {', '.join(nearest)}"
         )
     if found:
         node.get_logger().info(f"calibration_file {path} sets {', '.join(found)}")

@@ -138,9 +138,9 @@ DRIVING: Final = (
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
         " the board supplies it. The driver sends whole seconds. On a bad line, some numbers"
-        " could lose two digits without a wrong checksum. The driver sends a larger number"
-        " instead: for example, 131 instead of 120. The answer of ~/power_off states the time in"
-        " use.",
+        " could lose two digits and still have a correct checksum. The driver sends a larger"
+        " number instead: for example, 131 instead of 120. The answer of ~/power_off states the"
+        " time in use.",
         low=1.0,
         high=3600.0,
     ),

@@ -206,8 +206,8 @@ class FejemisTopics:
         trouble = self._say("brush", lambda services, now: services.set_brush(on, now), off=not on)
         response.success = not trouble
         sent = (
-            f"command to switch the brush {'on' if on else 'off'} sent; the board does not"
-            " confirm it"
+            f"the command to switch the brush {'on' if on else 'off'} was sent; the board does"
+            " not confirm it"
         )
         response.message = trouble or sent
         return response

@@ -145,15 +145,15 @@ class LoisEcuTopics:
         on = bool(request.data)
         return self._say(
             lambda board, now: board.set_led(on, now),
-            f"command to switch the LED {'on' if on else 'off'} sent; the board does not confirm"
-            " it",
+            f"the command to switch the LED {'on' if on else 'off'} was sent; the board does not"
+            " confirm it",
             response,
         )
 
     def _on_ball(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         return self._say(
             lambda board, _now: board.distribute_ball(),
-            "ball command sent once; the board does not confirm it",
+            "the ball command was sent once; the board does not confirm it",
             response,
         )
 

@@ -23,8 +23,9 @@ ROBOT: Final = (
         "odom_linear_scale",
         1.0,
         "m/m",
-        "True distance divided by the distance that the board computes with the nominal size of"
-        " its wheels. The command `calibrate geometry` measures this ratio.",
+        "True distance divided by the distance that odom shows while this parameter is 1. The"
+        " driver multiplies measured distances by this ratio. The command `calibrate geometry`"
+        " measures the ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,
@@ -33,8 +34,9 @@ ROBOT: Final = (
         "odom_angular_scale",
         1.0,
         "rad/rad",
-        "True angle of a turn divided by the angle that the board computes with the nominal size"
-        " of its wheels. The command `calibrate geometry` measures this ratio.",
+        "True angle of a turn divided by the angle that odom shows while this parameter is 1."
+        " The driver multiplies measured angles by this ratio. The command `calibrate geometry`"
+        " measures the ratio.",
         low=0.5,
         high=2.0,
         calibrated=True,

@@ -61,7 +61,7 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
     line = said_of(path, start_driver)
     assert "WARN" in line
     assert (
-        f"{path} has names that the driver does not read from it: axis_sings (the nearest known"
+        f"{path} contains names that the driver ignores: axis_sings (the nearest known"
         " name: axis_signs)" in line
     )
     assert ", max_linear_speed (" in line

@@ -148,8 +148,9 @@ class Measuring(Starts):
             self._stray_s = now
             self._rescue = True
             self._notice(
-                "robot moves, but the server knows of no motion; the driver starts a turn by 1"
-                " degree; at the end of the turn the server switches the motors off",
+                "robot moves, but the server knows of no motion; to stop the robot, the driver"
+                " starts a turn by 1 degree, at the end of which the server switches the motors"
+                " off",
                 halt=True,
             )
             return
