@@ -204,7 +204,7 @@ def test_a_setting_of_sums_that_the_lines_contradict_is_told_of() -> None:
     bench.open()
     bench.run(4.0)
     assert bench.session.state == "connecting"
-    assert any("contradict" in text for text in bench.notices)
+    assert any("show the opposite" in text for text in bench.notices)
 
 
 def test_boards_with_different_geometries_are_told_of() -> None:
