@@ -45,7 +45,7 @@ class CompileCore(build_ext):
     def run(self) -> None:
         """Compile the core. Never raises, because the package also works as plain Python."""
         if self.inplace:
-            print(f"{NAME}: a development installation runs its sources; core: interpreted")
+            print(f"{NAME}: not compiled, as in each development installation; core: interpreted")
             return
         remove_compiled(self.build_lib)
         try:

@@ -35,9 +35,11 @@ The driver rejects an unknown name, a wrong type and a value out of its range. T
 which values are valid. The driver also rejects a parameter of another board, and names that board.
 
 In an array of doubles, write every element with a decimal point: `[0.1, 0.0, 0.0]`. ROS itself
-rejects a mixed array such as `[0.1, 0, 0]`. Put a word such as `on` or `no` in quotes if it is a
-string. A parameter file begins with `/**:`. If its first line names another node or namespace, ROS
-ignores the file without a message.
+rejects a mixed array such as `[0.1, 0, 0]`. Put the value of a string parameter in quotes if it is
+a word such as `on` or `no`. Without quotes, ROS reads such a word as true or false.
+
+A parameter file begins with `/**:`, which stands for every node. If the file begins with the name
+of another node or namespace, ROS ignores the file without a message.
 """
 TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 
@@ -45,9 +47,10 @@ TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 def parameter_file(board: str) -> str:
     """Return config/<board>.yaml: each parameter with its default, and its range as a comment."""
     lines = [
-        f"# All parameters of the board {board}, with their defaults. Load the file with",
+        f"# All parameters of the board {board}, with their defaults. Load this file, or a changed",
+        "# copy of it, with",
         f"#   ros2 run omnibot_driver driver --ros-args --params-file {board}.yaml",
-        "# or change a copy of it. You can set a (fixed) parameter only at the start.",
+        "# A parameter that is marked as fixed can be set only when the driver starts.",
         "/**:",
         "  ros__parameters:",
     ]

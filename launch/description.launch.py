@@ -38,23 +38,24 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "board",
                 default_value="",
-                description="Motor board of the robot, whose description is shown; empty: omnibot.",
+                description="Motor board of the robot to describe. If empty, it is omnibot.",
             ),
             DeclareLaunchArgument(
                 "namespace",
                 default_value="",
-                description="Namespace of robot_description and joint_states; empty: none.",
+                description="Namespace of robot_description and joint_states. If empty, these"
+                " topics are in no namespace.",
             ),
             DeclareLaunchArgument(
                 "frame_prefix",
                 default_value="",
-                description="Text put before every frame name, without adding a slash: robot1/",
+                description="Prefix of every frame name, with its slash, such as robot1/",
             ),
             DeclareLaunchArgument(
                 "xacro_args",
                 default_value="",
-                description="What differs on this robot, such as base_height:=0.13 "
-                "imu_rpy:='3.14159 0 1.5708'.",
+                description="xacro arguments for the properties in which this robot differs from"
+                " the default, such as base_height:=0.13 imu_rpy:='3.14159 0 1.5708'.",
             ),
             DeclareLaunchArgument(
                 "rviz", default_value="false", description="Show the robot in RViz."

@@ -18,8 +18,8 @@ OVERRIDES = {
     "board": (str, "Motor board of the robot"),
     "port": (str, "Serial device or pyserial URL of the board"),
     "front_port": (str, "Serial device of the front board, for a robot that has one (fejemis)"),
-    "publish_tf": (bool, "Whether the driver publishes odom to base_link on /tf"),
-    "frame_prefix": (str, "Text put before every frame name, without adding a slash: robot1/"),
+    "publish_tf": (bool, "Whether the driver publishes the transform from odom to base_link"),
+    "frame_prefix": (str, "Prefix of every frame name, with its slash, such as robot1/"),
 }
 
 
@@ -63,13 +63,14 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "params_file",
                 default_value="",
-                description="YAML file with the driver's parameters. If empty, it is the file of"
-                " the board in this package's config/ (omnibot.yaml without a board).",
+                description="YAML file with the driver's parameters. If empty, the board's file in"
+                " this package's config/ is used. If board is empty too, it is omnibot.yaml.",
             ),
             DeclareLaunchArgument(
                 "namespace",
                 default_value="",
-                description="Namespace of the node and its topics, one per robot; empty: none.",
+                description="Namespace of the node and its topics. Each of several robots needs a"
+                " namespace of its own.",
             ),
             OpaqueFunction(function=driver_node),
         ]

@@ -59,14 +59,15 @@ def generate_launch_description() -> LaunchDescription:
                 default_value="",
                 choices=["", "omnibot", *FILTERED],
                 description="Motor board of the robot. If empty, the filter and the description"
-                " are those of omnibot, and the driver's board is that in params_file.",
+                " are for omnibot, and the driver takes its board from params_file.",
             ),
             DeclareLaunchArgument(
                 "ekf_params_file",
                 default_value=PathJoinSubstitution(
                     [FindPackageShare("omnibot_driver"), "config", file]
                 ),
-                description="YAML file with the filter's parameters; the frames are set here.",
+                description="YAML file with the filter's parameters. Frame names in the file have"
+                " no effect, because this launch file sets them.",
             ),
             include("driver.launch.py", {"publish_tf": "false"}),
             include("description.launch.py", {"board": board}),

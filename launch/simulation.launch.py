@@ -19,7 +19,8 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "port",
                 default_value="sim://",
-                description="The simulated board with its options: sim://?imu_only&seed=1",
+                description="URL of a simulated board with its options, such as"
+                " sim://?imu_only&seed=1",
             ),
             IncludeLaunchDescription(
                 PythonLaunchDescriptionSource(

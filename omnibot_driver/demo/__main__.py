@@ -120,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     parser = argparse.ArgumentParser(
         prog="demo",
-        description="Drives a square on a simulated board; no robot is needed.",
+        description="Lets a simulated robot drive a square. A real robot is not needed.",
         epilog="The environment variable DEMO_SECONDS sets the duration in seconds; without it the"
         " demo runs until ctrl-C. Exit codes: 0 at the end, 1 with a message on failure, 2 on wrong"
         " usage.",

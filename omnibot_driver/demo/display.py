@@ -22,7 +22,7 @@ HEADING: Final = """\
 state        imu odom lap   x m   y m yaw° x m/s y m/s rad/s x m/s y m/s rad/s"""
 
 CLOSING: Final = """
-With the real robot: lift its wheels off the ground first ({page}), then run
+To use a real robot, first lift its wheels off the ground ({page}). Then run
   ros2 run omnibot_driver driver --ros-args """
 
 
@@ -74,9 +74,9 @@ A simulated {capability.title} drives a square of 1 m, {turning}.
 
   simulator  python -m omnibot_driver.simulator{options[0]}
   driver     python -m omnibot_driver.driver --ros-args {options[1]}
-  demo       steers by odom over cmd_vel, {ending}
+  demo       reads odom and steers with cmd_vel, {ending}
 
-Where ROS 2 Jazzy is installed, watch and intervene from another terminal:
+In another terminal with ROS 2 Jazzy, you can watch and stop the robot:
 
   export {exports}{imu}
   ros2 topic echo {namespace}/odom --field pose.pose

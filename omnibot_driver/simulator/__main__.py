@@ -25,7 +25,7 @@ _CONSOLE_HELP = """\
 truth    print the true pose and the true state of the robot as one line of JSON
 reboot   power-cycle the board; the robot stays where it is
 help     print this list
-quit     end the simulator (as ctrl-C and SIGTERM do; the end of the input does not)"""
+quit     end the simulator; ctrl-C and SIGTERM end it too, the end of the input does not"""
 
 _HEALTH_CHECK_S = 0.5
 
@@ -96,9 +96,9 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             "--link",
             metavar="PATH",
             action="append",
-            help="make a symbolic link to the pseudo-terminal; if the board has several"
-            " pseudo-terminals, repeat the option for each, or give the option once: a hyphen and"
-            " the port's name are then appended to each link",
+            help="make a symbolic link to the pseudo-terminal. For a board with several"
+            " pseudo-terminals, give one --link for each. If only one --link is given, each port"
+            " has the link PATH-PORT, with the name of the port",
         )
     if any(channel.datagrams for channel in module.CHANNELS):
         parser.add_argument(
@@ -106,7 +106,8 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             type=int,
             default=0,
             metavar="NUMBER",
-            help="first UDP port; further ports follow it (default: any free ports)",
+            help="number of the first UDP port; further ports have the numbers after it (default:"
+            " any free ports)",
         )
     options.add_options(parser, module)
     return parser

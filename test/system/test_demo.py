@@ -209,7 +209,7 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
     assert float(driven[2]) == pytest.approx(float(driven[1]) / 4, abs=0.5)
     assert "no driver" not in output
     closing = output[output.index("pose error") :]
-    assert closing.index("wheels off the ground first") < closing.index("/dev/ttyUSB0")
+    assert closing.index("first lift its wheels off the ground") < closing.index("/dev/ttyUSB0")
 
 
 @pytest.mark.parametrize(("laps", "told"), [(0.0, "0 laps"), (1.0, "1 lap"), (1.25, "1.25 laps")])

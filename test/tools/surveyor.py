@@ -27,11 +27,11 @@ class Surveyor:
                 sign * float(question.split(": ")[1].split()[0]) if "turn" in question else 0
             )
         way = self._mark.way_to(here)
+        if "degrees" in question:
+            turned = math.degrees(here.yaw_rad - self._mark.yaw_rad) - 360 * self._turns
+            return str(round(2 * turned) / 2)
         if "forward of" in question:
             return str(round(1000 * way.x_m))
         if "left of" in question:
             return str(round(1000 * way.y_m))
-        if "degrees" in question:
-            turned = math.degrees(here.yaw_rad - self._mark.yaw_rad) - 360 * self._turns
-            return str(round(2 * turned) / 2)
         return "y"

@@ -56,7 +56,7 @@ def test_the_whole_walk_finds_what_was_planted(
         said = told(capsys)
         assert code == 0, said
         assert parameters_of(robot.driver)["motion_monitor"] is True
-        assert "That is not possible: wheel A alone was commanded" in said
+        assert "This result cannot be right: wheel A alone was commanded" in said
         assert "+y is reversed" in said
         assert "delta_frame is read at the start" in said
         assert robot.written() == {
@@ -121,8 +121,8 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)
-    assert "Please answer with three of + - 0" in told(capsys)
-    assert any("mirror the robot" in note for note in result_of(found).notes)
+    assert "Please answer with three signs (each +, - or 0)" in told(capsys)
+    assert any("a mirror image of the robot" in note for note in result_of(found).notes)
 
 
 def test_wheels_that_are_all_reversed_are_mended_by_the_axes() -> None:

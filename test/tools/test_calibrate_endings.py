@@ -78,7 +78,10 @@ def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
     assert ending(draw=draw) == 1
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     said = capsys.readouterr()
-    assert f"saved to {tmp_path}/robot.yaml, but {tmp_path}/imu.svg is not drawn: " in said.err
+    assert (
+        f"saved to {tmp_path}/robot.yaml, but the picture {tmp_path}/imu.svg is not drawn: "
+        in said.err
+    )
     assert "71.3" in said.out
 
 

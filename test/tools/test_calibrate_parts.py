@@ -158,7 +158,7 @@ def test_a_question_is_repeated_until_the_answer_makes_sense() -> None:
     """
     asks, shown = console("ten", "nan", "-5", "0,25", "", "yes", "n")
     assert asks.number("How far", "m", 0.0, 1.0) == 0.25
-    assert shown.getvalue().count("Please type a number of m from 0 to 1.") == 3
+    assert shown.getvalue().count("Please type a number from 0 to 1, in m.") == 3
     assert [asks.asks("Sure?") for _ in range(3)] == [False, True, False]
     sure, shown = console(yes=True)
     sure.confirm("Sure?")

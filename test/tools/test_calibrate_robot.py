@@ -77,7 +77,7 @@ def test_a_motion_is_what_was_asked_for_and_ends_at_rest(robot: Robot, rigged: R
         ("reboot", "the driver reported the state"),
         ("other", "another node commands the robot on cmd_vel"),
         ("wheels", "another node commands the robot on wheel_cmd"),
-        ("signal", "interrupted; the robot is stopped"),
+        ("signal", "interrupted: the robot is stopped"),
     ],
 )
 def test_what_happens_on_the_way_ends_it_at_rest(

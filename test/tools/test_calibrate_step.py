@@ -69,10 +69,10 @@ def still(answer: str, *words: str) -> None:
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (["--wheels", "D"], "some of ABC"),
+        (["--wheels", "D"], "one or more of the letters ABC"),
         (["--speeds", "12", "4"], "the slower one first"),
         (["--speeds", "4", "40"], "max_wheel_speed of 17"),
-        (["--speeds", "4", "4.1"], "give the same command"),
+        (["--speeds", "4", "4.1"], "commands of 8 and 8 units"),
         (["--hold", "0.1"], "at least 0.5 s"),
     ],
 )

@@ -84,8 +84,8 @@ def test_what_has_happened_is_counted() -> None:
     It omits faults that have not occurred.
     """
     stream = Status("Stream", Level.OK, "complete", {"Framing faults": "3", "Sequence gaps": "0"})
-    assert text.counts(view(statuses=(stream,))) == "since its start: framing faults 3"
-    assert text.counts(view()) == "since its start: nothing lost, nothing refused"
+    assert text.counts(view(statuses=(stream,))) == "since driver start: framing faults 3"
+    assert text.counts(view()) == "since driver start: nothing lost, nothing refused"
 
 
 def test_a_message_cannot_move_the_cursor() -> None:
@@ -101,7 +101,7 @@ def test_a_message_cannot_move_the_cursor() -> None:
 
 def test_a_silent_driver_is_said_to_be_silent() -> None:
     """The driver is silent. The title says for how long, and omits the outdated link."""
-    assert text.title(view(silent_s=7.2)).endswith("nothing heard for 7 s (was nominal)")
+    assert text.title(view(silent_s=7.2)).endswith("silent for 7 s (last state: nominal)")
     assert text.title(view()) == "/robot1/omnibot_driver  nominal  connected, /dev/omnibot"
 
 

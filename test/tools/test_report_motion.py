@@ -70,7 +70,7 @@ def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
 def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
     """Gyro and wheels differ by 20 %. The advice names ``base_radius``."""
     drive.imu.values[:, 2] *= 1.2
-    assert "base_radius" in said(drive, "IMU", "gyro measured 1.2").advice
+    assert "base_radius" in said(drive, "IMU", "by the gyro are 1.2").advice
 
 
 @pytest.mark.parametrize("lost", [("imu",), ("odom",), ("imu", "odom")], ids="+".join)
@@ -84,7 +84,7 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
-    assert said(drive, "IMU", "gyro measured 1.000 times").level is Level.GOOD
+    assert said(drive, "IMU", "by the gyro are 1.000 times").level is Level.GOOD
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
@@ -129,7 +129,7 @@ def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
 
     The tolerance is one step of the search plus half a step of the odometry.
     """
-    text = said(drive, "Commands", "followed").text
+    text = said(drive, "Commands", "follows").text
     lag_s = float(text.split("lag of ")[1].split(" ms")[0]) / 1e3
     assert lag_s == pytest.approx(DELAY_S, abs=0.041)
 
@@ -147,7 +147,7 @@ def test_a_robot_that_goes_the_wrong_way_is_told_with_the_signs(drive: Drive) ->
     """The robot turns in the wrong direction. The advice names ``axis_signs``."""
     drive.odom.values[:, 2] *= -1.0
     drive.odom.values[:, 5] *= -1.0
-    assert "axis_signs" in said(drive, "Commands", "followed").advice
+    assert "axis_signs" in said(drive, "Commands", "follows").advice
 
 
 def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
@@ -163,7 +163,7 @@ def test_a_robot_that_stands_when_told_to_move_is_wrong(drive: Drive) -> None:
 def test_commands_that_ceased_are_noted(drive: Drive) -> None:
     """The commands pause. The report notes this, because it explains why the robot stood still."""
     drive.cmd_vel.drop(10.0, 10.8)
-    assert "1 time for more" in said(drive, "Commands", "paused").text
+    assert "1 time, first at 9.9 s" in said(drive, "Commands", "paused").text
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
@@ -211,11 +211,11 @@ def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None
 
     The report notes this, and the jump is not a driven distance.
     """
-    way = said(drive, "Odometry", "Driven").text.split(",")[0]
+    way = said(drive, "Odometry", "drove").text.split(" in all")[0]
     drive.odom.values[450:, :3] = 0.0
     assert not troubles(drive)
     assert "1 time" in said(drive, "Odometry", "set back to zero").text
-    assert said(drive, "Odometry", "Driven").text.startswith(way)
+    assert said(drive, "Odometry", "drove").text.startswith(way)
 
 
 def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
@@ -227,7 +227,7 @@ def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
     commands = Topic(drive.joints.stamp_s, told, drive.joints.late_s).series()
     drive.cmd_vel.drop(0.0, 99.0)
     findings = judge(replace(drive.log(), wheel_cmd=commands))
-    (followed,) = [finding for finding in findings if "wheel_cmd is followed" in finding.text]
+    (followed,) = [finding for finding in findings if "follows wheel_cmd" in finding.text]
     assert followed.level is Level.WARN
     assert "wheel A 1.00" in followed.text
     assert "wheel B 0.50" in followed.text

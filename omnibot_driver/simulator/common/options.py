@@ -66,8 +66,8 @@ def add_options(parser: argparse.ArgumentParser, simulator: SimulatorModule) -> 
             type=_delay,
             default=0.0,
             metavar="SECONDS",
-            help="largest random delay of a datagram in s, in either direction; datagrams may"
-            " change their order (default 0)",
+            help="largest random delay of a datagram in s, in either direction (default 0). A"
+            " datagram can arrive before one that was sent earlier",
         )
 
 
@@ -87,7 +87,7 @@ def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list
     """
     parts = urlsplit(url)
     if place := parts.netloc + parts.path:
-        raise OptionError(f"'{place}' must come after a question mark")
+        raise OptionError(f"'{place}' must come after a question mark, as in sim://?seed=1")
     words = [
         f"--{name.replace('_', '-')}" + (f"={value}" if value else "")
         for name, value in parse_qsl(parts.query, keep_blank_values=True)

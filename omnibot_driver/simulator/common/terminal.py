@@ -70,15 +70,13 @@ def _make_link(link: Path, target: str) -> None:
         if link.exists() and not os.path.realpath(link).startswith("/dev/pts/"):
             raise FileExistsError(
                 f"{link} already leads to {os.path.realpath(link)}, which is not a"
-                " pseudo-terminal; "
-                "choose another name for the simulator's link or remove it first"
+                f" pseudo-terminal; remove {link}, or choose another name for the simulator's link"
             )
         link.unlink()
     elif link.exists():
         raise FileExistsError(
-            f"{link} exists and is not a symbolic link; choose another name for the simulator's"
-            " link "
-            "or remove it first"
+            f"{link} exists and is not a symbolic link; remove {link}, or choose another name for"
+            " the simulator's link"
         )
     try:
         link.symlink_to(target)

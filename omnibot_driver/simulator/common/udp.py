@@ -71,7 +71,7 @@ def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
             refused = error
     what = f"port {port}" if count == 1 else f"ports {port} to {port + count - 1}"
     raise OSError(
-        f"cannot listen on UDP {what} ({refused.strerror}); choose others with --udp-port"
+        f"cannot listen on UDP {what} ({refused.strerror}); choose another port with --udp-port"
     ) from refused
 
 

@@ -36,7 +36,9 @@ class WiredBoard(Generic[B]):
         self.lines = tuple(lines) or tuple(good_line(channel) for channel in board.channels)
         matching = [isinstance(line, FaultyNetwork) for line in self.lines]
         if matching != [channel.datagrams for channel in board.channels]:
-            raise ValueError(f"{len(self.lines)} lines do not match {board.channels}")
+            raise ValueError(
+                f"the {len(self.lines)} lines do not match the board's channels {board.channels}"
+            )
         self._networks = [
             (channel, line)
             for channel, line in enumerate(self.lines)

@@ -17,11 +17,11 @@ from omnibot_driver.simulator.fejemis.settings import Fault, FejemisSettings, Fi
 _DEFAULT = FejemisSettings()
 _SWITCHES = (
     ("timed-velocity", "vel lines begin with the time"),
-    ("acceleration-in-g", "acc is in g instead of m/s²"),
-    ("tilt", "pose has a fifth number"),
-    ("start-resumes", "after start the last rc command applies again"),
-    ("confirms", "a command after ! is confirmed"),
-    ("single-precision", "times have the precision of float32"),
+    ("acceleration-in-g", "acc lines are in g instead of m/s²"),
+    ("tilt", "pose lines have a fifth number, the tilt"),
+    ("start-resumes", "after the command start, the last rc command takes effect again"),
+    ("confirms", "the board confirms a command that begins with !"),
+    ("single-precision", "times are float32, so after an hour they advance in steps of 0.2 ms"),
 )
 
 
@@ -31,22 +31,23 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--sums",
         choices=("on", "off"),
         default="on",
-        help="on (the default): lines carry a checksum, ;NN, as with the public host programs;"
+        help="on (the default): each line has a checksum, ;NN, as in the public host programs."
         " off: lines have no checksum, as in the manual",
     )
     parser.add_argument(
         "--reverse",
         choices=get_args(Reverse),
         default="mirrored",
-        help="front wheel's angle at a negative speed: mirrored (the default) takes the angle of"
-        " the same curve driven forward, clamped stays at 90 degrees",
+        help="angle of the front wheel in a curve that the robot drives backward. mirrored (the"
+        " default): the same angle as in that curve driven forward. clamped: an angle beyond 90"
+        " degrees stays at 90 degrees",
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)
     parser.add_argument(
         "--no-start-line",
         action="store_true",
-        help="a boot does not end with the line '# Starting main loop'",
+        help="the boards do not send the line '# Starting main loop' at the end of a boot",
     )
     parser.add_argument(
         "--boot",
@@ -56,7 +57,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="duration of a boot (default 0.4)",
     )
     parser.add_argument(
-        "--swapped", action="store_true", help="the front Teensy is at the first port"
+        "--swapped",
+        action="store_true",
+        help="the front Teensy is at the first port, and the drive Teensy at the second",
     )
     parser.add_argument(
         "--ids",
@@ -70,8 +73,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="SECONDS",
-        help="time for which the boards have been running at the start; with 0, the default, they"
-        " boot first",
+        help="how long the boards have been running when the simulation starts. With 0, the"
+        " default, they boot first",
     )
     parser.add_argument(
         "--volts", type=float, default=_DEFAULT.volts, help="battery voltage (default 24.9)"
@@ -96,9 +99,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="SECONDS:HALF:WHAT",
-        help="fault of the drive or the front half, SECONDS after the start; the option"
-        f" may be repeated. WHAT for both halves: {', '.join(FAULTS)}; for the front half only:"
-        f" {', '.join(SENSOR_FAULTS)}",
+        help="let the fault WHAT occur in one half (drive or front), SECONDS after the start."
+        " Repeat the option for more faults. WHAT in either half:"
+        f" {', '.join(FAULTS)}; in the front half only: {', '.join(SENSOR_FAULTS)}",
     )
 
 

@@ -19,11 +19,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--firmware",
         choices=get_args(Firmware),
         default="documented",
-        help="behaviour of the board: that of the manual (documented, the default) or that of the"
-        " public firmware (firmware)",
+        help="behaviour of the board. documented (the default): as in the manual. firmware: as in"
+        " the public firmware",
     )
     parser.add_argument(
-        "--running", action="store_true", help="start as a board that has booted already"
+        "--running", action="store_true", help="start with a board that has already booted"
     )
 
 

@@ -23,8 +23,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--firmware",
         choices=get_args(Firmware),
         default="firmware",
-        help="behaviour of the server: as in the manual (documented), as observed on the public"
-        " server (firmware, the default), or as its source shows (source)",
+        help="behaviour of the server. documented: as in the manual. firmware (the default): as"
+        " observed on the running public server. source: as in the source code of this server",
     )
     for name, number, metavar, effect in _NUMBERS:
         default = getattr(_DEFAULT, name)
@@ -49,7 +49,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="the encoder counts down when the robot drives forward",
     )
     parser.add_argument(
-        "--motor-board-silent", action="store_true", help="the motor board does not answer or obey"
+        "--motor-board-silent",
+        action="store_true",
+        help="the motor board neither answers nor obeys",
     )
     parser.add_argument(
         "--reference-start-fails",
@@ -103,7 +105,12 @@ _WORDS = {
     "dock_m": "dock",
 }
 _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
-    ("speed_mps_per_unit", _within(0.0001, 1.0), "M/S", "speed for one unit, at 24 V"),
+    (
+        "speed_mps_per_unit",
+        _within(0.0001, 1.0),
+        "M/S",
+        "wheel speed for one unit of motor speed, at 24 V",
+    ),
     ("metres_per_count", _within(1e-6, 1.0), "M", "distance for one encoder count"),
     ("track_m", _within(0.01, 10.0), "M", "distance between the wheels"),
     ("volts", _within(0.0, 40.0), "V", "battery voltage; a higher voltage gives a higher speed"),
@@ -111,7 +118,7 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
         "dead_zone_units",
         _within(0.0, 127.0),
         "UNITS",
-        "motor speed below which a motor does not turn",
+        "motor speed, in units, up to which a motor does not turn",
     ),
     (
         "motor_inequality",
@@ -123,13 +130,24 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
         "gyro_bias_dps",
         _within(-50.0, 50.0),
         "DEG/S",
-        "bias of the gyro, which the server measures with SB",
+        "bias of the gyro; the server does not know the bias before the command SB",
     ),
     ("gyro_noise_dps", _within(0.0, 50.0), "DEG/S", "noise of a gyro sample while the robot moves"),
-    ("imu_dies_s", _within(0.0, inf), "SECONDS", "time at which the IMU stops working"),
-    ("imu_returns_s", _within(0.0, inf), "SECONDS", "time at which the IMU works again"),
+    ("imu_dies_s", _within(0.0, inf), "SECONDS", "time after the start until the IMU fails"),
+    (
+        "imu_returns_s",
+        _within(0.0, inf),
+        "SECONDS",
+        "time after the start until the IMU works again",
+    ),
     ("front_m", _within(0.0, inf), "M", "distance from the start to a wall in front"),
     ("rear_m", _within(0.0, inf), "M", "distance from the start to a wall behind"),
     ("dock_m", _within(0.0, inf), "M", "distance from the start to the dock in front"),
-    ("motor_status", _bits, "BITS", "status bits of MCSTAT; 4, 8: tripped, 16, 32: short"),
+    (
+        "motor_status",
+        _bits,
+        "BITS",
+        "sum of status bits in the reply to MCSTAT. Right motor: 4 tripped, 16 short circuit. Left"
+        " motor: 8 tripped, 32 short circuit",
+    ),
 )

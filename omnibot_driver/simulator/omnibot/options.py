@@ -16,19 +16,23 @@ from omnibot_driver.simulator.omnibot.settings import BoardSettings
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add all options to the parser."""
-    parser.add_argument("--imu-only", action="store_true", help="run in IMU only mode")
+    parser.add_argument(
+        "--imu-only", action="store_true", help="send IMU frames and no odometry (IMU-only mode)"
+    )
     parser.add_argument(
         "--frame",
         choices=("earth", "body", "wheel_counts"),
         default="earth",
-        help="meaning of the 25 Hz frame (default earth)",
+        help="content of the delta frame, which is sent at 25 Hz. earth (the default):"
+        " displacement in the board's earth frame. body: displacement in the robot's frame."
+        " wheel_counts: encoder counts",
     )
     parser.add_argument(
         "--delta-period",
         type=_ticks,
         default=0.04,
         metavar="SECONDS",
-        help="period of the 25 Hz frame in s (default 0.04; the manual also says 0.1)",
+        help="period of the delta frame in s (default 0.04; the manual also states 0.1)",
     )
     parser.add_argument(
         "--control",
@@ -40,21 +44,22 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--receiver",
         choices=get_args(FramingName),
         default="counting",
-        help="how the firmware finds control frames: counting (the default) counts seven bytes"
-        " after FF FE without a timeout; naive is like counting, but misses the header in FF FF"
-        " FE; idle_gap is like counting, but a pause of 5 ms ends an incomplete"
-        " frame; window accepts the last 9 bytes whenever they begin with FF FE",
+        help="how the firmware finds control frames. counting (the default): it counts seven bytes"
+        " after FF FE, without a timeout. naive: like counting, but it misses the header in FF FF"
+        " FE. idle_gap: like counting, but a pause of 5 ms ends an incomplete frame. window: it"
+        " accepts the last 9 bytes whenever they begin with FF FE",
     )
     parser.add_argument(
         "--letters",
         choices=get_args(LetterPlace),
         default="between",
-        help="where S, P and R act: between control frames, or anywhere (default between)",
+        help="where the letters S, P and R take effect. between (the default): only between"
+        " control frames. anywhere: also within a control frame",
     )
     parser.add_argument(
         "--wakes-while-booting",
         action="store_true",
-        help="let bytes that arrive during the boot count as wake-up bytes (three are needed)",
+        help="bytes that arrive during the boot count as wake-up bytes. The board needs three",
     )
     parser.add_argument(
         "--ignore-estop", action="store_true", help="simulate a firmware without emergency stop"
@@ -62,7 +67,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--latching-estop",
         action="store_true",
-        help="keep an emergency stop until the board is reset",
+        help="after an emergency stop, refuse all motion until the board is reset",
     )
     parser.add_argument(
         "--running", action="store_true", help="start in the running mode instead of booting"

@@ -25,13 +25,13 @@ NEEDS: Final = {
     "imu": (("gyro_bias",), "an IMU"),
     "scale": (
         ("linear_scale", "odom_linear_scale"),
-        "`linear_scale` or `odom_linear_scale`",
+        "the parameter `linear_scale` or `odom_linear_scale`",
     ),
     "geometry": (
         ("base_radius", "odom_linear_scale"),
-        "`base_radius` or `odom_linear_scale`",
+        "the parameter `base_radius` or `odom_linear_scale`",
     ),
-    "step": (("delta_frame", GAINS), "a wheel controller that it can model"),
+    "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
 """What each subcommand needs: names of parameters, and a text for the error message.
 
@@ -73,19 +73,20 @@ def command_line() -> argparse.ArgumentParser:
         subparser.add_argument(
             "--output",
             metavar="FILE",
-            help="YAML file for the results (default: the driver's calibration_file; without one,"
-            " omnibot_calibration.yaml in this folder)",
+            help="YAML file for the results. The default is the driver's calibration_file. If the"
+            " driver has none, it is omnibot_calibration.yaml in the current folder",
         )
         subparser.add_argument(
             "--plot",
             metavar="FILE",
-            help=f"file or folder for the picture (default: calibrate_{name}.png in this folder)",
+            help="file or folder for the picture (default:"
+            f" calibrate_{name}.png in the current folder)",
         )
         subparser.add_argument(
             "--apply",
             action="store_true",
-            help="set the results in the running driver as well as in the file, except for"
-            " parameters that the driver reads only at its start",
+            help="also set the results in the running driver, except for parameters that the"
+            " driver reads only at its start",
         )
         subparser.add_argument(
             "--namespace",
@@ -112,7 +113,8 @@ def _imu(parser: argparse.ArgumentParser) -> None:
         "--minutes",
         type=_positive,
         default=1.0,
-        help="minutes at rest (default 1; ten or more show how the bias drifts)",
+        help="duration of the rest in minutes (default 1). With ten or more, the result also shows"
+        " how the bias drifts",
     )
     parser.add_argument(
         "--gravity",
@@ -156,7 +158,7 @@ def _by_tape(parser: argparse._ActionsContainer) -> None:
         "--turns",
         type=_whole,
         default=3,
-        help="turns on the spot in each direction (default %(default)s)",
+        help="number of turns on the spot in each direction (default %(default)s)",
     )
     parser.add_argument(
         "--tape",
@@ -217,12 +219,12 @@ def _step(parser: argparse.ArgumentParser) -> None:
         type=_positive,
         nargs=3,
         metavar=("K_FF", "K_VP", "K_VI"),
-        help="gains in the firmware (default: the manual's 40 10 1.5)",
+        help="present gains in the firmware (default: the manual's 40 10 1.5)",
     )
     tuning = parser.add_argument_group("for boards whose gains are parameters")
     for name, default, words in (
-        ("records", 24, "number of recorded starts at full duty"),
-        ("responses", 3, "number of recorded steps of the set-point for each set of gains"),
+        ("records", 24, "number of starts at full duty to record"),
+        ("responses", 3, "number of steps of the set-point to record for each set of gains"),
         ("samples", 120, "number of encoder ticks of each wheel in a record"),
     ):
         tuning.add_argument(
@@ -242,7 +244,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
     tuning.add_argument(
         "--gain-optimum",
         action="store_true",
-        help="find the fastest gains with Td = 0, without a limit on the phase margin",
+        help="find the fastest gains without a limit on the phase margin; Td is 0",
     )
 
 
@@ -270,7 +272,7 @@ SUBCOMMANDS: Final = {
         _commission,
     ),
     "imu": (
-        "gyro bias and noise, accelerometer level, Allan deviation; the robot stands still",
+        "bias and noise of the IMU, its tilt, and Allan deviation; the robot stands still",
         _imu,
     ),
     "scale": (

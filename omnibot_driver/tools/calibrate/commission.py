@@ -110,13 +110,14 @@ class Walk:
         if found.control_method == "position":
             say(
                 f"The commands were {slow_mps:.3f} m/s, then {2 * slow_mps:.3f} m/s. At the end"
-                f" of each command the robot moved at {slow.late_mps:.3f} m/s and"
-                f" {fast.late_mps:.3f} m/s, so the switch is on positional control."
+                f" of these commands the robot moved at {slow.late_mps:.3f} m/s and"
+                f" {fast.late_mps:.3f} m/s. Its speed did not follow the commands, so the switch is"
+                " on positional control."
             )
             return
         say(
-            f"The robot moved at {slow.speed_mps:.3f} m/s, then at {fast.speed_mps:.3f} m/s, so the"
-            " switch is on velocity control."
+            f"The robot moved at {slow.speed_mps:.3f} m/s, then at {fast.speed_mps:.3f} m/s. Its"
+            " speed followed the commands, so the switch is on velocity control."
         )
         say("Checking the odometry deltas: a turn on the spot, then another drive forward.")
         seconds = TURN_RAD / TURN_RADPS
@@ -127,8 +128,8 @@ class Walk:
         if not deltas_are_understood(turning, found.before["base_radius"]):
             found.delta_frame = "earth" if frame == "wheel_counts" else "wheel_counts"
             say(
-                f"In a turn on the spot the deltas show {turning.speed_mps:.3f} m/s sideways:"
-                f" delta_frame is not {frame}, but {found.delta_frame}."
+                f"In a turn on the spot, the odometry shows {turning.speed_mps:.3f} m/s sideways."
+                f" So delta_frame must be {found.delta_frame}, not {frame}."
             )
             self._obeys = False  # with the wrong delta_frame, the driver reports wrong speeds
             return
@@ -138,8 +139,11 @@ class Walk:
         again = drift(log.odometry, began_s + SETTLING_S, began_s + JOG_S)
         right = frame == "wheel_counts" or frame_is_right(fast, again, turned_rad)
         found.delta_frame = frame if right else {"earth": "body", "body": "earth"}[frame]
-        verdict = "as set" if right else "because the direction of a forward drive has changed"
-        say(f"After a turn by {turned_rad:.2f} rad: delta_frame is {found.delta_frame}, {verdict}.")
+        verdict = "as set" if right else "because the odometry shows the drive in a new direction"
+        say(
+            f"Result of a forward drive after a turn by {turned_rad:.2f} rad: delta_frame is"
+            f" {found.delta_frame}, {verdict}."
+        )
 
     def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
         """Return the motions in the slow and in the fast drive, and the control method.
@@ -177,8 +181,8 @@ class Walk:
         self._console.say(
             "Look at each wheel from outside, towards the robot's centre. According to the"
             " manual, A is front right, B front left, C at the back.\nAnswer with three signs, for"
-            " A, B and C: + for counter-clockwise, - for clockwise, 0 for still. An example is +00."
-            " Answer r to see the motion again."
+            " A, B and C: + for counter-clockwise, - for clockwise, 0 for still. For example, +00"
+            " means that only A turned. Answer r to see the motion again."
         )
         signs = [self._until_possible(lambda n=wheel: self._wheel(n)) for wheel in range(3)]  # type: ignore[misc]
         a, b, c = signs
@@ -187,11 +191,11 @@ class Walk:
             odd = WHEELS[next(n for n in range(3) if signs.count(signs[n]) == 1)]
             raise ToolError(
                 f"wheel {odd} turns in the opposite direction to the other two: no parameter"
-                " corrects a single wheel; check how its motor and encoder are connected, then"
-                " begin again"
+                f" corrects a single wheel; check how motor and encoder of wheel {odd} are"
+                " connected, then begin again"
             )
         if found.control_method == "position":
-            self._console.say("The axes cannot be checked with the switch on positional control.")
+            self._console.say("With the switch on positional control, the axes cannot be checked.")
             return
         seen = [self._until_possible(lambda n=axis: self._axis(n)) for axis in range(3)]  # type: ignore[misc]
         x, y, yaw = (now * sign for now, sign in zip(found.before["axis_signs"], seen, strict=True))
@@ -227,7 +231,8 @@ class Walk:
             seen = self._console.ask(
                 "What did A, B, C do?",
                 _understand,
-                "Please answer with three of + - 0, such as +00, or r to see the motion again.",
+                "Please answer with three signs (each +, - or 0), such as +00. Answer r to see the"
+                " motion again.",
             )
             if seen:
                 self._console.say(f"Your answer means: {in_words(seen)}.")
@@ -255,8 +260,8 @@ class Walk:
         left_up = up(self._robot.rest(HELD_S).imu)
         found = mounting(level, nose_up, left_up)
         ask(
-            "Put the robot down. After you press Enter, turn it to the left by hand, by a quarter"
-            f" turn or more, within {TURN_BY_HAND_S:.0f} s."
+            "Put the robot down. Then press Enter, and turn the robot to the left by hand within"
+            f" {TURN_BY_HAND_S:.0f} s, by a quarter turn or more."
         )
         turn_rad = require_left_turn(self._robot.rest(TURN_BY_HAND_S).imu, bias(resting), level)
         self._console.say(
@@ -277,7 +282,7 @@ class Walk:
                 return find()
             except Contradiction as error:
                 said = str(error)
-                self._console.say(f"That is not possible: {said}. Please try again.")
+                self._console.say(f"This result cannot be right: {said}. Please try again.")
         raise ToolError(f"{said}; no clear result after several tries, see docs/commissioning.md")
 
     def _drive(

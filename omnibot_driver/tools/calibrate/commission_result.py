@@ -61,8 +61,8 @@ def result_of(found: Found) -> Result:
         findings += _angles(found.mounting, chosen)
         words = " ".join(f"{angle:.4f}" for angle in angles)
         notes.append(
-            "The driver does not rotate the IMU's axes; the robot's description does. Start"
-            f" description.launch.py with\n  xacro_args:=\"imu_rpy:='{words}'\""
+            "The driver does not rotate the IMU's axes; the robot's description contains the"
+            f" rotation. Start description.launch.py with\n  xacro_args:=\"imu_rpy:='{words}'\""
         )
     return Result(
         findings=findings,
@@ -93,19 +93,19 @@ def _remarks(found: Found) -> list[str]:
     remarks = []
     if found.control_method == "position":
         remarks.append(
-            "With the switch on positional control the driver accepts only cmd_pose. To drive by"
-            " velocities, move the switch, reboot the board and begin again."
+            "With the switch on positional control, the driver accepts only cmd_pose. To command"
+            " velocities, move the switch, reboot the board and calibrate again."
         )
     if found.wheel_signs == (-1, -1, -1):
         remarks.append(
-            "All wheels turn in the opposite direction to the manual's. axis_signs corrects cmd_vel"
-            " and odom, but wheel_cmd and joint_states stay reversed."
+            "All wheels turn in the opposite direction to that in the manual. axis_signs corrects"
+            " cmd_vel and odom, but wheel_cmd and joint_states stay reversed."
         )
     if found.axis_signs is not None and mirrored(found.axis_signs):
         remarks.append(
-            "These signs mirror the robot. Choosing another side as its front cannot cause that, so"
-            " check your answers. If they are right, use these signs for velocities; the driver"
-            " refuses cmd_pose with them."
+            "The signs of the axes describe a mirror image of the robot. Another choice of its"
+            " front side cannot cause this, so check your answers. If your answers are right, use"
+            " the signs for velocities only: with these signs, the driver refuses cmd_pose."
         )
     if found.delta_frame not in (None, found.before["delta_frame"]):
         remarks.append(
@@ -128,14 +128,14 @@ def draw(figure: "Figure", found: Found) -> None:
     left.set_title("The board's x and y")
     right.set_title("The IMU's axes")
     if found.axis_signs is None:
-        _say(left, "not looked at")
+        _say(left, "not checked")
     else:
         x, y, yaw = found.axis_signs
         _arrow(left, (0.8 * x, 0.0), "x")
         _arrow(left, (0.0, 0.8 * y), "y")
         _say(left, f"yaw {'counter-' if yaw > 0 else ''}clockwise")
     if found.mounting is None:
-        _say(right, "not looked at")
+        _say(right, "not checked")
     else:
         for name, column in zip("xyz", found.mounting.rotation.T, strict=True):
             if math.hypot(column[0], column[1]) > SEEN_FROM_ABOVE:

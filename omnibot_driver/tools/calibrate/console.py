@@ -72,7 +72,7 @@ class Console:
                 value = math.nan
             if low <= value <= high:
                 return value
-            self.say(f"Please type a number of {unit} from {low:g} to {high:g}.")
+            self.say(f"Please type a number from {low:g} to {high:g}, in {unit}.")
 
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
         """Ask until ``understand`` accepts the answer; return what ``understand`` returned.

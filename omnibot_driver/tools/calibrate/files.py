@@ -87,8 +87,10 @@ def draw(result: Result, output: Path, picture: Path) -> None:
         picture.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(picture, dpi=110)
     except Exception as error:  # whatever fails here, only the picture is lost
-        saved = f"saved to {output}, but " if result.parameters or result.record else ""
-        raise ToolError(f"{saved}{picture} is not drawn: {error}") from error
+        saved = (
+            f"the result is saved to {output}, but " if result.parameters or result.record else ""
+        )
+        raise ToolError(f"{saved}the picture {picture} is not drawn: {error}") from error
 
 
 def _values(content: Any) -> list[Any]:

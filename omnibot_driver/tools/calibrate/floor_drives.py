@@ -115,7 +115,8 @@ def turned_past_mark(console: Console) -> float:
     """
     return math.radians(
         console.number(
-            "By how much did the robot turn past the mark of its front (left +, right -)",
+            "Angle from the floor mark to the robot's front (+ if the front points left of the"
+            " mark, - if right)",
             "degrees",
             -170.0,
             170.0,

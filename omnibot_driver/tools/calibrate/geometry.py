@@ -24,10 +24,11 @@ from omnibot_driver.tools.calibrate.waypoints import square, visit
 PLAIN: Final = 0.005
 """The tool warns if a wheel's radius differs from the mean by more than this fraction."""
 INTRODUCTION: Final = (
-    "You need a tape measure, something to mark the floor with, and a plumb or a fixed point"
-    " under the robot's centre. Before each drive mark where the centre is and where the front"
-    " points. After the drive, enter where the robot stands relative to these marks: forward and"
-    " left are positive, back and right are negative. Do not push the robot or correct its course."
+    "You need a tape measure, something to mark the floor with, and a plumb line or a point of"
+    " the robot's lowest deck under its centre. Before each drive, mark where the centre is and"
+    " where the front points. After the drive, enter where the robot stands relative to these"
+    " marks: forward and left are positive, back and right are negative. Do not push the robot or"
+    " correct its course."
 )
 
 
@@ -153,7 +154,7 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     ]  # fmt: skip
     parameters = {name: size * factors[name][0] for name, size in was.items()}
     findings += [
-        Finding(name=f"wheel {wheel} over the mean", value=100 * float(more),
+        Finding(name=f"wheel {wheel}, size above the mean", value=100 * float(more),
                 sigma=100 * float(sigma), unit="%")
         for wheel, more, sigma in zip(WHEELS, found.unlike, found.unlike_sigma, strict=True)
     ]  # fmt: skip
@@ -161,20 +162,21 @@ def result(readings: Sequence[Reading], found: Geometry, now: Mapping[str, Any])
     notes = [
         f"The mean error of the odometry was {before * 1000:.0f} mm; with these values it would"
         f" have been {after * 1000:.0f} mm.",
-        "These values do not correct the speeds: load them, then run `calibrate scale`.",
+        "These values correct the odometry, but not the speeds of the robot. Load the values, then"
+        " run `calibrate scale` for the speeds.",
     ]
     notes += [
-        f"Wheel {wheel} is {abs(more):.1%} {'larger' if more > 0 else 'smaller'} than the mean,"
-        " which no parameter corrects; check its rollers, and whether all wheels carry the same"
-        " load."
+        f"Wheel {wheel} is {abs(more):.1%} {'larger' if more > 0 else 'smaller'} than the mean."
+        f" No parameter corrects this. Check the rollers of wheel {wheel}, and whether all wheels"
+        " carry the same load."
         for wheel, more, sigma in zip(WHEELS, found.unlike, found.unlike_sigma, strict=True)
         if abs(more) > max(PLAIN, 3 * sigma)
     ]
     if found.excess > 2.0:
         notes.append(
             f"The readings scatter {found.excess:.1f} times as much as --tape, --angle and"
-            " odom_wheel_drift predict, so the uncertainties are larger by this factor: a reading"
-            " may be wrong, or the robot slips."
+            " odom_wheel_drift predict. The uncertainties above already include this factor."
+            " Perhaps a reading is wrong, or the wheels slip."
         )
     return Result(
         findings=findings,

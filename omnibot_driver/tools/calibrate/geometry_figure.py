@@ -31,9 +31,9 @@ def draw(
         left.plot(was[:, 0], was[:, 1], ":", color=colour)
         left.plot(now[:, 0], now[:, 1], color=colour, label=one.name)
         left.errorbar(*one.end[:2], *one.sigma[:2], fmt="x", ms=9, mew=2, color=colour)
-    left.plot([], [], ":", color="grey", label="by odom before")
-    left.plot([], [], "x", color="grey", label="by the tape")
-    left.set(title="Drives, with the geometry found", xlabel="forward, m", ylabel="left, m")
+    left.plot([], [], ":", color="grey", label="path by odom, old geometry")
+    left.plot([], [], "x", color="grey", label="end by the tape")
+    left.set(title="Path by odom, new geometry", xlabel="forward, m", ylabel="left, m")
     left.set_aspect("equal")
     figure.legend(*left.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     labels, before, after = [], [], []
@@ -50,7 +50,9 @@ def draw(
     right.barh(rows + 0.2, after, 0.4, color="tab:green", label="after")
     right.set_yticks(rows, labels, fontsize="small")
     right.invert_yaxis()
-    right.set(title="Off by", xlabel="standard deviations of the reading", xscale="symlog")
+    right.set(
+        title="Error of odom", xlabel="in standard deviations of the reading", xscale="symlog"
+    )
     right.legend()
 
 

@@ -35,7 +35,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     if robot.parameters["auto_gyro_bias"]:
         raise ToolError(
             "auto_gyro_bias is on, so the driver would change the bias during the measurement;"
-            " set it to false"
+            " set auto_gyro_bias to false"
         )
     console.confirm(
         f"The measurement takes {60 * arguments.minutes:g} s. Does the robot stand still on a"
@@ -129,8 +129,8 @@ def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> R
         },
         notes=[
             f"{found.readings} readings in {found.readings * found.period_s:.0f} s. At rest only"
-            " the part of the accelerometer's bias along gravity can be measured. Roll and pitch"
-            " include the slope of the floor. For the robot's description:"
+            " one part of the accelerometer's bias can be measured: the part along gravity. Roll"
+            " and pitch include the slope of the floor. For the robot's description, use"
             f" imu_rpy:='{roll_rad % math.tau:.4f} {pitch_rad:.4f} <yaw>'."
         ],
         draw=lambda figure: draw(figure, found, imu),

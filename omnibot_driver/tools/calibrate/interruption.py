@@ -48,7 +48,7 @@ class Interruption:
     def check(self) -> None:
         """Raise Interrupted if a signal was received and is not deferred."""
         if self._requested and not self._deferred:
-            raise Interrupted("interrupted; the robot is stopped, nothing was written")
+            raise Interrupted("interrupted: the robot is stopped, and nothing was written")
 
     @contextmanager
     def deferred(self) -> Iterator[None]:

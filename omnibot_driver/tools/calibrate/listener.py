@@ -134,7 +134,7 @@ class Listener(Client):
             if state not in states:
                 raise ToolError(
                     f"the driver reported the state {state}, but {' or '.join(states)} is needed:"
-                    " see the driver's log; ~/start starts a paused board"
+                    " see the driver's log; if the board is paused, start it with ~/start"
                 )
         if lost := self._lost():
             raise ToolError(

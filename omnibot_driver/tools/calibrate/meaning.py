@@ -135,9 +135,10 @@ def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     if abs(change_rad - abs(math.remainder(turned_rad, math.tau))) < ALIKE * abs(turned_rad):
         return False
     raise ToolError(
-        f"the odometry contradicts itself: after a turn of {math.degrees(turned_rad):.0f}° the"
-        f" same command leads in a direction that differs by {math.degrees(change_rad):.0f}°; see"
-        " /diagnostics, and docs/internals/omnibot_protocol.md"
+        f"the odometry contradicts itself: after a turn of {math.degrees(turned_rad):.0f}°, the"
+        f" direction of a forward drive is off by {math.degrees(change_rad):.0f}° (it should be"
+        " off by 0°, or by the whole turn if delta_frame is wrong); see /diagnostics, and"
+        " docs/internals/omnibot_protocol.md"
     )
 
 

@@ -93,7 +93,7 @@ class Bounds:
         if not pose.finite:
             raise ToolError(
                 "the robot was stopped because `odom` contains NaN or infinity: find the node"
-                " that publishes it"
+                " that publishes such values"
             )
         if pose.way_m > self.way:
             where = f"{pose.way_m:.2f} m from its start, {self.way:.2f} m allowed"
@@ -104,8 +104,8 @@ class Bounds:
         else:
             return
         raise ToolError(
-            f"the robot was stopped because it went too far ({where}): check `linear_scale`,"
-            " `angular_scale` and that `odom` is right (docs/commissioning.md)"
+            f"the robot was stopped because it went too far ({where}): check `linear_scale` and"
+            " `angular_scale`, and whether `odom` is right (docs/commissioning.md)"
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:

@@ -52,10 +52,10 @@ BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 ``BALANCE_SIGMA``: standard deviation of the value.
 """
 INTRODUCTION: Final = (
-    "You need a tape measure and something to mark the floor with. Before each drive mark where"
-    " the robot's centre is and where the front points. After the drive, enter how far the robot"
-    " has driven, or how far it has turned past its mark. Do not push the robot or correct its"
-    " course."
+    "You need a tape measure and something to mark the floor with. Before each drive, mark where"
+    " the robot's centre is and where the front points. After a straight drive, enter how far the"
+    " robot has driven. After a turn, enter the angle from the mark to the front. Do not push the"
+    " robot or correct its course."
 )
 
 
@@ -211,4 +211,4 @@ def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
     values = [one.value for one in ratios]
     axes.errorbar(names, values, [one.value_sigma for one in ratios], fmt="o", color="tab:blue")
     axes.axhline(1.0, color="grey", lw=0.8)
-    axes.set(ylabel="true / reported by odom", title="Factor by which odom is multiplied")
+    axes.set(ylabel="motion by the tape / motion by odom", title="Factor that corrects odom")

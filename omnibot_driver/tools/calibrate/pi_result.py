@@ -157,23 +157,24 @@ def _recorded(wheel: WheelTuned, goals: Goals) -> dict[str, Any]:
 def _remarks(wheel: WheelTuned, goals: Goals) -> list[str]:
     predicted = told(wheel.plant, wheel.tuned.gains, wheel.loop, goals)
     remarks = [
-        f"The {wheel.name} wheel: a step to {wheel.tuned.target_rpm:.0f} RPM has a predicted"
-        f" overshoot of {predicted.overshoot:.1%}, and a predicted settling time of"
+        f"The {wheel.name} wheel, with the new gains: a step to {wheel.tuned.target_rpm:.0f} RPM"
+        f" has a predicted overshoot of {predicted.overshoot:.1%}, and a predicted settling time of"
         f" {predicted.settled_s:.2f} s. The measured overshoot is {wheel.after.overshoot:.1%}; with"
         f" the previous gains it was {wheel.before.overshoot:.1%}."
     ]
     if predicted.settled_s > goals.settled_s:
         remarks.append(
             f"The {wheel.name} wheel needs {predicted.settled_s:.2f} s to settle, more than the"
-            f" {goals.settled_s:g} s of --settling: the wheel, or the controller's rate of"
-            f" {1 / wheel.loop.period_s:.0f} Hz, does not allow a faster response."
+            f" {goals.settled_s:g} s that --settling asks for. A faster response is not possible"
+            f" with this wheel and the controller's rate of {1 / wheel.loop.period_s:.0f} Hz."
         )
     if wheel.worse:
         remarks.append(
             f"The {wheel.name} wheel followed a step better with its previous gains (integrated"
-            f" error {wheel.before.error_s:.2f} s before, {wheel.after.error_s:.2f} s now), so the"
-            " new gains are not kept: allow more overshoot, or take more records. If the driver did"
-            " not know the previous gains, restart the driver and the board to restore them."
+            f" error {wheel.before.error_s:.2f} s) than with the new gains"
+            f" ({wheel.after.error_s:.2f} s). So the new gains are not kept: allow more overshoot,"
+            " or take more records. If the driver did not know the previous gains, restart the"
+            " driver and the board to restore these gains."
         )
     return remarks
 

@@ -67,8 +67,8 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     )
     total = 1 + arguments.records + (1 + ROUNDS) * arguments.responses
     console.confirm(
-        f"Both wheels will turn {total} times for some seconds, at up to full duty. Is the robot on"
-        " a box, with both wheels off the ground and nothing near them?"
+        f"Both wheels will turn {total} times, for some seconds each, at up to full duty. Is the"
+        " robot on a box, with both wheels off the ground and nothing near them?"
     )
     names = [*RECORDING, *_names("kp", "tn", "td")]
     names += _names("short_correction", "long_correction")
@@ -194,8 +194,9 @@ def _plant(found: PlantFit, free: Levels) -> Plant:
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:
         raise ToolError(
-            f"a wheel turns at {free.rpm:.0f} RPM with half duty and at {found.final_rpm:.0f} RPM"
-            " with full duty; check that nothing blocks the wheel, and charge the battery"
+            f"a wheel turns at {free.rpm:.0f} RPM with half duty, but only at"
+            f" {found.final_rpm:.0f} RPM with full duty; check that nothing blocks the wheel, and"
+            " charge the battery"
         )
     dead_zone = FULL_PERCENT - found.final_rpm / slope
     return Plant(slope, found.slow_s, found.fast_s, float(np.clip(dead_zone, 0.0, 50.0)))

@@ -102,8 +102,8 @@ def rest(imu: Imu) -> Rest:
         )
     if not (np.ptp(rates, axis=0).all() and np.ptp(forces, axis=0).all()):
         raise ToolError(
-            "an axis of the IMU gave identical readings all the time: it is stuck; switch the"
-            " board off and on"
+            "an axis of the IMU is stuck, because all its readings are identical: switch the board"
+            " off and on"
         )
     size = max(2, round(BLOCK_S / period_s))
     rate_noise, force_noise = _within(rates, size), _within(forces, size)

@@ -42,14 +42,15 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     for _seconds, (x, y, yaw) in steps:
         if max(abs(x), abs(y)) > linear or abs(yaw) > turning:
             raise ToolError(
-                "the slowest speed that the board can be given exceeds the limits: raise --speed"
-                " or --turning, and max_linear_speed or max_angular_speed"
+                "the slowest speed that a command can contain exceeds the limits: raise --speed or"
+                " --turning, and if necessary max_linear_speed or max_angular_speed"
             )
     way_m = linear * step_s
     console.confirm(
-        f"The robot will drive {way_m:.1f} m forward and back, then left and back, then turn on the"
-        f" spot both ways, at up to {linear:g} m/s and {turning:g} rad/s,"
-        f" {arguments.levels} times. Are {2 * way_m:.1f} m clear all around?"
+        f"The robot will drive up to {way_m:.1f} m forward and back, then to the left and back."
+        " Then it will turn on the spot in both directions. It will do this"
+        f" {arguments.levels} times, at up to {linear:g} m/s and {turning:g} rad/s. Are"
+        f" {2 * way_m:.1f} m clear all around?"
     )
     with console.progress("Listening at rest") as told:
         ask = still(np.array(now["gyro_bias"]))
@@ -93,7 +94,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
         ("  by y alone", y, units[0], None),
         ("angular_scale", angular, units[1], now["angular_scale"]),
         ("  by the gyro", gyro, units[1], None),
-        ("turn by gyro / by odom", Scale(ratio, ratio_sigma, 1.0), "", None),
+        ("ratio of turns, gyro to odom", Scale(ratio, ratio_sigma, 1.0), "", None),
     ]
     notes = []
     if abs(x.value - y.value) > UNLIKE * math.hypot(x.sigma, y.sigma):
@@ -103,9 +104,9 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
         )
     if abs(ratio - 1) > GYRO_TOLERANCE + UNLIKE * ratio_sigma:
         notes.append(
-            f"Gyro and odometry differ by {abs(ratio - 1):.1%}, more than the gyro's tolerance of"
-            f" {GYRO_TOLERANCE:.0%}: run `calibrate geometry`, load its values, then run"
-            " `calibrate scale` again."
+            f"The turns by the gyro and by the odometry differ by {abs(ratio - 1):.1%}, more than"
+            f" the gyro's tolerance of {GYRO_TOLERANCE:.0%}. Run `calibrate geometry`, load its"
+            " values, then run `calibrate scale` again."
         )
     notes.append(
         "These values are based on the present `odom`. If `calibrate geometry` changes `odom`, run"

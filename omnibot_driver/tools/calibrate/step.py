@@ -37,8 +37,9 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
     levels = _levels(robot.parameters, arguments)
     _law, seconds = _to_and_fro(levels, arguments)
     console.confirm(
-        f"One wheel at a time will turn at up to {levels[1]:.1f} rad/s, for {2 * seconds:.0f} s"
-        " each. Is the robot on a box, with all wheels off the ground and nothing near them?"
+        f"The wheels will turn one after another, each for {2 * seconds:.0f} s and at up to"
+        f" {levels[1]:.1f} rad/s. Is the robot on a box, with all wheels off the ground and nothing"
+        " near them?"
     )
     now = Gains(*arguments.gains) if arguments.gains else MANUAL
     found = []
@@ -95,7 +96,7 @@ def _to_and_fro(
 def _wheels(names: str) -> str:
     wanted = names.upper().replace(",", "")
     if not wanted or set(wanted) - set(WHEELS):
-        raise ToolError(f"--wheels must be some of {WHEELS}, not {names!r}")
+        raise ToolError(f"--wheels must be one or more of the letters {WHEELS}, not {names!r}")
     return "".join(sorted(set(wanted)))
 
 
@@ -116,7 +117,7 @@ def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[
     words = round(slow * lsb), round(fast * lsb)
     if words[0] < 1 or words[1] <= words[0]:
         raise ToolError(
-            f"--speeds {slow:g} {fast:g} give the same command, because the board's unit is"
-            f" {1 / lsb:.2f} rad/s: choose speeds further apart"
+            f"--speeds {slow:g} {fast:g} become commands of {words[0]} and {words[1]} units of"
+            f" {1 / lsb:.2f} rad/s: choose speeds of at least one unit, and further apart"
         )
     return words[0] / lsb, words[1] / lsb

@@ -30,19 +30,19 @@ def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: G
     measured: Any = left.subplots(len(wheels), 1, sharex=True, squeeze=False)
     for axes, wheel in zip(measured[:, 0], wheels, strict=True):
         _draw_wheel(axes, wheel)
-    measured[0, 0].set_title("Measured: deltas of 40 ms, as a fraction of the step", fontsize=10)
+    measured[0, 0].set_title("Measured: mean speed in 40 ms, fraction of the step", fontsize=10)
     measured[-1, 0].legend(fontsize=7, loc="lower right")
-    measured[-1, 0].set_xlabel("middle of the delta, ms after the control tick")
+    measured[-1, 0].set_xlabel("time from the control tick to the middle of the 40 ms, in ms")
     command, load = right.subplots(2, 1, sharex=True)
     motors = [wheel.motor for wheel in wheels]
     _draw_predictions(command, motors, now, better, command=1.0, load=0.0)
-    command.set_title("Predicted: a step of command", fontsize=10)
+    command.set_title("Predicted: a step of the commanded speed", fontsize=10)
     command.set_ylabel("fraction of the step")
     command.legend(fontsize=7, loc="lower right")
     _draw_predictions(load, motors, now, better, command=0.0, load=1.0)
-    load.set_title("Predicted: a load equal to 1 count per tick", fontsize=10)
+    load.set_title("Predicted: a load as large as the effort for 1 count per tick", fontsize=10)
     load.set_ylabel("counts per tick")
-    load.set_xlabel("ms after the control tick")
+    load.set_xlabel("time after the control tick, in ms")
 
 
 def _draw_wheel(axes: "Axes", wheel: "WheelFound") -> None:

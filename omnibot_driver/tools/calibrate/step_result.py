@@ -117,8 +117,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
     remarks = [
         f"Wheel {wheel.name}: the residuals are {first.rms_radps:.3f} rad/s with the model of first"
         f" order, {second.rms_radps:.3f} with that of second order, and {motor.rms_radps:.3f} with"
-        " a motor in the manual's control loop. Of the first two,"
-        f" {wheel.answer.model.title} fits better by AIC."
+        " a motor in the manual's control loop. By the AIC, the better of the first two models is"
+        f" “{wheel.answer.model.title}”."
     ]
     if wheel.left_out:
         remarks.append(
@@ -134,8 +134,8 @@ def _remarks(wheel: WheelFound) -> list[str]:
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
             f"Wheel {wheel.name}: no motor in the manual's control loop explains these steps, so"
-            " the results for motor and gains are not valid. If the firmware was built with gains"
-            " other than those of --gains, give its gains."
+            " the results for motor and gains are not valid. Perhaps the gains in the firmware"
+            " differ from --gains. In this case, calibrate again with the firmware's gains."
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
@@ -160,7 +160,8 @@ def _told(wheels: list[Behaviour]) -> str:
         for values in ([wheel.overshoot for wheel in wheels], [wheel.ms for wheel in wheels])
     )
     return (
-        f"a step of the command has a rise time of at most {rise_ms:.0f} ms and an overshoot of"
-        f" {100 * overshoot:.0f} %; the integrated error is {command_ms:.0f} ms times a step of the"
-        f" command, and {load_ms:.0f} ms times a step of the load; Ms is {ms:.2f}"
+        f"a step of the command has a rise time of at most {rise_ms:.0f} ms and an overshoot of at"
+        f" most {100 * overshoot:.0f} %. The integrated error is at most {command_ms:.0f} ms times"
+        f" the height of the step, and after a step of the load {load_ms:.0f} ms times its height."
+        f" The peak of the sensitivity, Ms, is at most {ms:.2f}"
     )

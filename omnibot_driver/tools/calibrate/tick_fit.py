@@ -103,7 +103,7 @@ def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     intervals = [record[1:] for record in records]
     if not intervals or min(map(len, intervals)) < FEWEST_TICKS:
         raise ToolError(
-            f"a record has fewer than {FEWEST_TICKS} ticks of a wheel: set record_samples higher"
+            f"a record has fewer than {FEWEST_TICKS} ticks of a wheel: increase --samples"
         )
     search = Search(intervals)
     values = search.roughly()

@@ -48,9 +48,9 @@ def read(path: Path) -> dict[str, Column]:
     for told in columns.values():
         if not told or sum(not one for one in told[1:]) > UNTOLD * len(told):
             raise ToolError(
-                f"the record {path} has ticks that took longer than the board can report, or the"
-                " unit of its times is not known: with a unit of 100 ns the wheels must turn faster"
-                " than 152 RPM"
+                f"the record {path} lacks too many times. Either the wheels turned so slowly that"
+                " the board could not report the times (in a unit of 100 ns it can do so only above"
+                " 152 RPM), or the unit of the times is not known"
             )
     return {
         side: np.array([float(one) if one else np.nan for one in told])

@@ -62,7 +62,8 @@ def _parse(arguments: Sequence[str]) -> tuple[argparse.Namespace, list[str]]:
     parser.add_argument(
         "--teleop",
         action="store_true",
-        help="steer with WASD or arrows, J and L turn, + and - change the speed",
+        help="steer with the keys WASD or the arrows; J and L turn the robot, + and - change the"
+        " speed",
     )
     parser.add_argument(
         "--timeout",
@@ -139,7 +140,8 @@ def _find(feed: "Feed", timeout_s: float) -> None:
         f" --driver {name}" if name != feed.driver.rpartition("/")[2] else ""
     )
     raise ToolError(
-        f"no driver {feed.driver} is running, but these are: {', '.join(there)}; try {others}"
+        f"no driver {feed.driver} is running, but these drivers are: {', '.join(there)}; try"
+        f" {others}"
     )
 
 
@@ -166,8 +168,8 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
         )
     if strange := view.not_finite():
         troubles.append(
-            f"not a finite number: {', '.join(strange)}; before you drive, fix the node that"
-            " publishes such values"
+            f"these values are NaN or infinite: {', '.join(strange)}; before you drive, fix the"
+            " node that publishes such values"
         )
     print(
         text.as_json(view, troubles) if as_json else text.report(view), end="\n" if as_json else ""

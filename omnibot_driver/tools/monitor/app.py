@@ -73,7 +73,7 @@ class Release(ModalScreen[bool]):
         """Build the question."""
         yield Static(
             "Release the e-stop?\n\nIs everybody clear of the robot?\nThe robot stays stopped"
-            " until the next command.\n\ny releases, any other key does not",
+            " until the next command.\n\ny: release the e-stop\nany other key: keep it",
             markup=False,
         )
 

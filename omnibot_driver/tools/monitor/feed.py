@@ -125,7 +125,7 @@ class Feed:
             return ""
         return (
             f"there are {count} drivers called {self.driver}: the display mixes their data, and"
-            " each obeys the requests; end all but one, or give them namespaces"
+            " all of them obey this monitor; end all but one, or give them namespaces"
         )
 
     def diagnoses(self) -> bool:
@@ -302,5 +302,5 @@ class Feed:
         except ExternalShutdownException:
             pass
         except Exception as error:
-            self.say(f"the monitor has stopped receiving because of a bug in it: {error!r}")
+            self.say(f"because of a bug, this monitor receives nothing any more: {error!r}")
             raise

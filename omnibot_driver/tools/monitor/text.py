@@ -51,7 +51,7 @@ def numbers(values: Iterable[float] | None) -> str:
 def title(view: View) -> str:
     """Return the first line of the screen: driver, state and link."""
     if view.silent:
-        return f"{view.driver}  nothing heard for {view.silent_s:.0f} s (was {view.state})"
+        return f"{view.driver}  silent for {view.silent_s:.0f} s (last state: {view.state})"
     return clean(f"{view.driver}  {view.state}  {view.link}".rstrip())
 
 
@@ -107,7 +107,7 @@ def counts(view: View) -> str:
     ]
     if not view.statuses:
         return ""
-    return clean(f"since its start: {', '.join(happened) or 'nothing lost, nothing refused'}")
+    return clean(f"since driver start: {', '.join(happened) or 'nothing lost, nothing refused'}")
 
 
 def report(view: View) -> str:

@@ -26,8 +26,8 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="report",
         description="Report on a drive: a page with pictures, and a verdict in words.",
-        epilog="Exit codes: 0 with a report, 3 if it finds something wrong, 1 with a message if"
-        " there is nothing to report on, 2 on wrong usage. See docs/tools/report.md.",
+        epilog="Exit codes: 0 with a report, 3 with a report that finds something wrong, 1 with a"
+        " message if there is nothing to report on, 2 on wrong usage. See docs/tools/report.md.",
     )
     parser.add_argument("bag", nargs="?", type=Path, help="folder or file of a rosbag2")
     parser.add_argument(
@@ -37,13 +37,14 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         help="instead of a bag, listen to a running driver for this time, or until ctrl-C",
     )
     parser.add_argument(
-        "--namespace", metavar="NAME", help="namespace of the robot, if there are several"
+        "--namespace", metavar="NAME", help="namespace of the robot, if there are several robots"
     )
     parser.add_argument(
         "--output",
         type=Path,
         metavar="FOLDER",
-        help="folder for page and pictures (default: BAG_report or live_report here)",
+        help="folder for page and pictures (default: BAG_report or live_report in the current"
+        " folder)",
     )
     parsed = parser.parse_args(given)
     if (parsed.bag is None) == (parsed.live is None):

@@ -56,7 +56,7 @@ def _states(log: Log) -> Iterator[Finding]:
             Level.WARN,
             "State",
             f"The board ran in IMU-only mode. Time in each state: {told}.",
-            "For odometry, set the board's own mode to nominal and reboot it.",
+            "To get odometry, set the board's own mode to nominal and reboot the board.",
         )
     else:
         yield Finding(Level.GOOD, "State", f"{told[:1].upper()}{told[1:]}.")
@@ -108,7 +108,8 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Diagnostics",
-            f"/diagnostics has data of several robots, on {ports}; all are listed here.",
+            f"/diagnostics has data of several robots, on {ports}; this report lists the data of"
+            " all of them.",
         )
     troubles = [
         status
@@ -123,8 +124,9 @@ def _diagnostics(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.BAD if worst == 2 else Level.WARN,
             "Diagnostics",
-            f"{name} ({port}) reported {LEVELS[worst]} {counted(len(statuses), 'time')}, from"
-            f" {statuses[0].at_s:.0f} s on: “{message}” ({times}×).",
+            f"{name} ({port}) was not OK {counted(len(statuses), 'time')}, first at"
+            f" {statuses[0].at_s:.0f} s. The worst level was {LEVELS[worst]}, most often with the"
+            f" message “{message}” ({counted(times, 'time')}).",
             "docs/diagnostics.md explains each status.",
         )
     if log.diagnostics and not troubles:

@@ -162,8 +162,8 @@ def judge(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Commands",
-            "No cmd_vel and no wheel_cmd, so the report cannot say whether the robot followed its"
-            " commands.",
+            "No message of cmd_vel or wheel_cmd, so the report cannot say whether the robot"
+            " followed its commands.",
             "",
         )
         return
@@ -240,10 +240,10 @@ def _ceased(log: Log, pair: Pair) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Commands",
-            f"{pair.topic} paused {counted(len(ceased), 'time')} for more than"
-            f" {COMMAND_TIMEOUT_S:g} s while the robot moved, first at"
-            f" {commands.arrived_s[ceased[0]]:.1f} s: the driver stopped the robot.",
-            "If you did not intend the pause, publish at a steady rate of 10 Hz or more.",
+            f"The robot was commanded to move, then {pair.topic} paused for more than"
+            f" {COMMAND_TIMEOUT_S:g} s: {counted(len(ceased), 'time')}, first at"
+            f" {commands.arrived_s[ceased[0]]:.1f} s. In such a pause the driver stops the robot.",
+            "If you did not intend a pause, publish at a steady rate of 10 Hz or more.",
         )
 
 
@@ -268,8 +268,8 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
         f"{pair.axes[axis]} {found.gains[axis]:.2f} (±{found.error[axis]:.2g})" for axis in told
     )
     figure = (
-        f"{pair.topic} is followed with a lag of {1e3 * found.lag_s:.0f} ms; measured divided by"
-        f" commanded: {figures}"
+        f"The robot follows {pair.topic} with a lag of {1e3 * found.lag_s:.0f} ms. Measured divided"
+        f" by commanded velocity: {figures}"
     )
     off = [axis for axis in told if abs(found.gains[axis] - 1.0) > TOLERANCE]
     if not off:
@@ -281,7 +281,7 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
         scales = sorted({pair.scales[axis] for axis in off})
         advice = (
             f"If the commands are within the limits max_…, divide {' and '.join(scales)} by these"
-            " ratios, and check with a tape measure."
+            " ratios. Then check a drive with a tape measure."
         )
     yield Finding(Level.WARN, "Commands", f"{figure}.", advice)
 
@@ -300,8 +300,8 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
             Level.BAD,
             "E-stop",
             f"The robot moved while the e-stop was latched, first at {stopped[0].begin_s:.1f} s.",
-            "If the robot was not pushed, use the switch in the power line, and do not drive the"
-            " robot before you know the cause.",
+            "If the robot was not pushed, cut its power with the switch in the power line. Do not"
+            " drive the robot before you know the cause.",
         )
     elif untold:
         yield Finding(

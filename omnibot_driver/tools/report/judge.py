@@ -42,8 +42,8 @@ def _all(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Recording",
-            f"No message of {', '.join(others)}: gaps and stops cannot be distinguished from"
-            " pauses.",
+            f"No message of {', '.join(others)}, so the report can show a pause of the board as a"
+            " gap or a stop.",
             "Record all topics: ros2 bag record --all.",
         )
     yield from events.judge(log)

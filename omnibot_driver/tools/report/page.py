@@ -27,9 +27,9 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "What happened",
         plots.timeline,
         lambda log: len(log.states) + len(log.diagnostics),
-        "Bands over time. Diagnostics: green is OK, yellow WARN, red ERROR, grey STALE. Red shading"
-        " in the pictures below is a latched e-stop, other shading is a state in which the board"
-        " does not run.",
+        "Bands over time. Diagnostics: green is OK, yellow WARN, red ERROR, grey STALE. In the"
+        " pictures below, red shading shows a latched e-stop. Other shading shows a state in which"
+        " the board does not run.",
     ),
     (
         "path",
@@ -43,15 +43,16 @@ PICTURES: Final[tuple[tuple[str, str, Draw, Callable[[Log], int], str], ...]] = 
         "Velocities",
         plots.velocities,
         lambda log: len(following.shown(log)[0].measured),
-        "A command expires 0.5 s after it arrived (the default of cmd_vel_timeout); after that,"
-        " zero is drawn.",
+        "A command is drawn until the next one, but for at most 0.5 s (the default of"
+        " cmd_vel_timeout). After this time the picture shows zero.",
     ),
     (
         "imu",
         "IMU",
         plots.inertia,
         lambda log: int(log.imu.finite.sum()),
-        "Raw, in the sensor's own axes, as published; long recordings are drawn as their envelope.",
+        "The published values, in the sensor's own axes. Of a long recording, only the largest and"
+        " the smallest values in each short time are drawn.",
     ),
     (
         "spectrum",

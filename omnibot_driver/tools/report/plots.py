@@ -73,7 +73,7 @@ def path(log: Log) -> Figure:
     for row, name, colour in ((0, "begin", Z), (-1, "end", RED)):
         above.plot(x[row], y[row], "o", color=colour, markersize=9, zorder=4, label=name)
     above.margins(0.12)
-    dress(above, "y in m", "Path in odom; the arrows are headings")
+    dress(above, "y in m", "Path in odom; arrows show the heading")
     above.set_xlabel("x in m")
     legend_below(above)
     left.colorbar(lines, ax=above, shrink=0.8, pad=0.02, label="time in s")
@@ -193,8 +193,8 @@ def timing(log: Log) -> Figure:
                 values, bins, orientation="horizontal", color=colour, alpha=0.55, density=True
             )
         grid[row, 0].set_ylim(low - 0.04 * (high - low), high + 0.18 * (high - low))
-    dress(grid[0, 0], "ms", "Step between stamps minus the median step")
-    dress(grid[1, 0], "ms", "Delay of arrival minus the smallest delay")
+    dress(grid[0, 0], "ms", "Step between two stamps, minus the median step")
+    dress(grid[1, 0], "ms", "Delay of arrival, minus the smallest delay")
     for axes in grid[:, 1]:
         dress(axes, "", "Distribution")
         axes.set_xticks([])

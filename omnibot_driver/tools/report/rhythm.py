@@ -220,7 +220,8 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
             "Timing",
             f"Stamps of {stream.name} jumped {counted(len(rhythm.leap_s), 'time')}, by up to"
             f" {1e3 * (rhythm.leap_s.max() - rhythm.period_s):.0f} ms, first at"
-            f" {rhythm.leap_at_s[0]:.1f} s, and later were right again: no message is missing.",
+            f" {rhythm.leap_at_s[0]:.1f} s. Later stamps were right again, so no message is"
+            " missing.",
             "The driver could not read for a while: reduce the load of the computer.",
         )
     even = rhythm.steps_s[(rhythm.steps_s > 0.0) & (rhythm.steps_s <= GAP * rhythm.period_s)]
@@ -232,7 +233,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     yield Finding(
         Level.WARN if off else Level.GOOD,
         "Timing",
-        f"{stream.name} comes at {rate_hz:.2f} Hz; it should be {stream.rate_hz:g}.",
+        f"The rate of {stream.name} is {rate_hz:.2f} Hz; it should be {stream.rate_hz:g} Hz.",
         (
             "Possible causes are two publishers, a filter in between, or a recorder that drops many"
             " messages."
@@ -253,7 +254,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     if not len(rhythm.gap_s):
         yield Finding(
-            Level.GOOD, "Gaps", f"{stream.name} has no gap while the board should send it."
+            Level.GOOD, "Gaps", f"{stream.name} has no gap in the states in which it is sent."
         )
         return
     lost = int(rhythm.missing.sum())
@@ -262,8 +263,8 @@ def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     counted_lost = grown(log, stream.lost)
     if counted_lost is None:
         advice = (
-            "Record /diagnostics of this robot alone. They show whether the line or the recorder"
-            " lost the messages."
+            "Record /diagnostics of this robot alone, without other robots. The counts in"
+            " /diagnostics show whether the line or the recorder lost the messages."
         )
     elif counted_lost == 0:
         advice = (
@@ -272,15 +273,15 @@ def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         )
     else:
         advice = (
-            f"The driver's count of messages lost on the line is {counted_lost}: check cable, hub"
-            " and ground."
+            f"The driver counts {counted_lost} messages as lost on the line or refused: check"
+            " cable, hub and ground."
         )
     yield Finding(
         Level.BAD if rhythm.gap_s[longest] > LONG_GAP_S or share > MANY_LOST else Level.WARN,
         "Gaps",
         f"{stream.name} has {counted(len(rhythm.gap_s), 'gap')}, {counted(lost, 'message')}"
-        f" ({100 * share:.2g} %) missing; the longest is {span(rhythm.gap_s[longest])}"
-        f" at {rhythm.gap_at_s[longest]:.1f} s.",
+        f" ({100 * share:.2g} %) missing. The longest gap lasts {span(rhythm.gap_s[longest])}, from"
+        f" {rhythm.gap_at_s[longest]:.1f} s on.",
         advice,
     )
 
@@ -304,8 +305,8 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     yield Finding(
         Level.WARN if late else Level.GOOD,
         "Timing",
-        f"The delay of {stream.name} above its minimum is {1e3 * over_s:.2f} ms on average, and"
-        f" less than {1e3 * most_s:.1f} ms in 99 of 100 cases.",
+        f"The delay of {stream.name} exceeds the smallest delay by {1e3 * over_s:.2f} ms on"
+        f" average, and by less than {1e3 * most_s:.1f} ms in 99 of 100 cases.",
         "Set the adapter's latency_timer to 1 (udev/99-omnibot.rules), or reduce the load of the"
         " computer."
         if late

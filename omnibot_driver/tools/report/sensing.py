@@ -175,7 +175,7 @@ def _gravity(force: Array) -> Iterator[Finding]:
         advice = (
             f"Set accel_range to {factor:.3g} times its present value."
             if likely
-            else "Check accel_range and accel_bias; a shaken or falling robot is not at rest."
+            else "Check accel_range and accel_bias, and that nothing shook the robot."
         )
         yield Finding(Level.BAD, "IMU", f"{figure}.", advice)
     if norm > 0.5 * STANDARD_GRAVITY:
@@ -239,8 +239,8 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         return
     ratio, total = found
     figure = (
-        f"The gyro measured {abs(ratio):.3f} times the rotation in odom,"
-        f" over {np.degrees(total):.0f}°"
+        f"The turns by the gyro are {abs(ratio):.3f} times the turns in odom"
+        f" ({np.degrees(total):.0f}° in all)"
     )
     if abs(abs(ratio) - 1.0) > TURN_TOLERANCE:
         yield Finding(
@@ -253,7 +253,7 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "IMU",
-            f"{figure}, in the same direction: the sensor is mounted upright.",
+            f"{figure}; both have the same direction, so the sensor is mounted upright.",
             "The robot's description has the sensor upside down: set imu_rpy in the description.",
         )
     else:

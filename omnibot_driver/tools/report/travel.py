@@ -103,10 +103,10 @@ def judge(log: Log) -> Iterator[Finding]:
     yield Finding(
         Level.NOTE,
         "Odometry",
-        f"Driven {found.way_m.sum():.2f} m and turned"
-        f" {np.degrees(np.abs(found.turned_rad).sum()):.0f}°, in motion for"
-        f" {span(moved_s)} of {span(log.duration_s)}; at the fastest {speed.max():.2f} m/s and"
-        f" {np.abs(odom.values[:, 5]).max():.2f} rad/s.",
+        f"The robot drove {found.way_m.sum():.2f} m and turned by"
+        f" {np.degrees(np.abs(found.turned_rad).sum()):.0f}° in all. It was in motion for"
+        f" {span(moved_s)} of {span(log.duration_s)}. Its highest speeds were {speed.max():.2f} m/s"
+        f" and {np.abs(odom.values[:, 5]).max():.2f} rad/s.",
     )
     yield from _leaps(odom, found)
 
@@ -123,14 +123,15 @@ def _leaps(odom: Series, found: Steps) -> Iterator[Finding]:
         )
     leap = found.leap & ~found.reset
     if not leap.any():
-        yield Finding(Level.GOOD, "Odometry", "Pose and twist agree; no jump.")
+        yield Finding(Level.GOOD, "Odometry", "Pose and twist agree; the pose does not jump.")
         return
     worst = int(np.where(leap, found.off_m / LEAP_M + found.off_rad / LEAP_RAD, 0.0).argmax())
     yield Finding(
         Level.BAD,
         "Odometry",
-        f"The pose jumps {counted(int(leap.sum()), 'time')} in a way that the twist does not"
-        f" explain; the largest jump was at {at_s[worst]:.1f} s, by {found.off_m[worst]:.2f} m and"
+        f"The pose jumps {counted(int(leap.sum()), 'time')} although the twist shows no such"
+        f" motion. The largest jump, at {at_s[worst]:.1f} s, was by {found.off_m[worst]:.2f} m and"
         f" {np.degrees(found.off_rad[worst]):.0f}°.",
-        "Do two nodes publish odom? If not, look at the gaps and at fastest_linear_speed.",
+        "Do two nodes publish odom? If not, look at the gaps in this report, and check"
+        " fastest_linear_speed.",
     )

@@ -329,7 +329,7 @@ def test_a_robot_is_calibrated_from_its_records(
             value = float(found[f"{side}: {one} time constant"].value)
             assert value == pytest.approx(planted_s, rel=0.1)
         assert found[f"{side}: overshoot, measured"].before is not None
-        assert f"The {side} wheel: a step to" in " ".join(result.notes)
+        assert f"The {side} wheel, with the new gains: a step to" in " ".join(result.notes)
     assert "not kept" not in " ".join(result.notes)
     names = {f"{side}_{gain}" for side in ("left", "right") for gain in ("kp", "tn", "td")}
     levels_of = {f"{side}_{n}_correction" for side in ("left", "right") for n in ("short", "long")}
