@@ -90,7 +90,10 @@ def test_in_a_wrong_namespace_the_drivers_that_are_there_are_named(
     The message names the running drivers, and the option that selects the first of them.
     """
     said = sentence(capsys, "--once", "--namespace", "/elsewhere/", *QUICKLY)
-    assert "/elsewhere/omnibot_driver is running, but these are: /fake/omnibot_driver; try" in said
+    assert (
+        "/elsewhere/omnibot_driver is running, but these drivers are: /fake/omnibot_driver; try"
+        in said
+    )
     assert said.endswith("try --namespace /fake")
 
 
@@ -124,7 +127,7 @@ def test_nan_is_named_and_shown(fake: Probe, capsys: pytest.CaptureFixture[str])
     assert main(["--once", "--namespace", "fake"]) == 1
     output = capsys.readouterr()
     assert "nan" in output.out
-    assert "not a finite number: pose x, measured y" in output.err
+    assert "these values are NaN or infinite: pose x, measured y" in output.err
 
 
 def test_a_heading_is_within_half_a_turn(fake: Probe, capsys: pytest.CaptureFixture[str]) -> None:
