@@ -100,7 +100,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="SECONDS:HALF:WHAT",
         help="let the fault WHAT occur in one half (drive or front), SECONDS after the start."
-        " Repeat the option for more faults. WHAT in either half:"
+        " Repeat the option for more faults; well and sensor-well end earlier faults. WHAT in"
+        " either half:"
         f" {', '.join(FAULTS)}; in the front half only: {', '.join(SENSOR_FAULTS)}",
     )
 
