@@ -26,7 +26,7 @@ runpy.run_module({module!r}, run_name="__main__")
     [
         ("omnibot_driver.driver", ["--ros-args", "-p", "port:=sim://"], "rclpy", 0, ""),
         ("omnibot_driver.driver", ["--ros-args", "-p", "port:=sim://"], "std_srvs", 0, ""),
-        ("omnibot_driver.tools.calibrate", ["imu"], "scipy", 130, "\ncalibrate: interrupted; "),
+        ("omnibot_driver.tools.calibrate", ["imu"], "scipy", 130, "\ncalibrate: interrupted: "),
     ],
 )
 def test_it_ends_as_it_does_later(
