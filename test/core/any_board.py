@@ -79,13 +79,11 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: driving time that is lost when the robot starts, in s.
-
-    The controller integrates for 0.5 s before a wheel turns. The wheel then takes another 0.5 s to
-    reach its speed. Without this loss, 0.3 m/s for 4 s would be 1.2 m. The robot drives 0.97 m with
-    the "firmware" quirks and 0.96 m with the "documented" ones.
+    ``late_s``: driving time that a start loses, in s. At 0.3 m/s for 4 s, the robot drives 0.97 m
+    instead of 1.2 m.
     """
 
+    # 0.5 s until a wheel turns, then another 0.5 s until the wheel has its speed.
     late_s = 0.75
 
     def __init__(self, firmware: Any) -> None:

@@ -2,9 +2,7 @@
 
 """A board's byte stream with known sampling times, and the ways in which it reaches a host.
 
-The module is written from the manual and shares no code with the driver. The board's crystal has
-ticks of 10 ms. Frames are sent back to back at 115200 baud: IMU in every tick, delta in every
-fourth, pose in every twentieth. Times are host times in s.
+The module is written from the manual and shares no code with the driver. Times are host times in s.
 """
 
 import math
@@ -101,10 +99,10 @@ def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 def ftdi(
     *, latency_s: float = 0.016, restarted_by_data: bool = False, skew: float = 0.0
 ) -> Chunker:
-    """Return a function that splits the stream as a USB adapter does.
+    """Return a function that splits the stream as a USB adapter does, in packets of 62 bytes.
 
-    The adapter delivers packets of 62 bytes when they are full, and a shorter packet when its timer
-    expires. The timer runs freely on the adapter's crystal, or begins with a packet's first byte.
+    A shorter packet comes when the timer expires. The timer runs freely, or begins with a packet's
+    first byte.
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:
@@ -139,8 +137,7 @@ def late(
 ) -> Iterator[Read]:
     """Delay the reads, as a host does that wakes up late.
 
-    Each read is late by a random time, and a read during a stall waits until the stall ends. Data
-    that arrives before the host wakes up is read at once.
+    Data that arrives before the host wakes up is read together.
     """
     pending = bytearray()
     wakes = -math.inf

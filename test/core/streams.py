@@ -40,10 +40,7 @@ def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
 
 
 def life(board: SimulatedBoard) -> list[bytes]:
-    """Boot, start, drive, pause, resume and reset the board. Return what it sends in each tick.
-
-    The board goes through all its modes and all changes of mode.
-    """
+    """Return what the board sends in each tick, through all its modes and changes of mode."""
     ticks = record(board, 2.6)
     board.receive(bytes(8) + b"S")
     ticks += drive(board, 2.0)

@@ -2,8 +2,7 @@
 
 """A synthetic board for odometry tests. It moves with given body twists and returns readings.
 
-The readings are like those of the firmware in the manual. The board uses rotation matrices and
-shares no code with the code under test.
+The board uses rotation matrices and shares no code with the code under test.
 """
 
 import math

@@ -85,10 +85,7 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 
 
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
-    """The board sends deltas but no pose. After a second, the odometry assumes heading 0.
-
-    It publishes the 25 deltas so far together, and each later delta at once.
-    """
+    """The odometry publishes the 25 deltas so far together, and later ones at once."""
     odometry = Odometry(SETTINGS)
     for _ in range(24):
         assert odometry.displace(earth(0.01, 0.0), 0.0) == []
@@ -115,10 +112,7 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """The odometry receives one pose with an unexpected heading, and keeps its own heading.
-
-    Two such poses that agree show that the board has a new earth frame.
-    """
+    """Two poses with the same unexpected heading show that the board has a new earth frame."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     x, y, yaw = trip.board

@@ -70,10 +70,9 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 3), ("body", 1)])
 def test_after_minutes_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: int) -> None:
-    """The robot drives for minutes while bytes are lost, alone (1 in 1000) and in bursts.
+    """1 byte in 1000 is lost, and bursts.
 
-    Odom stays within 2 cm of the board's own pose. After 1.5 s without losses, the difference is
-    below 1.5 mm.
+    Odom is right within 2 cm, and 1.5 s later within 1.5 mm.
     """
     drive = Drive(frame, LineFaults(lose=0.001, burst=0.0005))
     drive.run(60.0 * minutes)

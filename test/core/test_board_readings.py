@@ -125,10 +125,7 @@ def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
 
 
 def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
-    """The button on the robot is pressed and released, and the driver publishes both.
-
-    The press latches the e-stop, and the release of the button does not end it.
-    """
+    """The driver publishes both the press and the release of the robot's button."""
     bench.drive_on()
     tell(bench, EStopButtonReading(True))
     assert bench.session.estop_active
@@ -182,11 +179,7 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
 
 
 def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
-    """The button on the robot is held, so the driver refuses to release the e-stop.
-
-    After a reconnection the driver still refuses, until the button is released. Each refusal says
-    what to do.
-    """
+    """The refusal outlasts a reconnection, and says what to do."""
     tell(bench, EStopButtonReading(True))
     with pytest.raises(RequestRefused, match="release the button, then call again"):
         bench.estop(False)

@@ -23,10 +23,9 @@ LOST = (0.0, 0.001, 0.01)
 
 
 def told(piece: int, lost: float) -> str:
-    """Return a digest of all events and bytes of a session whose board goes through all modes.
+    """Return a digest of all events and bytes of a session through all modes of the board.
 
-    The board's bytes arrive in pieces of ``piece`` bytes. Each byte is lost with probability
-    ``lost``.
+    ``piece``: bytes in each read. ``lost``: probability of losing a byte.
     """
     random, bench = Random(piece), Bench()
     session, now = bench.session, 1000.0

@@ -37,11 +37,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """The user commands 0.3 m/s for 4 s.
-
-    The robot drives 1.2 m, minus what it loses at the start. The odometry gives the distance that
-    the robot has really driven.
-    """
+    """0.3 m/s for 4 s give 1.2 m, minus what the robot loses at the start."""
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
@@ -90,10 +86,7 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench, seconds: float
 ) -> None:
-    """The driver stalls for up to 9 s while the robot drives, and the board's data waits unread.
-
-    Afterwards the robot stands, and it obeys a new command.
-    """
+    """The stall lasts up to 9 s, while the board's data waits unread."""
     for _ in range(2):
         bench.drive_on()
         bench.stall(seconds)
@@ -138,10 +131,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """An interruption, such as a stall or an e-stop, comes while the robot drives.
-
-    The command from before the interruption has no effect any more. A new command moves the robot.
-    """
+    """After a stall or an e-stop, the command from before has no effect any more."""
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -203,10 +193,7 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """At shutdown, the driver sends Stop until the robot is seen at rest.
-
-    It then sends its last bytes. Afterwards the robot stays at rest, and commands are refused.
-    """
+    """Stop is sent until the robot is seen at rest. Commands are refused afterwards."""
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)
     bench.settle()

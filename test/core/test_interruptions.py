@@ -27,10 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The board is paused while the robot drives, so the robot rolls out during the pause.
-
-    Odom is right afterwards, even if all frames around the pause are lost.
-    """
+    """The robot rolls out during the pause, and all frames around it may be lost."""
     on = line(seed)
     if hidden:
         on.loses = lambda _data, _now: True
@@ -46,10 +43,7 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """The board restarts, so its SEQ and its pose begin at zero, and odom continues.
-
-    The result is the same if the board's text or its first frames are lost.
-    """
+    """SEQ and the pose begin at zero. The board's text or its first frames may be lost."""
     on = line(seed)
     on.drives = False
     on.run(1.0)
@@ -96,10 +90,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Frames are lost, and the odometry is reset before the next pose arrives.
-
-    Odom begins at zero. The lost motion came before the reset, so the pose does not add it to odom.
-    """
+    """The next pose does not add the motion that was lost before the reset."""
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)
@@ -133,10 +124,7 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """The robot drives for an hour. Each delta is rounded to 0.1 mm and 0.1 mrad.
-
-    A pose follows every fifth delta, and odom stays within 2 mm and 2 mrad of the truth.
-    """
+    """Each delta is rounded to 0.1 mm and 0.1 mrad. A pose follows every fifth delta."""
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
     for number in range(1, count + 1):
@@ -165,10 +153,9 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """All three wheels make −1/8 of a turn, and the robot rotates by 2πr/8L.
+    """After −1/8 of a turn of all wheels, the yaw is 2πr/8L.
 
-    Then wheel B turns forward, and wheel A turns backward by the same angle. The robot drives
-    forward.
+    B forward and A backward then drive the robot straight on.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -59,10 +59,7 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """After a stall of the driver, the board has 2 s again to send data.
-
-    The reason is that data from before the stall may still wait to be read.
-    """
+    """Data from before the stall may still wait, so the board has 2 s again."""
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
     assert not liveness.fell_silent(51.9)
@@ -78,10 +75,7 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """A driven robot sends no data for 0.5 s. The driver then wakes up and ends the command.
-
-    If the robot is not driven, the driver wakes after 2 s, when the board counts as silent.
-    """
+    """A command ends 0.5 s after the last data. A board that is not driven has 2 s."""
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5
     assert liveness.unheard(10.5)

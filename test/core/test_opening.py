@@ -94,10 +94,7 @@ def test_a_silent_board_is_told_once() -> None:
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """A brown-out restarts the board while the robot drives, and the driver starts the board again.
-
-    The robot stands until a new command, because the old command is not sent again.
-    """
+    """A brown-out comes while the robot drives. The old command is not sent again."""
     bench.drive(0.5)
     bench.run(0.2)
     bench.board.reboot()

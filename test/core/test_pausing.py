@@ -17,10 +17,7 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """The user requests a pause, and the driver sends Stop at once.
-
-    It sends P as soon as new data shows that the board runs. The board's notice confirms the pause.
-    """
+    """P is sent as soon as new data shows that the board runs."""
     bench.drive(0.5)
     bench.run(0.3)
     start = len(bench.written)
@@ -48,11 +45,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board just before the user requests a pause.
-
-    The driver sends P only if new data arrives after the request. A paused board sends none. So the
-    driver sends no P, which would resume the board.
-    """
+    """P needs data that arrives after the request. A paused board sends none."""
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -78,10 +71,9 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board, but old data makes the driver send P, which resumes it.
+    """Old data makes the driver send P, which resumes a paused board.
 
-    The board's notice of the first pause arrives late. The driver does not take this notice as
-    proof. It sends P again and then reports the pause.
+    The late notice of the other pause is no proof, so P is sent again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")
@@ -126,10 +118,7 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """The host sleeps for 3 s after it sent P. Then it reads data that the board sent before P.
-
-    This data does not mean that P was lost, so the driver does not repeat P.
-    """
+    """The host sleeps for 3 s after P. Data from before P then does not mean that P was lost."""
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.session.inbound.receive(on_its_way[:80], bench.now)
@@ -146,10 +135,7 @@ def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> 
 
 
 def test_after_a_failed_pause_the_robot_stands_until_start(bench: Bench) -> None:
-    """The board does not receive P. The answer says that the pause failed, and motion is refused.
-
-    The driver repeats P, so the board is paused as soon as it receives again.
-    """
+    """The board does not receive P. The driver repeats P until the board receives again."""
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success

@@ -244,12 +244,7 @@ STEPS = st.lists(
 def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wanted_mode(
     steps: list[tuple[str, float]], seed: int, latency_s: float, run: bool, boot_time_s: float
 ) -> None:
-    """Random actions happen, and every write and answer of the driver is checked.
-
-    The driver never sends a command that is too old, was discarded or does not fit the board's
-    mode. It answers every request in time, and sends P only to a board that is known to run. When
-    the faults are over, the board reaches the wanted mode, and the robot stands still.
-    """
+    """Every request is answered in time. P goes only to a board that is known to run."""
     walk = Walk(seed, latency_s, BoardSettings(boot_time_s=boot_time_s, seed=seed), run=run)
     walk.open()
     for action, pause_s in steps:

@@ -104,10 +104,7 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """The user requests a start while the board runs and the robot drives.
-
-    The driver still writes S, because a P may be on its way to the board. The robot drives on.
-    """
+    """The driver still writes S, because a P may be on its way to the board."""
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"

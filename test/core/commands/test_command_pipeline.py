@@ -76,11 +76,7 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """The user commands forward and sideways speed on a base that cannot move sideways.
-
-    The driver sends the forward speed only, and says so once. A command with NaN in either speed is
-    refused.
-    """
+    """A base that cannot move sideways is driven forward only. NaN in either speed is refused."""
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -98,9 +94,9 @@ def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> N
 
 
 def test_a_velocity_out_of_the_plane_is_said_once(bench: Bench) -> None:
-    """A command has values other than zero in linear.z, angular.x or angular.y.
+    """A command has values in linear.z, angular.x or angular.y.
 
-    The driver says once that they are set to zero, and obeys the rest of the command.
+    The rest of the command is obeyed.
     """
     for _ in range(2):
         bench.session.command_twist(BodyTwist(0.4, 0.0, 0.0), bench.now, planar=False)
@@ -125,10 +121,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """The user commands (0.3, 0.4) m/s from rest. At a limit of 1 m/s², the ramp takes 0.5 s.
-
-    The direction stays the same during the ramp. On the line, 1 m/s is 70 LSB.
-    """
+    """From rest to (0.3, 0.4) m/s at 1 m/s² takes 0.5 s. On the line, 1 m/s is 70 LSB."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -146,10 +139,7 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Commands arrive every 1 ms or every 18 ms. The ramp of the speed is equally steep.
-
-    Each new command continues the ramp of the last one. The driver sends set-points every 18 ms.
-    """
+    """Commands arrive every 1 ms or 18 ms, and each continues the ramp of the last one."""
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)

@@ -115,10 +115,7 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """The user commands (3, −4) m/s at a limit of 0.5 m/s. The result is (0.3, −0.4) m/s.
-
-    The yaw rate has a limit of its own and stays as commanded.
-    """
+    """(3, −4) m/s becomes (0.3, −0.4) m/s at a limit of 0.5 m/s. The yaw rate stays."""
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     found = (limited.vx_mps, limited.vy_mps, limited.yaw_rate_radps)
     assert found == pytest.approx((0.3, -0.4, 0.1))
@@ -157,10 +154,9 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity changes in a straight line towards the wanted one.
+    """The linear velocity approaches the wanted one in a straight line.
 
-    Its change is at most the acceleration limit times the duration. The yaw rate also changes
-    towards the wanted one, and has a limit of its own.
+    The yaw rate has its own limit.
     """
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)

@@ -46,10 +46,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """An interruption, such as a pause, a reset or an e-stop, comes while the robot drives.
-
-    The command from before the interruption never moves the robot again. A new command does.
-    """
+    """After a pause, a reset or an e-stop, an old command never moves the robot again."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -86,11 +83,7 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The board restarts while the robot drives.
-
-    The driver's last motion frame comes during the boot. After the boot, the board would take a
-    byte of a motion frame for the letter S and start.
-    """
+    """The last motion frame comes during the boot. Later, the board could take a byte for S."""
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -120,10 +113,7 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """The board is connecting or paused, and the driver refuses motion.
-
-    A paused board would take a byte 0x52 of a motion command for the letter R, and reset.
-    """
+    """A paused board would take a byte 0x52 of a motion command for R, and reset."""
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state(state)
@@ -151,10 +141,7 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
-    """The board's data is lost while the robot drives, but the board still receives.
-
-    The driver sends Stop and refuses commands. After a while, the state is ``connecting``.
-    """
+    """The board's data is lost, but the board still receives. The driver sends Stop."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False
@@ -219,10 +206,7 @@ def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_els
 
 
 def test_a_driver_that_stood_still_has_no_command_and_blames_nobody(bench: Bench) -> None:
-    """The driver stalls for 3 s while the robot drives. Afterwards it sends only Stop.
-
-    The notice names the driver as the cause, not the board or the line.
-    """
+    """After a stall of 3 s the driver sends only Stop. The notice names the driver as the cause."""
     bench.drive(vx=0.3)
     bench.run(0.2)
     mark = len(bench.written)

@@ -26,10 +26,7 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """The user commands 0.4 m/s, and then the scale changes from 70 to 100 LSB per m/s.
-
-    The driver sends 40 LSB instead of 28, without a new command.
-    """
+    """At 0.4 m/s, the scale changes from 70 to 100 LSB per m/s: 40 LSB, not 28."""
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -40,10 +37,7 @@ def test_a_velocity_is_repeated_in_the_new_scale() -> None:
 
 
 def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> None:
-    """The user commands a wheel rate of 10 rad/s, and then the wheel radius is doubled.
-
-    The driver sends 41 LSB instead of 20, without a new command.
-    """
+    """At 10 rad/s, the wheel radius is doubled: 41 LSB are sent instead of 20."""
     bench = driving()
     bench.turn_wheels(10.0, 0.0, -10.0)
     bench.run(0.1)
@@ -54,10 +48,7 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """The robot drives to a goal at 1 m, and the scale changes from 1000 to 500 LSB per m.
-
-    The driver sends 500 LSB instead of 1000.
-    """
+    """For a goal at 1 m, the scale changes from 1000 to 500 LSB per m."""
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)
@@ -66,10 +57,7 @@ def test_a_goal_is_repeated_in_the_new_scale() -> None:
 
 
 def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() -> None:
-    """The robot drives to a goal at 10 m, and the scale changes to 10,000 LSB per m.
-
-    The goal does not fit a 16-bit word any more, so the driver sends Stop and a notice.
-    """
+    """A goal at 10 m with 10,000 LSB per m does not fit a 16-bit word."""
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
     assert last(bench) == bare(STOP)

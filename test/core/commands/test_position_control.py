@@ -75,10 +75,7 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The robot has made several full turns, and the board counts them in its heading.
-
-    A goal turns the robot by the shorter way, never back by full turns.
-    """
+    """The board's heading counts full turns. A goal never turns the robot back by them."""
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
     bench.go_to(0.0, 0.0, 0.4)
@@ -140,10 +137,7 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """The board sends no poses, or the driver does not use them, so goals are refused.
-
-    Without the board's pose, a goal in odom cannot be converted to the board's frame.
-    """
+    """Without the board's pose, a goal in odom cannot be converted to the board's frame."""
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
         bench.go_to(1.0, 0.0, 0.0)
@@ -188,11 +182,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """The robot drives to a goal.
-
-    An event, such as a reset, discards the goal, and the robot rests. Then a new goal is sent and
-    reached, even if the board has a new frame.
-    """
+    """After an event such as a reset, the robot rests. It then reaches a new goal."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -210,10 +200,7 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """The odometry is reset while the robot drives to a goal, so the driver stops the robot.
-
-    It sends Stop, because zeros in mode 1 would be a goal at the origin.
-    """
+    """A reset of the odometry sends Stop. Zeros in mode 1 would be a goal at the origin."""
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)
@@ -228,11 +215,7 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 def test_a_robot_that_drives_away_from_its_goal_is_stopped(
     goal: tuple[float, float, float],
 ) -> None:
-    """The board's switch is on velocity, but the driver's parameter says position.
-
-    The board takes the goal for a velocity. The robot drives away from the goal, and the driver
-    stops it.
-    """
+    """The board's switch is on velocity, so the board takes the goal for a velocity."""
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()
     bench.run(1.5)

@@ -15,10 +15,7 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """The port is opened while the e-stop is latched. The driver sends the e-stop twice at once.
-
-    An e-stop that it has just sent on the old connection makes no difference.
-    """
+    """The e-stop is sent twice when the port opens, even just after one on the old connection."""
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -26,10 +23,7 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """The authority changes, so a Stop and a command are due. Then the e-stop is latched.
-
-    The driver sends only the e-stop, neither the Stop nor the command.
-    """
+    """A Stop and a command are due when the e-stop is latched. Neither is sent."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -39,10 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """The e-stop is sent at once as ES and Stop, both twice, and is repeated without end.
-
-    A Stop follows each ES, because some firmware does not know ES.
-    """
+    """ES and Stop are sent, both twice. Some firmware does not know ES."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)

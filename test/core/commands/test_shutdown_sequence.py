@@ -75,11 +75,7 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """At shutdown, the driver stops the robot, then checks that it rests.
-
-    During the check the driver writes nothing, because a damaged line could turn any frame into a
-    motion.
-    """
+    """The driver writes nothing meanwhile. A damaged line could turn any frame into a motion."""
     bench = driving()
     left(bench)
     assert bench.session.shutdown.fall_silent(bench.now)

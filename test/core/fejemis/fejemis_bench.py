@@ -32,7 +32,7 @@ class Bench:
 
     ``speaks``: channels on which the driver receives bytes.
 
-    ``read_s``: time between two reads of a port, in s.
+    ``read_s``: time between two reads, in s.
     """
 
     def __init__(

@@ -25,9 +25,9 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether an angle to the right with a digit 6 is within half a degree of this angle.
+    """Return whether the angle is within 0.5° of one to the right with a digit 6.
 
-    Such angles are −6°, −16° and so on, and all from −60° to −69°.
+    These are −6°, −16° and so on, and −60° to −69°.
     """
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
@@ -44,11 +44,7 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Two lost characters can change an angle only if it is to the right and has a digit 6.
-
-    The board then reads an angle of 0° to 10° to the left. Fewer than a tenth of all angles are
-    affected.
-    """
+    """Only an angle to the right with a digit 6 can change. It becomes 0° to 10° to the left."""
     across = 0
     for angle_deg in EVERY:
         text = relayed(angle_deg)
@@ -105,11 +101,7 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """Without checksums, the driver sends whole degrees.
-
-    If characters are lost, the angle that the board reads is still at most 90°. Only beyond 90°
-    would the inner wheel be faster than the outer one.
-    """
+    """No loss makes an angle beyond 90°, where the inner wheel would be the faster one."""
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
         assert text == b"fwl %d" % angle_deg

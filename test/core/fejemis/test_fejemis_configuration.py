@@ -221,10 +221,9 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """Motion is refused until the board has the user's setting.
+    """The line that writes the setting may be lost.
 
-    A change of the setting meanwhile has no effect on this. The line that writes the setting may be
-    lost. The driver does not repeat this line while the robot is driven.
+    It is not repeated while the robot is driven.
     """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)

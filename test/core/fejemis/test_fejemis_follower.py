@@ -114,10 +114,9 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
-    """The firmware limits the wheel to 90° in reverse.
+    """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
 
-    The user commands a motion backward, and the robot turns instead. The driver stops it before it
-    has rolled 12 cm. After the second fault, motion is refused until ~/start.
+    The second fault needs ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)
@@ -160,10 +159,9 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """After two faults, motion is refused until the user calls ~/start.
+    """After a reconnect the driver starts the board itself.
 
-    After a reconnect the driver starts the board by itself. This start is not enough: motion is
-    still refused.
+    Motion is still refused until ~/start.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

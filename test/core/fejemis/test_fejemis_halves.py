@@ -112,11 +112,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """The port of one board disappears while the robot drives.
-
-    Then the link can open only the other port. The other board receives a stop, and motion is
-    refused until both ports are open.
-    """
+    """Motion is refused until both ports are open."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -168,11 +164,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
-    """One port leads to a board of another robot. The driver sends only stops and queries to it.
-
-    It must not send ``start``, because ``start`` could release a robot that another user has
-    stopped.
-    """
+    """``start`` could release a robot that another user has stopped."""
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -251,11 +243,7 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """No more angles arrive while the robot drives.
-
-    The driver stops the robot when the last angle is 60 ms old. The driver does not wait for the
-    next command.
-    """
+    """The angles stop while the robot drives. The driver does not wait for the next command."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -276,10 +264,7 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """The angle sensor sets an error bit while the robot drives. A notice names the error.
-
-    The robot is stopped, and motion is refused while the bit is set.
-    """
+    """The sensor sets an error bit, and motion is refused while the bit is set."""
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -361,11 +346,7 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """The boards change ports during each disconnection. The robot is driven as before each time.
-
-    The driver remembers which requests each board does not know. This memory belongs to the board,
-    not to the port.
-    """
+    """The driver remembers which requests each board does not know, by board and not by port."""
     bench = nominal()
     for swapped in (True, False, True):
         bench.close()
@@ -397,10 +378,9 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The boards change ports but keep running. The front board's clock is ``ahead_s`` ahead.
+    """The front board's clock is ``ahead_s`` ahead.
 
-    The driver must not use this clock for the times of the drive board. Otherwise the stamps of the
-    odometry would be wrong, or the drive board would seem to have restarted.
+    The driver must not use this clock for the stamps of the drive board.
     """
     bench = Bench()
     bench.robot.front._clock_s += ahead_s

@@ -40,7 +40,7 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: whether the other lines come with every odd sample, not with every even one.
+    ``odd``: whether the other lines come with odd samples.
     """
 
     order: str
@@ -260,10 +260,7 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """Up to a tenth of the lines are lost, and up to a tenth come twice. The host may stall.
-
-    A false pair is allowed only if its lines arrived late and no pose follows in the same read.
-    """
+    """A pair may be false only if its lines are late and no pose follows in the same read."""
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
     if period_s is not None:

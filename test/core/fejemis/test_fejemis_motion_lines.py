@@ -25,14 +25,9 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
-    """Return the motions that a board with checksums reads from these bytes.
+    """Return the motions that the most lenient board with checksums reads from these bytes.
 
-    The board reads numbers as C does, and is as lenient as possible. Missing numbers are 0. Further
-    text is ignored. A checksum may have one digit.
-
-    ``keyword``: first word of the lines to read.
-
-    ``count``: how many numbers follow the keyword.
+    Numbers are read as C reads them. Missing ones are 0. A checksum may have one digit.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -59,21 +54,14 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The manual's example line loses two characters, and the board reads another motion.
-
-    So the driver does not use these digits. It chooses digits with which the checksum shows such a
-    loss.
-    """
+    """The driver must choose digits with which the checksum shows such a loss."""
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """One or two characters are lost from any motion line. The board never reads another motion.
-
-    The next line is part of the test, because a line end may be lost.
-    """
+    """A line end may be lost, so another line follows."""
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -107,12 +95,9 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """Two lost characters can join two lines: a line end, and the semicolon of the next line.
+    """Without its end and the next semicolon, ``rc 2 0 0`` may become ``rc 2 0 092``.
 
-    The line ``rc 2 0 0`` then ends with the checksum of the next line. If this checksum is 92, the
-    result is ``rc 2 0 092``, which means 92 degrees/s. With the checksum 02 or 92, the sum of the
-    joined line is still right. So the driver puts an empty line before a line with one of these two
-    checksums.
+    The joined sum fits if the checksum is 02 or 92. An empty line prevents this.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -156,10 +141,9 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
-    """The two numbers in the drive line avoid certain digits.
+    """The numbers avoid certain digits, but reach every speed within 1.8 %.
 
-    Together they still reach every wheel speed within 1.8 %. Negative numbers are the least exact,
-    because they have fewer digits.
+    Negative numbers are the least exact: they have fewer digits.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.03**n for n in range(240))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -168,10 +152,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 
 @pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """The lift line has 60 to 100 % of the requested voltage, and at most the requested time.
-
-    If one or two characters are lost, the board reads at most 12 V, and never a longer time.
-    """
+    """The lift line has 60 to 100 % of the requested voltage. Losses give at most 12 V."""
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
     said_volts, said_s = motions(data, b"motv", 2)[0]
@@ -187,10 +168,7 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """The driver adds only a checksum to a line and, in some cases, puts an empty line before it.
-
-    A related firmware obeys ``stop`` only if it is the complete line.
-    """
+    """A related firmware obeys ``stop`` only if it is the complete line."""
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
 
@@ -201,10 +179,7 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """Without checksums, the loss of a space or of the source number shifts the other numbers.
-
-    The board then reads a stop. Only damage within the speed itself can make the robot faster.
-    """
+    """If a space or the source number is lost, the board reads a stop."""
     for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         text = plain_drive_line(speed, turn)
         rim = math.hypot(speed, turn)

@@ -74,11 +74,7 @@ def test_displacements_add_up_to_the_pose() -> None:
 
 
 def test_the_speed_is_smoother_than_the_digits_of_the_pose() -> None:
-    """The board prints poses in steps of 1 mm.
-
-    Speeds from poses alone would have steps of 0.05 m/s. The driver also uses the wheel speeds, so
-    the published speed is smoother.
-    """
+    """Poses in steps of 1 mm alone would give speeds in steps of 0.05 m/s."""
     spread = {}
     for with_speeds in (True, False):
         drive = Drive(with_speeds=with_speeds)

@@ -1,10 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that two tables contain every command and every subscription in the boards' help.
-
-A row of the table ``SAID`` has an example of the command, the golden line. It also says where the
-driver uses the command, or why the driver does not use it.
-"""
+"""Tests that two tables contain every command and every subscription in the boards' help."""
 
 import math
 import re
@@ -35,7 +31,7 @@ class Row:
 
     ``use``: the topic, service, parameter or diagnostic key that sends or shows it.
 
-    ``by``: what the driver does instead, if it never sends the command.
+    ``by``: what the driver does instead.
     """
 
     golden: str
@@ -220,10 +216,7 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """If the driver uses a command, it sends the command in the form of the golden line.
-
-    It never sends the other commands, such as ``setid``, which can erase the board.
-    """
+    """Some commands must never be sent: ``setid`` can erase the board."""
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden
     words = {text.split()[0] for text in said}

@@ -138,10 +138,7 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
 
 
 def test_a_power_off_without_an_answer_may_still_come() -> None:
-    """The drive board's heartbeats are lost after a request to power off, so the request fails.
-
-    The board may still have obeyed, so motion is refused until ~/start.
-    """
+    """The request fails, but the board may obey. Motion is refused until ~/start."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()

@@ -29,10 +29,7 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 
 
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
-    """One read contains a pose and then a start line. The pose is from before the restart.
-
-    The driver handles the pose first, and then resets the board's clock.
-    """
+    """The driver handles the pose first, and then resets the board's clock."""
     bench = nominal()
     drive = bench.robot.drive
     pose = with_sum(drive._pose().encode("ascii")) + b"\n"
@@ -50,10 +47,7 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """The driver reads every 20 ms, and the drive board restarts at any time between two reads.
-
-    So a read may contain poses from before and after the restart. Odom still has no jump.
-    """
+    """A read every 20 ms may contain poses from before and after the restart. Odom has no jump."""
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
     for phase in range(10):
@@ -78,10 +72,7 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A board restarts, and the driver reports it and subscribes to the board's lines again.
-
-    If the board sends no start line, the times in its lines show the restart.
-    """
+    """Without a start line, the times in the board's lines show the restart."""
     bench = nominal(Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)))
     bench.run(2.0)
     bench.read_s = read_s
@@ -100,9 +91,9 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 
 
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
-    """Restart a board while commands are sent, and return the reasons for which they were refused.
+    """Restart a board under commands, and return why commands were refused.
 
-    Check that the robot is not driven until the front board has its configuration again.
+    Check that the robot is driven only after the front board has its configuration.
     """
     robot, refusals = bench.robot, []
     bench.drive_on(0.3, 0.0, 0.5)
@@ -128,11 +119,7 @@ def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
 def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
     boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """The front board restarts and loses its settings while the robot drives.
-
-    Motion is refused until they are written again. Without a start line, heartbeats show the
-    restart.
-    """
+    """A restart loses the settings. Without a start line, heartbeats show the restart."""
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         FejemisSettings(written=FRONT_OFFSET),
@@ -145,11 +132,7 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """The front board is silent for a while.
-
-    Then the driver reads a heartbeat from before the silence. This heartbeat does not prove that
-    the board has not restarted. Only a newer heartbeat proves it.
-    """
+    """Only a heartbeat from after the silence proves that the board has not restarted."""
     bench = nominal()
     bench.run(2.0)
     half, front = bench.board._ports.halves[FRONT], bench.robot.front
@@ -168,10 +151,7 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """The data of one board stops for a while, so the board may have restarted.
-
-    The state becomes nominal only after a heartbeat shows that the board has not restarted.
-    """
+    """After a silence of one board, a heartbeat must show that it has not restarted."""
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
     bench.run(pause_s)
@@ -185,11 +165,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """While a board is silent, the driver requests a heartbeat ten times a second.
-
-    A requested heartbeat shows at once whether the board has restarted. Periodic ones come only
-    every 0.4 s.
-    """
+    """A requested heartbeat shows a restart at once. Periodic ones come every 0.4 s."""
     bench = nominal()
     bench.speaks = {DRIVE}
     bench.run_until(lambda: bench.board._ports.halves[FRONT].unsure)

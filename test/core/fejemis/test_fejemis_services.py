@@ -87,10 +87,7 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """Every command to calibrate is lost, so the offsets do not change. The request fails.
-
-    A real calibration always changes the offsets a little, because of sensor noise.
-    """
+    """A real calibration always changes the offsets a little, because of sensor noise."""
     bench = nominal()
     lose(bench, word.encode(), 99)
     done = ask(bench, job)
@@ -345,9 +342,8 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """If the line ``off 300`` loses its 3 and a 0, its checksum still fits.
+    """If ``off 300`` loses its 3 and a 0, its checksum still fits.
 
-    The board would then cut the power at once. So the driver sends a longer delay, a number without
-    two such digits.
+    So the driver sends a longer delay, without two such digits.
     """
     assert whole_seconds(wanted_s) == seconds

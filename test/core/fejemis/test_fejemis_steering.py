@@ -54,10 +54,9 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """The command ``rc`` contains a speed and a turn rate.
+    """In a curve, the robot's motion differs from the numbers of ``rc``.
 
-    In a curve, the actual speed and turn rate of the robot differ from them. The expected values
-    come from the manual's equations.
+    The expected values come from the manual's equations.
     """
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
@@ -86,10 +85,7 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """While the front wheel turns to its angle, the robot is not faster than commanded.
-
-    A small excess is allowed. It corresponds to an error of 5° in the wheel's angle.
-    """
+    """A small excess is allowed, as from an error of 5° in the wheel's angle."""
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -143,9 +139,9 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The simulated robot moves at the commanded speed, within 1.2 % of the outer wheel's speed.
+    """The speed may be wrong by 1.2 % of the outer wheel's speed.
 
-    Its turn rate is right within 3 % of the outer wheel's speed divided by the track width.
+    The turn rate may be wrong by 3 % of it, divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -170,10 +166,7 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 
 
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
-    """The robot is commanded to turn on the spot, and it does not roll before it turns.
-
-    If both boards got ``rc 2 0 w`` at once, the robot would roll 0.17 m.
-    """
+    """If both boards got ``rc 2 0 w`` at once, the robot would roll 0.17 m."""
     bench = nominal()
     for _ in range(12):
         bench.drive(0.0, 1.0)
@@ -183,10 +176,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """The turn on the spot is reversed, so the front wheel must turn by 180°, for over 1 s.
-
-    While the wheel turns, the robot rests, and no fault is reported.
-    """
+    """The front wheel turns by 180°, for over 1 s. No fault is reported."""
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     before_m = bench.robot.truth.x_m

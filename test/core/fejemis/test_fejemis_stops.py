@@ -22,11 +22,7 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """The e-stop stops both boards. Its release sends ``start`` to the drive board alone.
-
-    The driver sets the command to zero before ``start``, because some firmware resumes the old
-    command.
-    """
+    """The command is set to zero before ``start``: some firmware resumes the old command."""
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -82,10 +78,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The heartbeat names the source of the command that the board obeys.
-
-    The source -1 proves a pause. The pause lasts even if the user latches and releases the e-stop.
-    """
+    """The source -1 proves a pause, even if the e-stop is latched and released."""
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -150,11 +143,7 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """A thousand lift voltages and colours come in a second. The driver sends twenty of each.
-
-    The newest voltage and the newest colour are sent last. A voltage of 0 is sent at once.
-    Meanwhile, the line for the brush is sent only as often as usual.
-    """
+    """Of a thousand in a second, twenty are sent. A voltage of 0 is sent at once."""
     machine = Machine()
     machine.set_brush(True)
     said: list[tuple[float, bytes]] = []
@@ -314,11 +303,7 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 
 
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
-    """The driver repeats ``brush 1`` every second.
-
-    Then it stalls, and the guard switches the brush off. After the stall, the driver does not
-    repeat ``brush 1`` any more.
-    """
+    """The driver stalls, and the guard switches the brush off. ``brush 1`` is then not repeated."""
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()

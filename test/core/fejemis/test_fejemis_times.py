@@ -42,10 +42,7 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Reads are late, the board's clock is fast or slow, and up to 3 % of the lines are lost.
-
-    Stamps of poses are right within 0.05 ms, and those of IMU samples within 0.2 ms.
-    """
+    """Stamps of poses are right within 0.05 ms, and those of IMU samples within 0.2 ms."""
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
     phase_s, start_s = chance.random() * 0.01, chance.random() * 50
@@ -194,10 +191,7 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """Lines that waited before the port was opened arrive first. Then the board's time jumps ahead.
-
-    The clock reports no restart, because a restart would set the board's time back.
-    """
+    """After them, the board's time jumps ahead. A restart would set it back."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)

@@ -30,18 +30,14 @@ def test_straight_ahead_both_wheels_roll_alike() -> None:
 
 
 def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
-    """The robot turns left on the spot at 1 rad/s. The wheels are 0.2 m from the centre.
-
-    Their rims move at 0.2 m/s, so the left wheel turns at −2 rad/s and the right wheel at 2 rad/s.
-    """
+    """At 1 rad/s, a rim 0.2 m from the centre moves at 0.2 m/s. The wheels turn at ∓2 rad/s."""
     assert ROBOT.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == pytest.approx((-2.0, 2.0))
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """The robot turns at 0.5 rad/s about a point 1 m to its left.
+    """The left wheel, the centre and the right wheel are at radii of 0.8, 1.0 and 1.2 m.
 
-    The left wheel moves at 0.4 m/s on a circle with a radius of 0.8 m. The right wheel moves at 0.6
-    m/s on a circle of 1.2 m. The middle between the wheels moves at 0.5 m/s.
+    At 0.5 rad/s they move at 0.4, 0.5 and 0.6 m/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 

@@ -25,10 +25,7 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """The wheel rates are the manual's rim speeds divided by the wheel radius, in rad/s.
-
-    The rim speed is ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, and Vy − L Ω for C.
-    """
+    """The rim speed is ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, and Vy − L Ω for C."""
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
     rim_b = 0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -40,10 +37,7 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The twist comes from the manual's matrix with the factor 1/(2 cos 30°).
-
-    The manual also has an expanded matrix, which is wrong by a factor of 4/3.
-    """
+    """The factor is 1/(2 cos 30°). The manual's expanded matrix is wrong by a factor of 4/3."""
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
     expected = (

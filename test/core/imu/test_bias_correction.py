@@ -176,10 +176,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, the driver finds half of the gyro bias within 15 s at rest.
-
-    While the robot moves, the bias stays as it is. Without ``auto_gyro_bias``, it stays zero.
-    """
+    """With ``auto_gyro_bias``, half of the bias is found within 15 s at rest."""
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)
@@ -194,10 +191,7 @@ def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
 
 
 def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
-    """A sensor that is set to 4 g shows half of gravity if its counts are read as 2 g.
-
-    The driver advises the right range in one notice.
-    """
+    """Counts of a 4 g range show half of gravity if they are read as 2 g."""
     bench = running()
     gravity = bench.session.figures(bench.now).imu.gravity_mps2
     assert gravity == pytest.approx(9.80665, rel=0.01)

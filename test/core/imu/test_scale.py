@@ -67,10 +67,7 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """The sensor is set to another range than the driver, so gravity at rest is wrong.
-
-    The advice names the range in which gravity would be right within a tenth.
-    """
+    """The advised range is the one in which gravity would be right within a tenth."""
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
         assert bool(text) == (actual_g != believed_g)

@@ -62,11 +62,7 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """The user resets the odometry while the robot drives.
-
-    Odom then gives the distance since the reset. It may miss the displacement under way, which is
-    at most 20 mm.
-    """
+    """Odom may miss the displacement under way, which is at most 20 mm."""
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)
@@ -106,11 +102,7 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
-    """The board is paused while the robot drives, so the robot rolls out.
-
-    Odom includes this motion. The first twist after the pause is unknown, and the next ones are
-    about zero.
-    """
+    """The robot rolls out in the pause. The first twist after the pause is unknown."""
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)
@@ -129,10 +121,7 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """The user commands a curve to the left. Odom shows this curve.
-
-    It does so for any signs of the board's axes and for any heading of the board at the start.
-    """
+    """The command is a curve to the left. The board may start with any heading."""
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
         axis_signs=signs,

@@ -74,10 +74,7 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """A word of one IMU reading jumps by the value of one of its high bits.
-
-    The reading is rejected. The next reading is released at once. The ranges are 2 g and 250 °/s.
-    """
+    """The jump is the value of a high bit. The ranges are 2 g and 250 °/s."""
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -87,10 +84,7 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """A word jumps and stays there, as when a robot is set down on a slope.
-
-    The first reading is released one reading late, and none is rejected.
-    """
+    """A word jumps and stays there, as when a robot is set down on a slope."""
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -192,9 +186,9 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """The speed jumps from 0.25 to 1.5 m/s for one displacement, and is then low again.
+    """A displacement has 1.5 instead of 0.25 m/s.
 
-    The displacement is rejected. A pose after it waits until the low speed shows the error.
+    A pose after it waits for the next displacement.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
@@ -232,10 +226,7 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """The robot rolls out in a pause, and one displacement contains all of this motion.
-
-    It is accepted if the robot can have driven so far during the pause.
-    """
+    """The displacement is accepted if the robot can roll so far in the pause."""
     through = gate()
     through.admit(ahead(), 1.0)
     rolled_out = replace(ahead(0.5), duration_s=None)

@@ -16,11 +16,7 @@ def lost(bench: Bench) -> tuple[int, int]:
 
 @pytest.mark.parametrize("silence_s", [0.04, 0.2, 1.0, 5.0])
 def test_a_silent_line_has_lost_imu_readings_with_the_displacements(silence_s: float) -> None:
-    """The line is silent for a while.
-
-    A counter in the delta frames shows how many displacements are lost. IMU frames have no counter.
-    So for each lost displacement, four IMU readings count as lost.
-    """
+    """IMU frames have no counter, so four IMU readings count as lost for each lost delta."""
     bench = Bench(BoardSettings(running=True))
     bench.open()
     bench.run(2.0)

@@ -34,10 +34,7 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """A motion limit is too low while the motion monitor is off, so displacements are rejected.
-
-    The limit is then corrected, and the monitor is switched on. The monitor does not trip.
-    """
+    """The displacements are rejected because a motion limit is too low at first."""
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
         bench.configure(motion_monitor=False, motion=limits)
@@ -106,10 +103,7 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """The driver stalls after a trip, so commands of the sender are lost.
-
-    The stall does not count as silence of the sender. Only the time after the stall does.
-    """
+    """Commands are lost in the stall. Only the time after the stall counts as silence."""
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     bench.now += 3.0

@@ -59,10 +59,7 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The robot has a wrong scale or wiring and does not move as commanded.
-
-    The driver stops it within 0.3 s. The notice gives the fault and what to check.
-    """
+    """The scale or the wiring is wrong. The notice gives the fault and what to check."""
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -93,10 +90,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """A robot reverses within one long displacement, so the displacement is about zero.
-
-    The motion monitor does not take it for a robot that is held, and stops it in time.
-    """
+    """The robot reverses within the displacement, so its sum is about zero."""
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)
@@ -199,10 +193,7 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """The robot drives away from its goal. The motion monitor trips and refuses motion.
-
-    Without the refusal, a node that repeats its goal could restart the robot again and again.
-    """
+    """Without the refusal, a node that repeats its goal could restart the robot again and again."""
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)

@@ -89,11 +89,7 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """The robot slowly speeds up in the wrong direction.
-
-    The monitor finds this within 0.3 s after the robot has reached 0.05 m/s. A held robot, in
-    contrast, is excused for up to 0.4 s while its wound-up controllers unwind.
-    """
+    """The 0.3 s begin at 0.05 m/s. A held robot is excused for up to 0.4 s."""
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
     wrong_s = -time_constant_s * math.log(1.0 - 0.05 / speed_mps)
@@ -215,11 +211,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """A robot is held for 1 s at 0.4 m/s, and its wheel controllers integrate the error.
-
-    When it is released, the robot is too fast until it has caught up 0.4 m. The monitor finds no
-    fault.
-    """
+    """Held for 1 s at 0.4 m/s, the robot may be too fast until it has caught up 0.4 m."""
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -242,20 +234,14 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot at rest is pushed for long. It has already obeyed Stop, so more Stops do not help.
-
-    So the faults, each of which causes a Stop, become rarer.
-    """
+    """The robot rests and is pushed, so more Stops do not help. Each fault causes a Stop."""
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot has missed Stop and goes on, but it may receive a later Stop.
-
-    So the faults, each of which causes a Stop, do not become rarer.
-    """
+    """The robot has missed Stop, but may receive a later one. Each fault causes a Stop."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -268,10 +254,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
-    """The robot moves the wrong way, so the driver sends Stop.
-
-    The robot moves on until Stop arrives, and then rolls out. The monitor finds no second fault.
-    """
+    """The robot moves on the wrong way until Stop arrives, and then rolls out."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY

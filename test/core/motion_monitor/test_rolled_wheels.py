@@ -37,7 +37,7 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """For all axis signs and frames, ``rolled`` is the sum of the tangents in the board's own axes.
+    """``rolled`` is the sum of the tangents in the board's axes.
 
     A tangent is the constant twist of a period, multiplied by the period.
     """
@@ -91,9 +91,9 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """Frames are lost for up to 0.4 s. The wheel angles are then right within 0.12 rad.
+    """Up to 0.4 s, the error is at most 0.12 rad.
 
-    After a loss of 2 s in curves, the error is larger. The driver then assumes the shortest path.
+    For 2 s in curves it is larger: the driver assumes the shortest path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

@@ -98,11 +98,7 @@ def test_in_imu_only_mode_nothing_is_found() -> None:
 
 
 def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
-    """The board receives nothing, so it misses the first Stops.
-
-    Later deltas show that the robot moves. The driver sends Stop again, which stops the robot once
-    the board receives again.
-    """
+    """The deltas still show that the robot moves, so Stop is sent again."""
     bench.hears = False
     bench.run(20.0)
     assert not bench.still()

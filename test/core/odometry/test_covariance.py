@@ -54,10 +54,7 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """The robot has two wheels. The size of each wheel is uncertain by 1 %.
-
-    After a metre straight ahead, each wheel adds an uncertainty of 0.025 rad and 5 mm.
-    """
+    """With wheel sizes uncertain by 1 %, each wheel adds 0.025 rad and 5 mm in a metre."""
     noise = OdometryNoise(
         wheel_drift=0.0,
         wheel_scale=0.01,
@@ -79,10 +76,7 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """The robot drives 1 m forward, for which wheels A and B roll 0.87 m each.
-
-    The covariance is the same after ten steps as after a hundred.
-    """
+    """In 1 m forward, wheels A and B roll 0.87 m each. Ten or a hundred steps give the same."""
     noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
@@ -128,10 +122,7 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """Wheel sizes are uncertain. The standard deviation of the yaw grows tenfold from 1 m to 10 m.
-
-    When the robot has driven back, the standard deviation is zero.
-    """
+    """The deviation of the yaw grows tenfold from 1 m to 10 m. After the way back it is zero."""
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -146,10 +137,9 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 
 @pytest.mark.slow
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
-    """In 40 drives, wheels have wrong sizes (1 %) and slip (2 %). The errors fit the covariance.
+    """Wheel sizes are wrong by 1 %, and wheels slip by 2 %.
 
-    If it is right, the mean of the normalised squared error is 3, one each for x, y and yaw. Over
-    40 drives, the mean is between 2.29 and 3.80 with a probability of 95 % (chi-squared of 120).
+    The mean normalised squared error of 40 drives is 2.29 to 3.80 in 95 % (chi-squared of 120).
     """
     total = 0.0
     for seed in range(40):
@@ -183,10 +173,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board computes its pose from its wheels, so the pose has the same drift as the deltas.
-
-    A pose therefore does not reduce the covariance of this drift.
-    """
+    """The board's pose comes from its wheels, so it drifts as the deltas do."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):

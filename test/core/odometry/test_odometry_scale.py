@@ -43,10 +43,7 @@ def drive(on: Bench) -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """The robot has other wheels than its board assumes and drives metres of curves.
-
-    With the scales, odom ends within 5 mm and 3 mrad of the truth.
-    """
+    """With the scales, odom ends within 5 mm and 3 mrad of the truth after metres of curves."""
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
     truth, pose = on.board.truth, on.odometry[-1].pose

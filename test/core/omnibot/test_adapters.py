@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that an IMU frame is returned with the packet that completes it, with any serial adapter.
+"""Tests that an IMU frame is returned with the packet that completes it, with any adapter.
 
-The last byte of an IMU frame may look like the first byte of the next frame. The arrival times show
-that it is not, because the next frame is not due yet.
+Its last byte may look like a header. The arrival times show that no frame is due yet.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,7 +32,7 @@ Handed = Iterator[tuple[float, bytes]]
 def ticks() -> Iterator[tuple[float, bytes]]:
     """Yield the time in s and the bytes of each tick of a robot at rest.
 
-    After 0, the most frequent value of its gyro is -1, whose bytes look like a header.
+    The robot's gyro often gives -1, whose bytes look like a header.
     """
     board = SimulatedBoard(BoardSettings(seed=1, running=True))
     for tick in range(TICKS):

@@ -150,10 +150,7 @@ def lost(board: OmniBot, *sent: Frame) -> list[int]:
 
 @given(st.integers(0, 255), st.integers(0, 2000))
 def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, gap: int) -> None:
-    """Deltas are lost, and their counter SEQ, which is one byte, may wrap several times.
-
-    The arrival times show how often it has wrapped, so the lost deltas are counted correctly.
-    """
+    """The counter SEQ is one byte. The arrival times show how often it has wrapped."""
     board = bot()
     readings(board, moved(start))
     (reading,) = board.receive(encode(moved((start + 1 + gap) % 256)) + b"\xff", 0.04 * (gap + 1))
@@ -162,11 +159,7 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Two reads bring seconds of data each, and SEQ wraps within a read.
-
-    Between the reads, three deltas and all other frames of that time are lost. Exactly three lost
-    deltas are counted, and no restart.
-    """
+    """SEQ wraps within a read. Between the two reads, exactly three deltas are lost."""
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
     board.receive(b"".join(periods[:58]), 10.0)
@@ -241,10 +234,7 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """To pause a running board, the driver sends Stop and P.
-
-    P is a toggle, so the driver refuses it if the board does not run. The mode stays as it was.
-    """
+    """P is a toggle, so it is never sent to a board that does not run."""
     board = in_mode(mode)
     if mode.running:
         assert joined(board.pause()) == STOP + ZEROS + b"\x50"

@@ -69,10 +69,7 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """A velocity that rounds to zero is sent as Stop, never as zeros in mode 1.
-
-    If the board's switch is at "position", zeros in mode 1 would send the robot to the origin.
-    """
+    """With the switch at "position", zeros in mode 1 would send the robot to the origin."""
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
@@ -135,10 +132,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A goal is beyond 32.77 m or rad, where a 16-bit word ends. The driver refuses it.
-
-    A goal that is only limited would lead to another place.
-    """
+    """A 16-bit word ends at 32.77 m or rad. A limited goal would be another place."""
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
@@ -194,11 +188,7 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """A velocity is encoded, and then read from the bytes again.
-
-    Because of rounding, the two may differ by 0.5 LSB. If the driver avoids a harmful byte, they
-    may differ by 1.5 LSB.
-    """
+    """Rounding changes 0.5 LSB. A byte that the driver avoids changes up to 1.5 LSB."""
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)

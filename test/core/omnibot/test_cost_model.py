@@ -12,9 +12,9 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """Return what is known after a pose with a heading of 100 mrad, and deltas with these turns.
+    """Return what is known after a pose with a heading of 100 mrad and these deltas.
 
-    ``turns`` are in 0.1 mrad, and ``seqs`` are the counts of the deltas.
+    ``turns``: turns of the deltas, in 0.1 mrad.
     """
     context = NOTHING_KNOWN
     for frame in (DeltaFrame(0, 0, 0, 9), PoseFrame(0.0, 0.0, 100.0, 1)):
@@ -31,10 +31,7 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five deltas turn by 5 mrad in all. The next pose may differ from that by a rounding error.
-
-    A larger difference is a contradiction, which has a cost.
-    """
+    """Five deltas turn by 5 mrad. The pose may differ by a rounding error without a cost."""
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)
     assert (cost > 0.0) is contradicts

@@ -1,10 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the decoder on undamaged streams, from their beginning or from any other byte.
-
-The streams come from the simulated board, or are typed from the manual. The expected frames come
-from decoding the parts of a stream one by one.
-"""
+"""Tests of the decoder on undamaged streams, from their beginning or from any other byte."""
 
 from random import Random
 
@@ -42,10 +38,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: str) -> None:
-    """The decoder returns all frames of the simulated board in order, and no others.
-
-    It makes no difference whether the bytes come all at once, tick by tick, or one by one.
-    """
+    """The decoder returns all frames of the simulated board in order, and no others."""
     ticks = ticks_of(name)
     sent = [frame for _, frame in frames_of(b"".join(ticks))]
     assert decoded([b"".join(ticks)]) == sent
@@ -73,10 +66,7 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
 def test_in_step_any_content_is_delivered_in_any_chunks(
     sent: list[Frame], data: st.DataObject
 ) -> None:
-    """The decoder is in step with the stream. It returns all frames, whatever their content.
-
-    The content may be a real shock, a stuck sensor, or words that look like headers.
-    """
+    """The content may be a real shock, a stuck sensor, or words that look like headers."""
     stream = LEAD_IN + b"".join(map(encode, sent))
     chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # an empty one is a pause
     assert decoded(chunks, step_s=1e-3) == [REST, REST, *sent]
@@ -84,10 +74,7 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """A frame is returned as soon as its last byte has come.
-
-    Only a frame whose values jump, or whose last byte may begin a header, waits for the next frame.
-    """
+    """A frame waits only if its values jump, or if its last byte may begin a header."""
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
     for number, tick in enumerate(ticks_of(name)):
@@ -151,11 +138,7 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """The last byte of an IMU frame may belong to a header.
-
-    The frame waits if a delta is due in this tick. In other ticks, the pause after the byte shows
-    that no header begins, so the frame does not wait.
-    """
+    """The IMU frame's last byte may belong to a header. The frame waits in ticks with a delta."""
     made, waited = FrameDecoder(), []
     for tick in range(60):
         imu = encode(ImuFrame((120, -80, -16384), (1, 2, -4 - tick % 2)))
@@ -200,9 +183,9 @@ def test_starting_anywhere_all_frames_but_the_first_two_come_and_nothing_false(
 def test_a_robot_on_a_slope_is_not_misread_for_ever(
     gyro: tuple[int, int, int], imu_only: bool
 ) -> None:
-    """A robot stands on a slope, and -6 on a gyro axis looks like a header in every frame.
+    """A gyro value of -6 looks like a header in every frame.
 
-    From any starting byte, all frames but at most two are returned, and no false ones.
+    From any starting byte, at most two frames are lost.
     """
     random, ticks = Random(3), []
     for tick in range(60):

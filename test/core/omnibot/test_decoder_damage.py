@@ -37,11 +37,9 @@ from omnibot_driver.core.omnibot.frames import Frame
 def assert_back_in_step(
     sent: list[tuple[int, Frame]], hurt: set[int], found: list[Frame], place: int
 ) -> None:
-    """Check that only frames near the damage are missing, and that no false frame was returned.
+    """Check that no frame is false, and that only frames near the damage are missing.
 
-    ``hurt``: the numbers of the frames that the damage changed or split.
-
-    ``place``: the position of the damage, for messages.
+    ``hurt``: numbers of the frames that the damage changed or split.
     """
     truth = [frame for _, frame in sent]
     assert is_subsequence(found, truth), f"a false frame came out: damage at {place}"
@@ -107,10 +105,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """Bytes are inserted into streams at random. At most 1 in 30 of them leads to a false frame.
-
-    A false frame comes from a gyro value that looks like a header.
-    """
+    """At most 1 in 30 inserted bytes makes one, from a gyro value that looks like a header."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -136,10 +131,7 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """A frame has lost a byte, so the first byte of the next header seems to complete it.
-
-    The byte after that shows the error, and the frame is not returned.
-    """
+    """The first byte of the next header seems to complete the frame. The second shows the error."""
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
     for number in range(8, 24):

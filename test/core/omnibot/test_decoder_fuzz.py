@@ -2,15 +2,8 @@
 
 """Fuzz tests of the decoder, with any bytes, at any times, in any chunks.
 
-The decoder must
-
-* never raise an exception;
-* return only frames that are in the stream, byte for byte, in order and without overlap;
-* hold less than ``DOUBT_BYTES`` between calls, and nothing after ``flush``;
-* do an amount of work in proportion to the number of bytes, for any bytes in any chunks;
-* return all frames of a stream in which no byte is lost or added.
-
-``test/integrity`` measures how rarely a damaged stream gives a wrong frame.
+The work must grow in proportion to the bytes. ``test/integrity`` measures how rarely a damaged
+stream gives a wrong frame.
 """
 
 from typing import Any
@@ -54,10 +47,7 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """The decoder gets any bytes at any times. It returns only frames that are in the stream.
-
-    It raises no exception, and holds fewer than ``DOUBT_BYTES`` between calls.
-    """
+    """The frames are in order and without overlap. Fewer than ``DOUBT_BYTES`` are held."""
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)
@@ -88,10 +78,7 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """A frame that fits the one before it is returned as soon as its last byte has come.
-
-    Only a frame whose last byte may begin a header must wait.
-    """
+    """A calm frame fits the one before it. It waits only if its last byte may begin a header."""
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
     for number, frame in enumerate(frames, 1):
@@ -140,7 +127,7 @@ def work(
 ) -> tuple[list[int], int]:
     """Return the work up to the end of each chunk, beginning with 0, and the most bytes held.
 
-    The unit of work is one examined byte, or one edge of the trellis.
+    Its unit is an examined byte, or an edge of the trellis.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 

@@ -101,11 +101,7 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """With deltas at 10 Hz, ten IMU frames come before each delta, and two deltas before each pose.
-
-    At 25 Hz the numbers are four and five. Each schedule accepts only its own numbers without a
-    cost.
-    """
+    """At 25 Hz, four IMU frames come before a delta, and five deltas before a pose."""
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
     for schedule, right in ((Schedule(0.1), True), (Schedule(), False)):
@@ -128,11 +124,7 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """Each delta is off by 0.05 mrad because of rounding, in the same direction.
-
-    A pose that differs from the deltas by the sum of these errors is accepted. Twice that
-    difference is a contradiction.
-    """
+    """Rounding changes each delta by 0.05 mrad. Twice the sum is a contradiction."""
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
     before = Context(seq=7, pose=PoseFrame(0.0, 0.0, 0.0, 4), deltas=deltas, turned=0)
@@ -145,10 +137,7 @@ def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: 
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 9, 10, 11, 30, 60, 100, 300])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """The board sends deltas at 10 Hz, and all frames are lost for a while.
-
-    SEQ wraps in the longest gap. 1.2 s later, the odometry is equal to the board's own pose again.
-    """
+    """Deltas come at 10 Hz. SEQ wraps in the longest gap, and odom is right 1.2 s later."""
     for seed in range(3):
         on = Line(
             BoardSettings(running=True, delta_period_s=TEN_HZ_S, frame=frame, seed=seed), seed=seed

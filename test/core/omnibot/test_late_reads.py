@@ -19,8 +19,7 @@ Reads = Iterator[tuple[bytes, float]]
 STOPS_S = (2e-3, 5e-3, 8.8e-3, 9e-3, 10e-3, 10.1e-3, 12e-3, 20e-3, 30e-3, 0.1, 0.3)
 """Times in s for which a reader stops.
 
-Some are close to 8.8 ms, for which the line is idle between two ticks. Some are close to 10 ms, a
-whole tick.
+Some are close to the idle time between two ticks, 8.8 ms, or to a tick, 10 ms.
 """
 
 
@@ -39,11 +38,9 @@ def stopped(
 ) -> Reads:
     """Yield the reads of a reader that stops once, for ``stop_s``, after ``place`` bytes.
 
-    After the stop the reader reads every 20 µs, until it has all bytes that have arrived.
-
     ``most``: the largest number of bytes in a read.
 
-    ``piece``: the number of bytes in each read before the stop.
+    ``piece``: bytes in each read before the stop.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -155,10 +152,7 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter sends 8 bytes at a time, so a piece may hold parts of two paused texts.
-
-    The silence between the texts then lies within the piece. All texts are returned.
-    """
+    """An adapter's piece of 8 bytes may hold parts of two paused texts, and the silence between."""
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
     for number in range(0, len(texts), 8):
@@ -167,12 +161,7 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The line is cut within a frame and comes back within a later frame.
-
-    Together the two parts are as long as one frame. Only the pause between the parts shows that
-    they belong to two frames. The reader is prompt and measures this pause, so no false frame is
-    returned.
-    """
+    """The two parts of different frames are as long as one frame. Only the pause shows the cut."""
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
         hurt = [*ticks[:50], ticks[50][:cut], b"", ticks[52][cut:], *ticks[53:]]

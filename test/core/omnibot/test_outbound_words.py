@@ -34,10 +34,7 @@ def words_of(counts: list[float]) -> tuple[int, ...]:
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """The board may miss the header of a frame, and read the payload as commands.
-
-    So no payload contains a byte that is a letter, or two bytes that form a header.
-    """
+    """If the board misses the header, it reads the payload as commands."""
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
 

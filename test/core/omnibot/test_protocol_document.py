@@ -2,8 +2,7 @@
 
 """Tests that the examples in docs/internals/omnibot_protocol.md agree with the codec.
 
-An example is a line of a code block. It has bytes, ``->``, a word with its numbers, and perhaps a
-remark.
+An example is a line with bytes, ``->`` and a word with its numbers.
 """
 
 import json

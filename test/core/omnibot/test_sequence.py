@@ -22,10 +22,7 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """Deltas are lost, and the arrival time of the next one is wrong by up to 0.4 s.
-
-    The lost deltas are counted correctly, also if the count has wrapped.
-    """
+    """The next delta's arrival time is wrong by up to 0.4 s."""
     step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
     assert step == Step(lost)
 
@@ -41,11 +38,7 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The board is paused, and then continues its count.
-
-    The duration of the first delta is unknown. If the count is 0 after 255, the board may also have
-    restarted.
-    """
+    """The first delta's duration is unknown. A 0 after 255 may also be a restart."""
     sequence = begun(count)
     sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
@@ -54,11 +47,7 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """After a pause, a delta has any count.
-
-    Either the board has restarted, or the old count continues. The driver accepts the explanation
-    with fewer lost deltas. If both have equally many, it accepts the restart.
-    """
+    """After a pause, the explanation with fewer lost deltas is accepted. A tie is a restart."""
     sequence = begun(count)
     sequence.pause()
     goes_on = (lost - count - 1) % 256
@@ -81,10 +70,7 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
-    """The serial line is unplugged for minutes, and the board's clock is 1 % slow or fast.
-
-    The lost deltas are counted correctly, and no restart is assumed.
-    """
+    """The serial line is unplugged for minutes, and the board's clock is wrong by 1 %."""
     sequence = begun(100)
     passed = round(elapsed_s / 0.04 * (1 + drift))
     step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
@@ -143,11 +129,7 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """Two seconds after the count 205, a delta has the count 0.
-
-    A continued count would be 0 too, because 50 deltas fit into this time. The next pose also has
-    the count 0. A continued pose counter would not be 0, so the board has restarted.
-    """
+    """In 2 s, 50 lost deltas lead from 205 to 0. A continued pose counter would not be 0."""
     sequence = Sequence()
     for count in range(206):
         sequence.delta(count, count * 0.04)
@@ -173,11 +155,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """The pose counter begins at zero again.
-
-    If poses had been lost, the counter would have needed more time to wrap. So no delta is counted
-    as lost.
-    """
+    """Lost poses would have needed more time to wrap the counter. No delta counts as lost."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -209,11 +187,7 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """While the host's clock stood still, 100 deltas were lost.
-
-    So the count of the next delta is too high for the elapsed time. When the delta after it
-    confirms this count, the lost deltas are counted.
-    """
+    """The host's clock stood still while 100 deltas were lost."""
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
@@ -232,9 +206,9 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """A pose shows that a delta was lost. The decoder may have held the pose for a while.
+    """The pose shows one lost delta.
 
-    So the next delta may follow at once, and no further delta is counted as lost.
+    The decoder may hold the pose, so the next delta comes at once.
     """
     sequence = Sequence()
     for count in range(11):
@@ -249,10 +223,7 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """After 3 s of silence, four IMU frames and a delta with the count 0 arrive.
-
-    A continued count would not be 0 at this time. So the board has restarted.
-    """
+    """After 3 s of silence, a continued count would not be 0."""
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

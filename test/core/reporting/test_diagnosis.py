@@ -187,10 +187,7 @@ def test_a_count_that_begins_anew_has_not_grown() -> None:
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """The reader waits for the processor and reads late. If nothing is lost, the status stays OK.
-
-    If the rates are wrong, the status names the busy computer as the cause.
-    """
+    """The status is OK if nothing is lost. If the rates are wrong, it names the busy computer."""
     robot = Robot()
     for second in range(12):
         robot.connect(waited_s=0.3 * second)
@@ -206,10 +203,7 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
-    """The skew of the clock is larger than a crystal can have. It is reported after more than 70 s.
-
-    A busy computer may cause such a skew for up to a minute. This must not be reported.
-    """
+    """A busy computer may cause such a skew for a minute, so the report comes after 70 s."""
     robot = Robot()
     robot.set(skew_ppm=-119.0)
     robot.seconds(70)

@@ -79,10 +79,10 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Unusual reads, each as a tuple of five values.
+"""Unusual reads.
 
-The values are the readings, the ticks since the reading before, the delay in s, the
-``SampleBoundary``, and the number of normal reads that follow.
+Each is (readings, ticks since the reading before, delay in s, ``SampleBoundary``, normal reads that
+follow).
 """
 
 

@@ -112,10 +112,7 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """An adapter or another line splits the stream. The stamps are compared from 2 s on.
-
-    They are uneven by less than 0.2 ms. Except for a constant error, 99 % are right within 0.5 ms.
-    """
+    """From 2 s on, stamps are uneven by less than 0.2 ms. 99 % have one error within 0.5 ms."""
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
         assert stamped.unevenness() < 0.2e-3
@@ -128,10 +125,7 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """The timer of an adapter runs freely with a period of 16 ms.
-
-    For several seconds, arrival times may then hide a delay of 0.8 ms. The stamps are still right.
-    """
+    """The timer has a period of 16 ms. Arrival times may hide a delay of 0.8 ms for seconds."""
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
