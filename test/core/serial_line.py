@@ -101,8 +101,7 @@ def ftdi(
 ) -> Chunker:
     """Return a function that splits the stream as a USB adapter does, in packets of 62 bytes.
 
-    A shorter packet comes when the timer expires. The timer runs freely, or begins with a packet's
-    first byte.
+    The timer ends a packet early. It runs freely, or begins with a packet's first byte.
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:

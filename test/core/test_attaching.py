@@ -31,10 +31,7 @@ from omnibot_driver.core.readings import PoseReading
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
 def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
-    """Deltas arrive before the board's first pose, and the odometry holds them.
-
-    When the heading is known, they are published as if the pose had come first.
-    """
+    """The deltas are published as if the pose had come before them."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
         assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
@@ -146,10 +143,7 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """The displacements are rounded, so their sum differs a little from the board's pose.
-
-    The odometry corrects the difference in five steps, one with each displacement.
-    """
+    """Rounding causes the errors. A correction is spread over five displacements."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.01, -0.005, 0.02))
@@ -213,10 +207,7 @@ def test_a_reset_puts_the_odometry_frame_where_the_robot_stands() -> None:
 
 
 def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> None:
-    """The robot moves before the board's first pose, and then the odometry is reset.
-
-    When the pose arrives, odom contains only the motion after the reset.
-    """
+    """The board's first pose arrives after the reset. Odom contains only the motion since then."""
     odometry, trip = Odometry(SETTINGS), Trip(0.7)
     for _ in range(3):
         odometry.displace(trip.move(0.02, 0.0, 0.1), 0.0)

@@ -160,10 +160,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """A driving robot is cut off in both directions for 5 s, and may have driven on.
-
-    The driver stops it when its data arrives again.
-    """
+    """The robot is cut off for 5 s, and may have driven on."""
     bench.drive_on()
     bench.speaks = bench.hears = False
     bench.run(5.0)

@@ -62,10 +62,7 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """The driver receives data, then a request. It has not processed the data yet.
-
-    This data does not answer the request. Only data that arrives later does.
-    """
+    """The data is received before the request, but not yet processed."""
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):
         session.inbound.receive(board.step(), tick * TICK_S)

@@ -90,7 +90,7 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """The next pose does not add the motion that was lost before the reset."""
+    """The lost motion came before the reset, so the next pose does not add it."""
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)

@@ -75,7 +75,7 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """A command ends 0.5 s after the last data. A board that is not driven has 2 s."""
+    """Without data, a command ends after 0.5 s. If the robot is not driven, the limit is 2 s."""
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5
     assert liveness.unheard(10.5)

@@ -45,7 +45,7 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """P needs data that arrives after the request. A paused board sends none."""
+    """The driver sends P only after new data. A paused board sends no data."""
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -73,7 +73,7 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 ) -> None:
     """Old data makes the driver send P, which resumes a paused board.
 
-    The late notice of the other pause is no proof, so P is sent again.
+    The late notice of the other pause proves nothing. P is sent again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")
@@ -118,7 +118,7 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """The host sleeps for 3 s after P. Data from before P then does not mean that P was lost."""
+    """The host sleeps for 3 s after P. Data that the board sent before P does not show a lost P."""
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.session.inbound.receive(on_its_way[:80], bench.now)

@@ -149,10 +149,7 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """A paused board does not receive R, so the numbers in its notices continue.
-
-    The driver concludes that the board has not restarted, and the reset fails.
-    """
+    """The numbers in the board's notices continue, so the driver lets the reset fail."""
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -163,10 +160,7 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
-    """A pause of a running board fails, and then a reset succeeds.
-
-    The driver starts the board again, but the robot stands until a fresh command arrives.
-    """
+    """The driver starts the board, but the robot stands until a fresh command."""
     bench = driving()
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
@@ -195,10 +189,7 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """The board does not receive R. The state becomes ``connecting`` only once.
-
-    It returns to ``nominal`` when the driver has found that the board did not restart.
-    """
+    """The state is ``connecting`` once, and ``nominal`` again when no restart was found."""
     bench.hears = False
     bench.events.clear()
     shown = [bench.session.state]

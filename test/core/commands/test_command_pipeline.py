@@ -76,7 +76,7 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """A base that cannot move sideways is driven forward only. NaN in either speed is refused."""
+    """A base that cannot move sideways is driven forward only. A command with NaN is refused."""
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -121,7 +121,7 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """From rest to (0.3, 0.4) m/s at 1 m/s² takes 0.5 s. On the line, 1 m/s is 70 LSB."""
+    """A step from rest to (0.3, 0.4) m/s at 1 m/s² takes 0.5 s. On the line, 1 m/s is 70 LSB."""
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):

@@ -21,11 +21,7 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """The user latches the e-stop while the robot drives.
-
-    The robot stops, and commands are refused. The driver then sends only ES and Stop, always
-    together.
-    """
+    """A driving robot stops. The driver then sends only ES and Stop, always together."""
     bench.drive(0.5)
     bench.run(0.1)
     start = len(bench.written)
@@ -67,10 +63,7 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """The user latches the e-stop while the port is closed, and the answer warns of this.
-
-    The driver sends the e-stop as soon as the port opens.
-    """
+    """The e-stop is latched while the port is closed. The answer to the user warns of this."""
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)

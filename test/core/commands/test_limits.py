@@ -193,9 +193,6 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """The driver refuses a command because of its stamp. The refusal states the age of the stamp.
-
-    The refusal also says that the clocks must agree.
-    """
+    """The refusal states the age of the stamp, and says that the clocks must agree."""
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

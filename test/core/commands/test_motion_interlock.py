@@ -81,10 +81,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """After a first trip the release changes nothing.
-
-    After a second trip it allows motion again.
-    """
+    """The board has no ~/start. The release matters only after a second trip."""
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

@@ -46,7 +46,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """After a pause, a reset or an e-stop, an old command never moves the robot again."""
+    """After a pause, a reset or an e-stop, the robot needs a new command."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)
@@ -61,10 +61,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """While the board's data is lost, the board restarts and another program starts it.
-
-    The driver notices the restart by the counters alone, and discards the command.
-    """
+    """While the board's data is lost, the board restarts and another program starts the board."""
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -83,7 +80,10 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The last motion frame comes during the boot. Later, the board could take a byte for S."""
+    """The last motion frame comes during the boot.
+
+    After the boot, the board could read an S in it.
+    """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
     rebooted_at, mark = bench.now, len(bench.written)
@@ -98,10 +98,7 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """The user requests a pause or a reset. The board receives nothing, so the robot drives on.
-
-    The driver sends no motion frame after the request.
-    """
+    """The board misses a request for a pause or a reset, so the robot drives on."""
     bench.drive(0.4)
     start = len(bench.written)
     bench.hears = False
@@ -191,10 +188,7 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """The line is cut in both directions, and the robot drives on with its last command.
-
-    When the line works again, the driver's Stop stops the robot.
-    """
+    """During the cut, the robot drives on with its last command."""
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = bench.hears = False

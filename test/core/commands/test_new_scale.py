@@ -26,7 +26,7 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """At 0.4 m/s, the scale changes from 70 to 100 LSB per m/s: 40 LSB, not 28."""
+    """At 0.4 m/s, 28 LSB become 40 LSB when the scale changes from 70 to 100 LSB per m/s."""
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -37,7 +37,7 @@ def test_a_velocity_is_repeated_in_the_new_scale() -> None:
 
 
 def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> None:
-    """At 10 rad/s, the wheel radius is doubled: 41 LSB are sent instead of 20."""
+    """At 10 rad/s, 20 LSB become 41 LSB when the wheel radius is doubled."""
     bench = driving()
     bench.turn_wheels(10.0, 0.0, -10.0)
     bench.run(0.1)
@@ -48,7 +48,7 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """For a goal at 1 m, the scale changes from 1000 to 500 LSB per m."""
+    """For a goal at 1 m, 1000 LSB become 500 LSB when the scale is halved."""
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)

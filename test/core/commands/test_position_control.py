@@ -182,7 +182,7 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """After an event such as a reset, the robot rests. It then reaches a new goal."""
+    """After a reset, for example, the robot rests. A new goal is then reached."""
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -200,7 +200,10 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """A reset of the odometry sends Stop. Zeros in mode 1 would be a goal at the origin."""
+    """The odometry is reset, so the driver sends Stop.
+
+    Zeros in mode 1 would be a goal at the origin.
+    """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
     start = len(bench.written)

@@ -15,7 +15,7 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """The e-stop is sent twice when the port opens, even just after one on the old connection."""
+    """The e-stop is sent when the port opens, even just after an e-stop on the old connection."""
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)
@@ -33,7 +33,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """ES and Stop are sent, both twice. Some firmware does not know ES."""
+    """The e-stop is ES and Stop, because some firmware does not know ES. Both are sent twice."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)

@@ -75,7 +75,7 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """Stop is sent at 20 Hz, for 1 s at rest and otherwise for 5 s."""
+    """Stop is sent at 20 Hz: for 1 s if the robot is seen at rest, otherwise for 5 s."""
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
@@ -119,7 +119,7 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """The zeros before a letter may turn an incomplete frame into a wrong command."""
+    """Zeros precede a letter. They may turn an incomplete frame into a wrong command."""
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.actuator.wrote(packed(b"S"), 1.02)
@@ -234,7 +234,7 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """The events come in random order. A Stop separates two authorities."""
+    """Events come in random order. The driver sends Stop between two authorities."""
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:

@@ -24,7 +24,7 @@ def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
 
 
 def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
-    """10 rad/s at a radius of 29 mm is 20 LSB. A limit scales all wheels by one factor."""
+    """10 rad/s at a radius of 29 mm is 20 LSB. A limit scales all wheels by the same factor."""
     start = len(bench.written)
     bench.session.command_wheels((10.0, -10.0, 0.0), bench.now)
     bench.settle()

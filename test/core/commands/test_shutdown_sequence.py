@@ -75,7 +75,10 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """The driver writes nothing meanwhile. A damaged line could turn any frame into a motion."""
+    """The driver checks that the robot rests, and writes nothing.
+
+    A bad line could make a motion of any frame.
+    """
     bench = driving()
     left(bench)
     assert bench.session.shutdown.fall_silent(bench.now)
@@ -88,10 +91,7 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
 
 
 def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
-    """A byte inserted by the line turns the last Stop of the shutdown into a motion.
-
-    The driver sees that the robot moves, and sends Stop again.
-    """
+    """The line inserts a byte into the last Stop. The robot moves, so Stop is sent again."""
     bench = driving()
     left(bench)
     bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))

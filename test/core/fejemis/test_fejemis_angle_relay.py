@@ -25,18 +25,12 @@ def angles(data: bytes) -> set[float]:
 
 
 def has_a_six_to_the_right(angle_deg: float) -> bool:
-    """Return whether the angle is within 0.5° of one to the right with a digit 6.
-
-    These are −6°, −16° and so on, and −60° to −69°.
-    """
+    """Return whether the angle is within 0.5° of −6°, −16° and so on, or of −60° to −69°."""
     return -69.5 < angle_deg < -59.5 or (angle_deg < 0.0 and 5.5 < -angle_deg % 10 < 6.5)
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """The driver sends most angles in steps of 0.1°.
-
-    It skips an angle if damage to its text would not be noticed. There, the steps are larger.
-    """
+    """The steps are 0.1°, and larger where damage to an angle's text would not be noticed."""
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -44,7 +38,7 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Only an angle to the right with a digit 6 can change. It becomes 0° to 10° to the left."""
+    """Only an angle to the right with a digit 6 can change, into 0° to 10° to the left."""
     across = 0
     for angle_deg in EVERY:
         text = relayed(angle_deg)
@@ -60,10 +54,7 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """Any one or two characters of a line are lost, perhaps of the checksum.
-
-    A board that reads as leniently as possible still reads no other angle.
-    """
+    """Characters of the checksum may be lost too. The board reads as leniently as possible."""
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):
@@ -83,11 +74,7 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """Three characters of a line are lost.
-
-    In less than 1 % of the cases, the board then reads another angle. The numbers are in
-    docs/boards/fejemis.md.
-    """
+    """In less than 1 %, the board reads another angle. docs/boards/fejemis.md has the numbers."""
     chance = random.Random(seed)
     passed = total = 0
     for _ in range(3):
@@ -101,7 +88,7 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """No loss makes an angle beyond 90°, where the inner wheel would be the faster one."""
+    """The inner wheel would be faster only at angles beyond 90°. No loss makes such an angle."""
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
         assert text == b"fwl %d" % angle_deg

@@ -43,10 +43,7 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """The driver writes each setting to the board that uses it, and reads it back.
-
-    After a restart of the board, the driver writes the setting again.
-    """
+    """The driver writes each setting to the board that uses it."""
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
@@ -105,10 +102,7 @@ def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_no
 
 
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
-    """The driver accepts a value when it was read twice alike.
-
-    A single reading is not enough, because one in 99 damaged answers passes its checksum.
-    """
+    """A single reading is not enough: 1 in 99 damaged answers passes its checksum."""
     configuration = Configuration("drive", {})
     for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
         configuration.hear(parse(text))
@@ -221,10 +215,7 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """The line that writes the setting may be lost.
-
-    It is not repeated while the robot is driven.
-    """
+    """The setting's line may be lost. The driver does not repeat this line to a driven robot."""
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)
     bench.open()

@@ -56,10 +56,7 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 
 
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """The commanded angle of a blocked wheel alternates between 0.9 and 1.5 rad.
-
-    These commands do not extend the wheel's time, so the fault is reported.
-    """
+    """Alternating commands of 0.9 and 1.5 rad do not extend the wheel's time."""
     follower = Follower()
     seen = 0
     for n in range(200):
@@ -116,7 +113,7 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
 
-    The second fault needs ~/start.
+    After the second fault, motion is refused until ~/start.
     """
     bench = nominal(
         Simulated(firmware=Firmware(reverse="clamped")), FejemisSettings(allow_reverse=True)

@@ -102,10 +102,7 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
 
 
 def test_a_stream_that_the_firmware_does_not_know_is_told_and_not_asked_for_again() -> None:
-    """The firmware does not know a stream, for example that of the time-of-flight sensor.
-
-    One notice says so, and the driver does not request the stream again.
-    """
+    """The stream is, for example, that of the time-of-flight sensor."""
     bench = nominal()
     del bench.robot.drive._items["tofd"]
     bench.robot.drive.reboot()

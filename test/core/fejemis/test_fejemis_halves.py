@@ -112,7 +112,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """Motion is refused until both ports are open."""
+    """The port of one board disappears. Motion is refused until both ports are open."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -164,7 +164,10 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
-    """``start`` could release a robot that another user has stopped."""
+    """One port leads to another robot.
+
+    ``start`` could release a robot that its user has stopped.
+    """
     bench = Bench(Simulated(ids=ids))
     bench.open()
     bench.run(6.0)
@@ -264,7 +267,7 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """The sensor sets an error bit, and motion is refused while the bit is set."""
+    """The sensor sets an error bit. Motion is refused while the bit is set."""
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -289,10 +292,7 @@ def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """The angle sensor repeats its last angle and reports no error.
-
-    The driver notices the fault when the wheel should turn and its angle does not change.
-    """
+    """The angle sensor repeats its last angle without an error bit."""
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):
@@ -346,7 +346,7 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """The driver remembers which requests each board does not know, by board and not by port."""
+    """Which requests a board does not know is remembered for the board, not for the port."""
     bench = nominal()
     for swapped in (True, False, True):
         bench.close()

@@ -220,10 +220,7 @@ pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
 def test_every_sample_is_given_in_pieces(
     layout: Layout, chance: random.Random, pauses_s: list[float]
 ) -> None:
-    """The lines arrive in small pieces, perhaps more slowly than the board sends them.
-
-    Every sample is found, even if the pieces arrive later and later.
-    """
+    """The pieces are small, and may come more slowly than the board sends them."""
     lines = layout.lines(3.0)
     reads = reads_of_pieces(lines, chance, pauses_s)
     assert_nothing_is_missing(outcome(reads), lines, reads)

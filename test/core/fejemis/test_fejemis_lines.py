@@ -269,7 +269,10 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Of five lines with other decimals, two are lost. Decimals that vary are accepted at once."""
+    """Two lines with a new number of decimals are discarded.
+
+    Decimals that vary are accepted at once.
+    """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")
     assert len(feed(decoder, b"gyro 1.0 2.0 3.0\n" * 5)) == 3

@@ -27,7 +27,7 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
     """Return the motions that the most lenient board with checksums reads from these bytes.
 
-    Numbers are read as C reads them. Missing ones are 0. A checksum may have one digit.
+    Numbers are read as in C. Missing numbers are 0. A checksum may have one digit.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -54,14 +54,14 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The driver must choose digits with which the checksum shows such a loss."""
+    """The driver therefore chooses digits with which the checksum shows such a loss."""
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """A line end may be lost, so another line follows."""
+    """Another line follows each line, because the line end may be lost."""
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -95,9 +95,9 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """Without its end and the next semicolon, ``rc 2 0 0`` may become ``rc 2 0 092``.
+    """The loss of a line end and a semicolon can turn ``rc 2 0 0`` into ``rc 2 0 092``.
 
-    The joined sum fits if the checksum is 02 or 92. An empty line prevents this.
+    The sum fits if the second line has the checksum 02 or 92. An empty line prevents this.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -124,9 +124,9 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front line gives the angle within 0.02°, and a small angle also within 1 %.
+    """The front line's angle is right within 0.02°, and if small within 1 %.
 
-    The drive line gives the outer wheel's speed within 0.6 %.
+    The drive line's speed of the outer wheel is right within 0.6 %.
     """
     if v == w == 0.0:
         return
@@ -152,7 +152,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 
 @pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """The lift line has 60 to 100 % of the requested voltage. Losses give at most 12 V."""
+    """The line has 60 to 100 % of the requested voltage. After a loss, it is at most 12 V."""
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
     said_volts, said_s = motions(data, b"motv", 2)[0]

@@ -64,10 +64,7 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 
 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
-    """The user requests a power off just after ~/start, while ``on`` is still being repeated.
-
-    The driver stops repeating ``on``, because ``on`` would cancel the power off.
-    """
+    """``on`` would cancel the power off, so the driver stops repeating ``on``."""
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -76,9 +73,9 @@ def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
 
 
 def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """A board is silent for a while, so the driver starts it again.
+    """After a silence, the driver starts the board again.
 
-    This does not cancel the power off. Only ~/start by the user cancels it.
+    Only the user's ~/start ends the power off.
     """
     mark = bench.now
     bench.speaks = set()
@@ -103,10 +100,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """The drive board restarts while the port is closed, so the power off is cancelled.
-
-    The driver notices the restart by the board's clock, and accepts motion.
-    """
+    """The driver notices the restart by the board's clock, and accepts motion."""
     bench.run(5.0)
     bench.close()
     bench.speaks = set()
@@ -138,7 +132,7 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
 
 
 def test_a_power_off_without_an_answer_may_still_come() -> None:
-    """The request fails, but the board may obey. Motion is refused until ~/start."""
+    """The request fails, but the board may have obeyed. Motion is refused until ~/start."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()

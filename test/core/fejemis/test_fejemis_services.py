@@ -305,10 +305,7 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """The user loads a configuration while the robot drives. The driver first sends a stop.
-
-    It sends ``eer`` only after the robot had time to stop.
-    """
+    """The driver sends a stop, and ``eer`` only after the robot had time to stop."""
     bench = nominal()
     bench.drive_on()
     mark = bench.now

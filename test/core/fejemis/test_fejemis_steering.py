@@ -139,9 +139,9 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The speed may be wrong by 1.2 % of the outer wheel's speed.
+    """The speed is right within 1.2 % of the outer wheel's speed.
 
-    The turn rate may be wrong by 3 % of it, divided by the track width.
+    The turn rate is right within 3 % of that speed per track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)

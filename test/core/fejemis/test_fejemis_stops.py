@@ -22,7 +22,7 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """The command is set to zero before ``start``: some firmware resumes the old command."""
+    """Before ``start``, the command is set to zero: some firmware resumes the old command."""
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -78,7 +78,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The source -1 proves a pause, even if the e-stop is latched and released."""
+    """The source -1 proves a pause. Latching and releasing the e-stop does not end the pause."""
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -143,7 +143,7 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Of a thousand in a second, twenty are sent. A voltage of 0 is sent at once."""
+    """Of a thousand lines in a second, twenty are sent. A voltage of 0 is sent at once."""
     machine = Machine()
     machine.set_brush(True)
     said: list[tuple[float, bytes]] = []
@@ -163,10 +163,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """A lift voltage waits before it is sent. Its time limit begins when it is sent.
-
-    If a stop comes before that, the voltage is discarded.
-    """
+    """The time limit begins when the voltage is sent. A stop before that discards the voltage."""
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
     machine.due(0.0)

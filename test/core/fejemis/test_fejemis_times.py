@@ -24,10 +24,7 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 
 def late(chance: random.Random) -> float:
-    """Return the delay of a read in s: 0.36 ms on average.
-
-    In 1 % of the reads, it is longer by up to 20 ms.
-    """
+    """Return the delay of a read in s: 0.36 ms on average, and in 1 % up to 20 ms longer."""
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 
@@ -146,10 +143,7 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
-    """For 0.3 s, the lines of the drive board wait. Then all of them arrive in one read.
-
-    Each orientation has the stamp of its IMU sample.
-    """
+    """The drive board's lines wait for 0.3 s, and then arrive in one read."""
     bench = nominal()
     bench.run(3.0)
     waiting = bytearray()
@@ -191,7 +185,7 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """After them, the board's time jumps ahead. A restart would set it back."""
+    """After the lines that waited, the board's time jumps ahead. A restart would set it back."""
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
@@ -245,10 +239,7 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
-    """A read every 100 ms contains ten samples. One line in a hundred is lost or comes twice.
-
-    No published sample has lines of two cycles.
-    """
+    """A read every 100 ms has ten samples. 1 % of the lines is lost or comes twice."""
     bench = numbered()
     chance = random.Random(5)
     times = {"all": 1, "lost": 0, "twice": 2}[kept]

@@ -35,10 +35,7 @@ def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """The left wheel, the centre and the right wheel are at radii of 0.8, 1.0 and 1.2 m.
-
-    At 0.5 rad/s they move at 0.4, 0.5 and 0.6 m/s.
-    """
+    """At 0.5 rad/s, radii of 0.8, 1.0 and 1.2 m give speeds of 0.4, 0.5 and 0.6 m/s."""
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 
 

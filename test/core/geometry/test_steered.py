@@ -65,10 +65,7 @@ def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: B
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """A twist gives the angle and the signed speed of the steered wheel.
-
-    The twist that is computed back from these two is the original one.
-    """
+    """A twist gives the wheel's angle and signed speed, and these give the twist back."""
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)
     speed_mps = math.copysign(speed_mps, wanted.vx_mps) if wanted.vx_mps else speed_mps

@@ -206,10 +206,7 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 
 
 def test_the_figures_count_what_happened() -> None:
-    """The figures count lost frames, restarts and limited commands.
-
-    They also count how often a sensor repeats the same values, which shows that it is stuck.
-    """
+    """Equal readings in a row are counted: they show that a sensor is stuck."""
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)
     assert figures.state == "nominal"

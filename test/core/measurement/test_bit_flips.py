@@ -104,10 +104,7 @@ def begins(data: bytes, kind: bytes) -> int:
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """One bit of one frame is changed. Odom is then wrong by at most 17 mm and 0.052 rad.
-
-    After 1.5 s, it is right again.
-    """
+    """Odom is wrong by at most 17 mm and 0.052 rad. After 1.5 s it is right again."""
     kind, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -128,7 +125,7 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """Errors below 5 m/s² and 0.6 rad/s may be published. All undamaged readings are."""
+    """Readings wrong by less than 5 m/s² and 0.6 rad/s may be published. Undamaged ones must be."""
     _, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)

@@ -74,7 +74,7 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """The jump is the value of a high bit. The ranges are 2 g and 250 °/s."""
+    """The word jumps by the value of a high bit. The ranges are 2 g and 250 °/s."""
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -226,7 +226,7 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """The displacement is accepted if the robot can roll so far in the pause."""
+    """The robot rolls out in the pause, at most as far as it can drive in that time."""
     through = gate()
     through.admit(ahead(), 1.0)
     rolled_out = replace(ahead(0.5), duration_s=None)

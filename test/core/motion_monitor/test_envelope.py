@@ -159,7 +159,10 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """A zero may also be a reversal. Two zeros in a row show that the robot is held."""
+    """A displacement of zero may also be a reversal.
+
+    Only two in a row prove that the robot is held.
+    """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
     assert wind_up.way_m == 0.0

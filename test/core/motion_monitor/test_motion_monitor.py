@@ -89,7 +89,7 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """The 0.3 s begin at 0.05 m/s. A held robot is excused for up to 0.4 s."""
+    """The time counts from 0.05 m/s. A held robot, in contrast, is excused for up to 0.4 s."""
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
     wrong_s = -time_constant_s * math.log(1.0 - 0.05 / speed_mps)
@@ -106,10 +106,7 @@ def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
 def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_s(
     motion: Triple,
 ) -> None:
-    """A person pushes a robot at rest, or the board obeys a command that is not from the driver.
-
-    The monitor finds this within 0.3 s.
-    """
+    """A person pushes the robot, or the board obeys a command that is not from the driver."""
     found_s, fault = first(Drive().move(motion, 1.0))
     assert fault is Fault.UNCOMMANDED
     assert found_s <= 0.28
@@ -222,10 +219,7 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """A robot at rest is pushed, and its controllers wind up.
-
-    At the next command the robot moves back for a moment. The monitor finds no fault.
-    """
+    """The push winds up the controllers. At the next command, the robot moves back for a moment."""
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)
@@ -234,14 +228,14 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """The robot rests and is pushed, so more Stops do not help. Each fault causes a Stop."""
+    """Each fault causes a Stop. A robot at rest has obeyed Stop, so more Stops do not help."""
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """The robot has missed Stop, but may receive a later one. Each fault causes a Stop."""
+    """Each fault causes a Stop. The robot has missed Stop, but may receive a later Stop."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)

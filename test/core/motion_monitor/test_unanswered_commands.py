@@ -98,7 +98,7 @@ def test_in_imu_only_mode_nothing_is_found() -> None:
 
 
 def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
-    """The deltas still show that the robot moves, so Stop is sent again."""
+    """The robot has missed the first Stops. Its deltas show motion, so Stop is sent again."""
     bench.hears = False
     bench.run(20.0)
     assert not bench.still()

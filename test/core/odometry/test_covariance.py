@@ -122,7 +122,10 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """The deviation of the yaw grows tenfold from 1 m to 10 m. After the way back it is zero."""
+    """From 1 m to 10 m, the standard deviation of the yaw grows tenfold.
+
+    After the way back it is zero.
+    """
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
     odometry = Odometry(OdometrySettings(noise=noise))
@@ -139,7 +142,7 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
     """Wheel sizes are wrong by 1 %, and wheels slip by 2 %.
 
-    The mean normalised squared error of 40 drives is 2.29 to 3.80 in 95 % (chi-squared of 120).
+    2.29 to 3.80: the 95 % range of a chi-squared of 120, divided by 40 drives.
     """
     total = 0.0
     for seed in range(40):

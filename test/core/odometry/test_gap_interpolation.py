@@ -16,10 +16,7 @@ def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> Displa
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Four displacements are missing between one at 0.5 m/s and one at 1 m/s.
-
-    The missing ones are replaced by displacements at the mean speed, 0.75 m/s.
-    """
+    """Between 0.5 m/s and 1 m/s, four displacements of 0.75 m/s are filled in."""
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)
@@ -28,10 +25,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """Ten seconds of displacements are missing, but only two seconds are filled in.
-
-    This is enough, because the driver stops a robot that is silent for longer.
-    """
+    """Of ten seconds, two are filled in. The driver stops a robot that is silent for longer."""
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)

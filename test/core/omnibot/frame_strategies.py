@@ -34,7 +34,7 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    Poses are at most 1e7, in mm or mrad. An acceleration of -6 needs at least 0.5 g in all.
+    Poses are at most 1e7, in mm or mrad. An acceleration of -6 needs 0.5 g in all.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

@@ -2,7 +2,7 @@
 
 """Tests that an IMU frame is returned with the packet that completes it, with any adapter.
 
-Its last byte may look like a header. The arrival times show that no frame is due yet.
+An IMU frame may end like a header. The arrival times show that no frame is due yet.
 """
 
 from collections.abc import Callable, Iterator
@@ -32,7 +32,7 @@ Handed = Iterator[tuple[float, bytes]]
 def ticks() -> Iterator[tuple[float, bytes]]:
     """Yield the time in s and the bytes of each tick of a robot at rest.
 
-    The robot's gyro often gives -1, whose bytes look like a header.
+    The gyro often gives -1, whose bytes look like a header.
     """
     board = SimulatedBoard(BoardSettings(seed=1, running=True))
     for tick in range(TICKS):

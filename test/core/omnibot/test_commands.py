@@ -132,7 +132,7 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A 16-bit word ends at 32.77 m or rad. A limited goal would be another place."""
+    """A 16-bit word ends at 32.77 m or rad. A goal that is only limited would be another place."""
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
@@ -188,7 +188,10 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Rounding changes 0.5 LSB. A byte that the driver avoids changes up to 1.5 LSB."""
+    """Rounding changes a word by 0.5 LSB.
+
+    Avoiding a harmful byte changes a word by up to 1.5 LSB.
+    """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)
     assert found.vx_mps == pytest.approx(twist.vx_mps, abs=1.51 / 70)

@@ -105,7 +105,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """At most 1 in 30 inserted bytes makes one, from a gyro value that looks like a header."""
+    """At most 1 in 30 inserted bytes makes a false frame: a gyro value looks like a header."""
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]

@@ -2,8 +2,7 @@
 
 """Fuzz tests of the decoder, with any bytes, at any times, in any chunks.
 
-The work must grow in proportion to the bytes. ``test/integrity`` measures how rarely a damaged
-stream gives a wrong frame.
+``test/integrity`` measures how rarely a damaged stream gives a wrong frame.
 """
 
 from typing import Any
@@ -28,7 +27,7 @@ times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
     """Check that ``stream`` contains the frames of ``found`` in order.
 
-    Frames are compared as text, because a pose may contain NaN, which is not equal to itself.
+    Frames are compared as text: a NaN of a pose is not equal to itself.
     """
     at = 0
     for frame in found:
@@ -78,7 +77,10 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """A calm frame fits the one before it. It waits only if its last byte may begin a header."""
+    """A calm frame fits the one before it.
+
+    Only a last byte that may begin a header makes it wait.
+    """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
     for number, frame in enumerate(frames, 1):
@@ -92,10 +94,7 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """In free fall, below 0.5 g, an acceleration of -6 has the bytes of an IMU header.
-
-    Only an IMU frame with that value is lost.
-    """
+    """Below 0.5 g, an acceleration of -6 has the bytes of an IMU header."""
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
     assert found.count(fall) == (word != -6)
@@ -127,7 +126,7 @@ def work(
 ) -> tuple[list[int], int]:
     """Return the work up to the end of each chunk, beginning with 0, and the most bytes held.
 
-    Its unit is an examined byte, or an edge of the trellis.
+    Its unit is an examined byte or trellis edge.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 

@@ -179,10 +179,7 @@ def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
 
 @pytest.mark.parametrize("period_s", [period_s for period_s in DELTA_PERIODS_S if period_s >= 0.04])
 def test_a_restart_shows_in_the_count(period_s: float) -> None:
-    """After a gap of 1.5 s, a delta has the count 1. A board that ran on could not have this count.
-
-    So the board has restarted.
-    """
+    """After a gap of 1.5 s, a board that ran on could not have the count 1."""
     sequence = Sequence(Schedule(period_s))
     for count in range(100):
         sequence.delta(count, count * period_s)

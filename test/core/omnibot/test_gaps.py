@@ -20,7 +20,7 @@ from omnibot_driver.core.omnibot.gaps import InterFrameGaps
 def test_bytes_of_a_slow_line_take_longer(baudrate: int, pause_s: float, idle: bool) -> None:
     """24 bytes take 2.08 ms at 115200 baud and 6.25 ms at 38400 baud.
 
-    On an idle line, a read comes at least 4 ms later than that.
+    If the line was idle, the read is at least 4 ms later.
     """
     pauses = InterFrameGaps(10 / baudrate)
     pauses.read(pause_s, 24, 5, now=1.0)

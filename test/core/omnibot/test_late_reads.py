@@ -38,7 +38,7 @@ def stopped(
 ) -> Reads:
     """Yield the reads of a reader that stops once, for ``stop_s``, after ``place`` bytes.
 
-    ``most``: the largest number of bytes in a read.
+    ``most``: maximum bytes in a read.
 
     ``piece``: bytes in each read before the stop.
     """
@@ -161,7 +161,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """The two parts of different frames are as long as one frame. Only the pause shows the cut."""
+    """Parts of two frames have the length of one frame.
+
+    Only the pause between the parts shows this.
+    """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):
         hurt = [*ticks[:50], ticks[50][:cut], b"", ticks[52][cut:], *ticks[53:]]

@@ -57,9 +57,9 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """Two seconds after a delta, a delta with the count 0 comes.
+    """A delta has the count 0 two seconds after the last delta.
 
-    A continued count would not be 0 at this time. So the board has restarted.
+    A continued count would not be 0.
     """
     assert begun(count).delta(0, 102.0).restarted
 
@@ -70,7 +70,7 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
-    """The serial line is unplugged for minutes, and the board's clock is wrong by 1 %."""
+    """The serial line is unplugged for minutes. The board's clock is wrong by 1 %."""
     sequence = begun(100)
     passed = round(elapsed_s / 0.04 * (1 + drift))
     step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
@@ -81,10 +81,7 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """The board's clock is 1 % fast. In 120 s it sends 30 more deltas than the time suggests.
-
-    The 3029 lost deltas are counted correctly.
-    """
+    """A clock that is 1 % fast gives 30 more deltas in 120 s."""
     sequence = Sequence()
     sequence.delta(100, 0.0)
     assert sequence.delta((100 + 3030) % 256, 120.0) == Step(3029)
@@ -155,7 +152,7 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """Lost poses would have needed more time to wrap the counter. No delta counts as lost."""
+    """If poses had been lost, the counter would have needed more time to wrap."""
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -187,7 +184,7 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """The host's clock stood still while 100 deltas were lost."""
+    """While the host's clock stood still, 100 deltas were lost."""
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
@@ -206,9 +203,9 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """The pose shows one lost delta.
+    """The decoder may have held a pose that shows a lost delta.
 
-    The decoder may hold the pose, so the next delta comes at once.
+    The next delta then comes at once.
     """
     sequence = Sequence()
     for count in range(11):
@@ -223,7 +220,7 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """After 3 s of silence, a continued count would not be 0."""
+    """A delta has the count 0 after 3 s of silence. A continued count would not be 0."""
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

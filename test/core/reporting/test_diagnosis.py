@@ -187,7 +187,10 @@ def test_a_count_that_begins_anew_has_not_grown() -> None:
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """The status is OK if nothing is lost. If the rates are wrong, it names the busy computer."""
+    """If nothing is lost, the status is OK.
+
+    If the rates are wrong, the status names the busy computer.
+    """
     robot = Robot()
     for second in range(12):
         robot.connect(waited_s=0.3 * second)
