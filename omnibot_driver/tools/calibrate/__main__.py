@@ -22,10 +22,9 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
     """Run the subcommand; return the exit code.
 
-    The code is 0 on success, 1 on failure, 2 on wrong usage, and 130 when interrupted. After a
-    failure, stderr shows the reason.
+    0: success, 1: failure, 2: wrong usage, 130: interrupted.
 
-    ``read``: a function that asks the user a question and returns the answer.
+    ``read``: asks the user a question and returns the answer.
     """
     given = list(sys.argv[1:] if argv is None else argv)
     own, ros = split_ros_arguments(given)

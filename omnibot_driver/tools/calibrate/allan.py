@@ -2,9 +2,8 @@
 
 """The Allan deviation of a sensor at rest, and the noise terms that fit it.
 
-The overlapping estimator is that of NIST Special Publication 1065. The noise terms and the standard
-deviation of an estimate are those of IEEE Std 952-1997, annex C. This module knows readings and
-their period; it does not know the sensor.
+Sources: NIST Special Publication 1065 and IEEE Std 952-1997, annex C. This module knows readings
+and their period; it does not know the sensor.
 """
 
 from dataclasses import dataclass
@@ -16,10 +15,9 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Least number of averages from which the tool computes an Allan deviation.
+"""Least number of averages in an Allan deviation, each over one averaging time.
 
-Each average is the mean of the readings over one averaging time. So the longest averaging time is
-one ninth of the recorded time.
+So the longest averaging time is one ninth of the record.
 """
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
@@ -28,13 +26,9 @@ WALK_FROM_S: Final = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Allan:
-    """Allan deviations for several averaging times. All arrays have the shape (n,).
+    """Allan deviations in the unit of the readings, by averaging time in s. Shapes: (n,).
 
-    ``tau_s``: averaging times, in s.
-
-    ``deviation``: Allan deviations, in the unit of the readings.
-
-    ``sigma``: standard deviations of these Allan deviations.
+    ``sigma``: standard deviation of ``deviation``.
     """
 
     tau_s: Column
@@ -46,9 +40,7 @@ class Allan:
 class Noise:
     """Noise terms of a sensor whose readings have the unit U.
 
-    ``density``: density of the white noise, in U/√Hz.
-
-    ``sigma``: standard deviation of ``density``.
+    ``density``: white noise, in U/√Hz. ``sigma`` is its standard deviation.
 
     ``instability``: bias instability (flicker noise), in U.
 

@@ -33,10 +33,9 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""What each subcommand needs: names of parameters, and a text for the error message.
+"""What each subcommand needs: one of these parameters of the driver.
 
-The driver must have at least one of these parameters. Otherwise the board lacks what the subcommand
-needs. The text names what is missing.
+The text is for the error message: it names what the board lacks.
 """
 
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A ROS client that finds the running driver, uses its parameters and calls its services.
+"""A ROS client of the running driver: its parameters and its services.
 
 This module knows parameters and services; it does not know how the robot moves.
 """
@@ -31,9 +31,7 @@ class Client:
 
     ``driver``: the full name of the driver's node.
 
-    ``parameters``: the values of the driver's parameters, by name.
-
-    ``table``: the descriptions of these parameters.
+    ``parameters``, ``table``: values and descriptions of its parameters, by name.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -132,8 +130,7 @@ class Client:
     def call(self, service: str, on: bool | None = None) -> str:
         """Call a service of the driver; return the message in its response.
 
-        ``on``: the data for a service of type SetBool, or None for a service of type Trigger.
-        Raises ToolError if the driver reports a failure.
+        ``on``: for SetBool; None for Trigger. Raises ToolError if the driver reports a failure.
         """
         kind = Trigger if on is None else SetBool
         request = Trigger.Request() if on is None else SetBool.Request(data=on)

@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate commission``: a guided procedure that finds how motors and IMU are oriented.
+"""``calibrate commission``: guide the user to find how motors and IMU are oriented.
 
-Where the board's data are sufficient, the procedure uses only these data. For the rest, it asks the
-user in which directions the wheels turn. It also asks the user to hold the robot in several
-postures. If an answer contradicts the command or another answer, the procedure explains why, and
-repeats the question.
+The user moves the robot and answers questions where the board's data do not suffice. A
+contradiction is explained, and the question is repeated.
 """
 
 import argparse
@@ -148,7 +146,7 @@ class Walk:
     def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
         """Return the motions in the slow and in the fast drive, and the control method.
 
-        ``slow_mps``: commanded speed of the slow drive. The fast drive has twice this speed.
+        The fast drive has twice the speed ``slow_mps``.
         """
         for _ in range(TRIES):
             log = self._drive(
@@ -272,10 +270,10 @@ class Walk:
     # Common to all parts
 
     def _until_possible(self, find: Callable[[], T]) -> T:
-        """Call ``find`` until it succeeds, at most ``TRIES`` times; return its result.
+        """Call ``find`` until it succeeds; return its result.
 
-        ``find`` raises Contradiction if an answer or a measurement cannot be right. If the last try
-        fails too, this method raises ToolError.
+        ``find`` raises Contradiction for an impossible answer or measurement. Raises ToolError
+        after ``TRIES`` failures.
         """
         for _ in range(TRIES):
             try:
@@ -304,6 +302,6 @@ class Walk:
 def _understand(answer: str) -> tuple[int, ...] | None:
     """Return the pattern in the user's answer; None if the answer is not valid.
 
-    The pattern is empty if the answer is ``r``, by which the user asks to see the motion again.
+    An empty pattern means ``r``: show the motion again.
     """
     return () if answer == "r" else understand(answer)

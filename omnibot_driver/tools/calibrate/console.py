@@ -24,10 +24,9 @@ PLAIN_WIDTH: Final = 100
 class Console:
     """The dialogue with the user on a terminal.
 
-    ``yes``: whether every yes-or-no question is answered with yes. The user must still enter
-    numbers, because only the user knows them.
+    ``yes``: answer every yes-or-no question with yes. The user still enters numbers.
 
-    ``read``: a function that asks a question and returns the answer. Tests replace it.
+    ``read``: asks a question and returns the answer. Tests replace it.
     """
 
     def __init__(
@@ -77,8 +76,7 @@ class Console:
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
         """Ask until ``understand`` accepts the answer; return what ``understand`` returned.
 
-        ``understand`` returns None for an answer that it does not accept. The tool then prints
-        ``otherwise`` and asks again.
+        None means not accepted. The tool then prints ``otherwise`` and asks again.
         """
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)

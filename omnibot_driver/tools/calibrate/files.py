@@ -19,13 +19,9 @@ PICTURES = (".png", ".svg", ".pdf")
 
 
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
-    """Return the path of the file to which the tool saves the result.
+    """Return the path of the result: ``given``, else ``drivers``, else ``DEFAULT``.
 
-    The path is the first of these that is not empty:
-
-    - ``given``, the user's choice
-    - ``drivers``, the driver's calibration file
-    - ``DEFAULT``, a file in the current folder
+    ``drivers``: the driver's calibration file.
 
     Raises ToolError if the file cannot be written, or is not a calibration file.
     """
@@ -45,10 +41,9 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 
 
 def picture_file(given: str | None, subcommand: str) -> Path:
-    """Return the path of the picture.
+    """Return the path of the picture, by default ``calibrate_<subcommand>.png``.
 
-    If ``given`` is a folder, the picture is the file ``calibrate_<subcommand>.png`` in this folder.
-    If ``given`` is None, the picture is the file of that name in the current folder.
+    ``given``: a file, a folder, or None for the current folder.
 
     Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """

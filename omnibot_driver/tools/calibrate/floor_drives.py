@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Drives on the floor, each of which the user measures with a tape.
+"""Drives on the floor that the user measures with a tape.
 
-This module knows how to run a drive and how to ask the user; it does not know what is computed from
-the drives.
+This module knows drives and questions; it does not know what is computed from them.
 """
 
 import argparse
@@ -39,10 +38,7 @@ def measured(
 ) -> list[Measured]:
     """Run each drive and let the user measure it; return the measurements.
 
-    ``go``: a function that runs a drive and returns the poses of the robot by the odometry.
-
-    ``measure``: a function that asks the user for a measurement and returns it. Its arguments are
-    the drive and these poses.
+    ``go``: runs a drive; returns its odometry poses. ``measure``: asks the user about them.
 
     Raises ToolError if the user does not confirm that there is room, or if a drive fails.
     """
@@ -86,9 +82,7 @@ def driven(
 ) -> Column:
     """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``: size of the whole turn from start to end.
-
-    ``seconds``: expected duration.
+    ``turn_rad``: size of the whole turn. ``seconds``: expected duration.
 
     Raises ToolError if the drive fails.
     """
@@ -109,9 +103,9 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask how far the robot has turned past the mark on the floor; return this angle in rad.
+    """Ask how far the robot's front has turned past the mark on the floor; return it in rad.
 
-    The mark shows where the robot's front should point. The angle is positive to the left.
+    Positive to the left.
     """
     return math.radians(
         console.number(

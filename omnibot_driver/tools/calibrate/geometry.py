@@ -63,14 +63,10 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 
 
 def believed(now: Mapping[str, Any]) -> dict[str, float]:
-    """Return the sizes in m and the scales from which ``odom`` is computed, by parameter name.
-
-    If the board sends wheel counts, the driver computes the odometry from its own parameters for
-    the sizes. If not, the board computes the odometry from the manual's sizes, and the driver
-    scales the result.
-    """
+    """Return the sizes in m and the scales from which ``odom`` is computed, by parameter name."""
     if now["delta_frame"] == "wheel_counts":
         return {name: now[name] for name in ("wheel_radius", "base_radius")}
+    # The board computes the odometry from the manual's sizes, and the driver scales the result.
     linear, angular = now["odom_linear_scale"], now["odom_angular_scale"]
     nominal = boards.load(now["board"]).PARAMETERS.by_name
     wheel_m, base_m = (nominal[name].default for name in ("wheel_radius", "base_radius"))
@@ -191,9 +187,8 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    An error is the distance from the end by the tape to the end by the odometry. The first value is
-    for the driver's present geometry, the second value for ``found``. Differences between the
-    wheels in ``found`` are not used, because the driver has one radius for all wheels.
+    First with the present geometry, then with ``found``. Both use one radius for all wheels, as the
+    driver does.
     """
     before: list[float] = []
     after: list[float] = []

@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 def draw(
     figure: "Figure", readings: Sequence[Reading], found: Geometry, base_radius_m: float
 ) -> None:
-    """Draw the path of each drive with the old and with the new geometry, and its measured end.
+    """Draw each drive's path with the old and with the new geometry, and its measured end.
 
-    Beside the paths, draw the errors of the odometry with both geometries. The unit of these errors
-    is the standard deviation of the reading.
+    Beside the paths, draw the errors, in standard deviations of the reading.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

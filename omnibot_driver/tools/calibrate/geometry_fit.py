@@ -2,12 +2,8 @@
 
 """Fit the robot's geometry to drives whose ends the user measured with a tape.
 
-The module converts each path of the odometry to the distances that the wheels rolled. From these
-distances, it computes the path again with other radii of the wheels and of the base. It varies the
-radii until the ends of the paths fit the tape. The drives can be any mixture of lines, turns and
-squares that determines the radii. The method is that of J. Borenstein and L. Feng, "UMBmark: a
-benchmark test for measuring odometry errors in mobile robots" (1995), extended to three wheels.
-This module knows paths and readings; it does not know how the robot was driven.
+Method: J. Borenstein and L. Feng, "UMBmark" (1995), extended to three wheels. This module knows
+paths and readings; it does not know how the robot was driven.
 """
 
 import math
@@ -34,14 +30,11 @@ If the error is larger, the readings are regarded as wrong.
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One drive with the user's measurement.
+    """One drive with the user's measurement. Units are m, m and unwrapped rad.
 
-    ``path``: poses of the odometry, (n, 3), in m, m and rad. The robot is at rest at the last pose.
+    ``path``: odometry poses, (n, 3), until the robot is at rest.
 
-    ``end``: the true pose at the end relative to the start, (3,), in m, m and unwrapped rad. A
-    value that was not measured is NaN.
-
-    ``sigma``: standard deviations of ``end``, (3,).
+    ``end``, ``sigma``: the true end relative to the start, (3,). NaN if not measured.
     """
 
     name: str
@@ -54,13 +47,9 @@ class Reading:
 class Geometry:
     """The robot's sizes, as ratios to the assumed sizes.
 
-    ``wheels``: ratio of the mean radius of the wheels.
-
-    ``base``: ratio of the base radius.
-
     ``unlike``: relative difference of each wheel's radius from the mean, (3,).
 
-    ``covariance``: (4, 4), for ``wheels``, ``base`` and the first two elements of ``unlike``.
+    ``covariance``: (4, 4), of ``wheels``, ``base`` and the first two of ``unlike``.
 
     ``excess``: ratio of the residuals to the expected residuals, at least 1.
     """
@@ -92,12 +81,9 @@ class Geometry:
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
     """Return the geometry that explains the readings best.
 
-    ``base_radius_m``: the assumed base radius.
+    ``drift``: standard deviation of a wheel's distance of 1 m by slip, in m.
 
-    ``drift``: standard deviation in m that slip causes in a wheel's distance of 1 m.
-
-    Raises ToolError if the fit fails, or if a radius differs from the assumed radius by more than
-    ``UNKNOWN``.
+    Raises ToolError if the fit fails, or if a radius is off by more than ``UNKNOWN``.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -126,18 +112,13 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the poses, (n, 3), that result from the same wheel rotations with other radii.
+    """Return the poses, (n, 3), of the same wheel rotations with other radii.
 
-    The new path begins at the origin.
+    ``path``: poses by the assumed radii. The new path begins at the origin.
 
-    ``path``: the path that was computed with the assumed radii.
+    ``factors``: new/assumed radius of each wheel, (3,), or of each step, (n - 1, 3).
 
-    ``factors``: ratio of the new to the assumed radius for each wheel, (3,). The ratios may also
-    differ from step to step, (n - 1, 3).
-
-    ``base``: ratio of the new to the assumed base radius.
-
-    ``base_radius_m``: the assumed base radius.
+    ``base``: new/assumed base radius.
     """
     rims = rims_of(path, base_radius_m) * factors
     body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T

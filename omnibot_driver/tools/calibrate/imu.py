@@ -60,9 +60,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 def result(found: Rest, imu: Imu, now: dict[str, Any], gravity_mps2: float) -> Result:
     """Return the result to show and to save.
 
-    ``found``: the evaluation of the IMU at rest.
-
-    ``imu``: the readings, without the driver's corrections of the biases.
+    ``imu``: the readings without the driver's correction of the biases.
 
     ``now``: the driver's parameters before the calibration.
     """

@@ -2,10 +2,8 @@
 
 """The reaction to Ctrl-C, to a lost SSH session and to kill.
 
-When such a signal arrives, the program notes it. The next call of ``check`` raises Interrupted. The
-signal itself does not raise an exception, because an exception inside ROS could leave the executor
-in an undefined state. In one case a signal raises Interrupted at once: while the program waits for
-the user's answer.
+A signal is noted, and the next ``check`` raises Interrupted. Only a question to the user is
+interrupted at once.
 """
 
 import signal
@@ -76,6 +74,7 @@ class Interruption:
         return ask
 
     def _heard(self, _number: int, _frame: FrameType | None) -> None:
+        # An exception inside ROS could leave the executor in an undefined state.
         self._requested = True
         if self._asking:
             self.check()

@@ -2,8 +2,8 @@
 
 """A log of the robot's data and commands during one motion or one rest.
 
-Times are in seconds of ROS's clock. The time of a measurement is its sampling time. This module
-knows rows and columns of numbers; it does not know ROS.
+Times are sampling times in s, by ROS's clock. This module knows rows and columns of numbers; it
+does not know ROS.
 """
 
 from collections.abc import Sequence
@@ -30,11 +30,11 @@ class Imu:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """The poses and velocities that the driver published.
+    """The odometry that the driver published. Both arrays have the shape (n, 3).
 
-    ``pose``: (n, 3), in m, m and unwrapped rad.
+    ``pose``: m, m and unwrapped rad.
 
-    ``twist``: velocities in the body's axes, (n, 3), in m/s, m/s and rad/s.
+    ``twist``: in the body's axes, m/s, m/s and rad/s.
     """
 
     stamp_s: Column

@@ -2,8 +2,8 @@
 
 """Find how the board interprets commands, and in which frame it reports odometry deltas.
 
-Only the odometry is used: no observer and no measured distance are needed. The signs and scales of
-the odometry may be wrong. This module knows odometry; it does not know how the robot is moved.
+The signs and scales of the odometry may still be wrong. This module knows odometry; it does not
+know how the robot is moved.
 """
 
 import math
@@ -21,23 +21,19 @@ STANDS_PART: Final = 0.1
 """Up to this fraction of the commanded speed, the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
-"""The robot is regarded as stopping if its speed has decreased to this fraction or less.
+"""Largest ratio of late to early speed at which the robot is regarded as stopping.
 
-The speed in the second half of a drive is compared with that in the first half.
+Early and late: the two halves of a drive.
 """
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
-"""Ratios of the speeds with two commands, the second of which is twice the first.
+"""Limits of the speed ratio when the command doubles. They allow for friction and rounding.
 
-``DOUBLED``: range of ratios that mean that the speed has doubled.
-
-``UNCHANGED``: largest ratio that means that both speeds are equal.
-
-Both allow for friction and rounding.
+``DOUBLED``: the speed has doubled. ``UNCHANGED``: largest ratio of equal speeds.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
 
-The ratio is 0 if the driver interprets the odometry deltas correctly. Otherwise it is 2 or more.
+0 if the deltas are interpreted correctly, otherwise 2 or more.
 """
 ALIKE: Final = 0.35
 """Two angles are regarded as equal if they differ by at most this fraction of the robot's turn."""
@@ -50,7 +46,7 @@ LEAST_M: Final = 1e-3
 class Drift:
     """Mean velocity of the robot over a time span, by the odometry, in the body's axes.
 
-    ``early_mps``, ``late_mps``: speeds in the first and in the second half of the time span.
+    ``early_mps``, ``late_mps``: speeds in the two halves of the span.
     """
 
     vx_mps: float
@@ -91,20 +87,13 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod | None:
-    """Return whether the board controls velocity or position, from the motion with two commands.
+    """Return how the board interprets commands, from motions at ``slow_mps`` and at twice that.
 
-    ``slow``: the motion with the command for ``slow_mps``.
-
-    ``fast``: the motion with twice that command.
-
-    In velocity control the speed is constant, and doubles with the command. In positional control
-    the command is a position a few millimetres from the origin of the board's frame. Either the
-    robot has reached this position and stopped, or it is still driving there. While it drives, its
-    speed is the same with both commands.
-
-    Returns None if the motion fits neither control method. This happens, for example, if a busy
-    computer delays the commands.
+    None if the motions fit neither method, e.g. because a busy computer delayed commands.
     """
+    # In velocity control the speed is constant, and doubles with the command. In positional control
+    # the command is a position a few mm away. The robot stops there, or still drives there at a
+    # speed that both commands share.
     both = slow, fast
     if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):
         return "position"
@@ -124,10 +113,9 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     """Return whether the frame of the odometry deltas is set correctly, "earth" or "body".
 
-    ``before``, ``after``: motions with the same command, before and after a turn by ``turned_rad``.
+    ``before``, ``after``: the same command before and after a turn by ``turned_rad``.
 
-    With the correct frame, both motions have the same direction in the body's axes. With the wrong
-    frame, the directions differ by the angle of the turn. Raises ToolError if neither is the case.
+    Raises ToolError if neither frame fits.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

@@ -2,8 +2,7 @@
 
 """Motions of a calibration: control laws, their bounds, and a check that the robot follows.
 
-A law computes the command from the time and from the pose by the odometry. This module knows
-commands and poses; it does not know ROS.
+This module knows commands and poses; it does not know ROS.
 """
 
 import math
@@ -20,51 +19,40 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A control law: a function of the time in s and of the pose, both relative to the start.
+"""A control law: the command by the time in s and the pose, both since the start.
 
-The yaw of the pose is unwrapped. The function returns the command, or None to end the motion. A
-command for ``cmd_vel`` is in m/s, m/s and rad/s. A command for ``wheel_cmd`` has the rates of
-wheels A, B and C in rad/s.
+None ends the motion. ``cmd_vel``: m/s, m/s, rad/s. ``wheel_cmd``: rad/s of wheels A, B, C. The yaw
+is unwrapped.
 """
 
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""Time, in s, that replaces ``LOOK_S`` if the board measures its motion only rarely.
+"""``LOOK_S`` for a board that measures its motion only rarely, in s.
 
-On such a board, a part of the odometry is only predicted, so the comparison needs a longer time.
+Between measurements, the odometry is only predicted.
 """
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
 SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
-"""Limits of speed, for each topic, below which the tool does not check that the robot moves.
+"""Speeds below which the tool does not check that the robot moves, because of friction.
 
-The first limit is for linear motion, the second limit for turns. At lower speeds, friction may hold
-the robot. The units are m/s and rad/s for ``cmd_vel``, and rad/s of a wheel for ``wheel_cmd``.
+Linear, turning: in m/s and rad/s, or both in rad/s of a wheel.
 """
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bounds:
-    """Limits of one motion.
+    """Limits of one motion. For ``wheel_cmd``, rad/s of a wheel replaces m/s.
 
-    ``speed``: largest commanded speed, in m/s. For ``wheel_cmd``, the largest rate of a wheel, in
-    rad/s.
+    ``speed``, ``turning``: largest commands, in m/s and rad/s.
 
-    ``turning``: largest commanded yaw rate, in rad/s.
-
-    ``way``, ``turn``: largest distance in m and largest turn in rad from the start, by the
-    odometry.
+    ``way``, ``turn``: largest distance and turn by the odometry, in m and rad.
 
     ``seconds``: longest duration.
 
-    ``acceleration``: largest change of the commanded speed per s, in m/s². For ``wheel_cmd``, the
-    largest change of a wheel's rate per s, in rad/s².
-
-    ``angular_acceleration``: largest change of the commanded yaw rate per s, in rad/s².
-
-    If an acceleration is infinite, its part of the command changes at once.
+    ``acceleration``, ``angular_acceleration``: in m/s² and rad/s². Infinite: no ramp.
     """
 
     speed: float
@@ -109,10 +97,9 @@ class Bounds:
         )
 
     def approach(self, topic: Topic, now: Vector3, wanted: Vector3, seconds: float) -> Vector3:
-        """Return the next command on a ramp from the command ``now`` to the command ``wanted``.
+        """Return the next command on a ramp from ``now`` to ``wanted``.
 
-        ``seconds``: time since ``now`` was sent. The change in this time does not exceed the
-        acceleration.
+        ``seconds``: time since ``now`` was sent.
         """
         if topic == "wheel_cmd":
             a, b, c = _step(now, wanted, self.acceleration * seconds)
@@ -139,9 +126,7 @@ class Obedience:
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
         """Raise ToolError if the robot was commanded to move for some time, but has not moved.
 
-        ``seconds``: time since the last call.
-
-        ``measured``: measured velocity, in the units of ``command``.
+        ``seconds``: since the last call. ``measured``: in the units of ``command``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

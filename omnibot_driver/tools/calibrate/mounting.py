@@ -2,14 +2,8 @@
 
 """Find how the IMU is mounted, from gravity in three postures of the robot.
 
-The postures are level, front raised and left side raised. In each posture, the sensor measures the
-upward direction in its own axes. A tilt is the angle between two such directions: in the level
-posture and in another posture. From the tilts, the upward directions in the body's axes are
-computed. The mounting is the rotation that fits the measured to the computed directions best
-(Wahba's problem, solved by a singular value decomposition). Finally, a turn to the left shows
-whether gyro and gravity agree.
-
-This module knows IMU readings; it does not know who holds the robot.
+Postures: level, front raised, left side raised. A turn to the left shows whether gyro and gravity
+agree. This module knows IMU readings; it does not know who holds the robot.
 """
 
 import math
@@ -35,9 +29,9 @@ SQUARE_RAD: Final = math.radians(35)
 """Largest accepted deviation from a right angle of the angle between the two tilts, in rad."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest angle, in rad, by which the tool rotates a mounting to make it right-angled.
+"""Largest rotation, in rad, that makes a mounting right-angled.
 
-In a right-angled mounting, each axis of the IMU is parallel to an axis of the body.
+Right-angled: each axis of the IMU is parallel to an axis of the body.
 """
 HAND_RAD: Final = math.radians(2)
 """Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
@@ -49,12 +43,9 @@ LEVEL_WEIGHT: Final = 20.0
 class Mounting:
     """The mounting of the IMU on the robot.
 
-    ``rotation``: the matrix that converts from the sensor's axes to the body's axes.
+    ``rotation``: converts from the sensor's axes to the body's axes.
 
-    ``yaw_sigma_rad``: standard deviation of the yaw. The yaw depends on the tilts, which the user
-    makes by hand.
-
-    ``tilts_rad``: the two angles by which the user tilted the robot.
+    ``yaw_sigma_rad``: the yaw depends on how exactly the user tilts the robot.
     """
 
     rotation: Array
@@ -103,10 +94,10 @@ def bias(imu: Imu) -> Array:
 
 
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
-    """Return the mounting from the upward directions in the three postures.
+    """Return the mounting from "up" in three postures, as unit vectors in the sensor's axes.
 
-    The directions are unit vectors in the sensor's axes. Raises Contradiction if a tilt is too
-    small or too large, or if the two tilts are not at a right angle.
+    Raises Contradiction if a tilt is too small or too large, or if the tilts are not at a right
+    angle.
     """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)
@@ -116,6 +107,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
             f"the angle between the two tilts is {math.degrees(square_rad):.0f}° instead of 90°:"
             " repeat both tilts"
         )
+    # "Up" in the body's axes, as it follows from the two tilts.
     body = np.array(
         [
             (0.0, 0.0, 1.0),
@@ -124,6 +116,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
         ]
     )
     weights = np.diag([LEVEL_WEIGHT, 1.0, 1.0])
+    # Wahba's problem: find the rotation from the measured to the computed directions.
     u, _, vt = np.linalg.svd(body.T @ weights @ np.array([level, nose_up, left_up]))
     rotation = u @ vt  # no mirror image: both sets of directions are right-handed
     sigma_rad = math.hypot(abs(square_rad - math.pi / 2) / math.sqrt(2), HAND_RAD)
@@ -131,11 +124,9 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
 
 
 def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
-    """Return the angle by which the user has turned the robot to the left, in rad.
+    """Return the angle, in rad, by which the user has turned the robot to the left.
 
-    ``bias_radps``: the gyro's bias.
-
-    ``level``: the upward direction in the sensor's axes.
+    ``level``: "up" in the sensor's axes.
 
     Raises Contradiction if the turn is too small, or to the right.
     """

@@ -2,9 +2,8 @@
 
 """``calibrate geometry`` and ``calibrate scale`` for a base that only drives straight and turns.
 
-The user measures each drive with a tape. The result is the scales of the odometry. If the driver
-has the parameter ``metres_per_count``, the result is the distance per encoder count instead. This
-module knows drives and readings; it does not know the wheels of the base.
+The result is ``metres_per_count`` if the driver has it, else the odometry's scales. This module
+knows drives and readings; it does not know the base's wheels.
 """
 
 import argparse
@@ -35,21 +34,14 @@ UNLIKE: Final = 4.0
 """Number of standard deviations by which two ratios must differ before the tool reports it."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""Names of two parameters of the driver.
+"""``COUNT``: m per encoder count. ``UNITS``: number of motor units per m/s.
 
-``COUNT``: distance per encoder count.
-
-``UNITS``: number of the motors' units per m/s. If a calibration increases the distance per count,
-it reduces this number in proportion.
+A larger distance per count reduces the units in proportion.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.
 
-``BALANCE``: name of the parameter.
-
-``BALANCE_SHOWN``: name of the value in /diagnostics.
-
-``BALANCE_SIGMA``: standard deviation of the value.
+Names: the parameter, the value in /diagnostics, the value's standard deviation.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark where"
@@ -63,9 +55,7 @@ INTRODUCTION: Final = (
 class Drive:
     """A drive straight ahead, or a turn on the spot.
 
-    ``wanted``: distance of a straight drive in m, or angle of a turn in rad.
-
-    ``turns``: whether the drive is a turn.
+    ``wanted``: distance in m, or angle in rad.
     """
 
     name: str
@@ -75,13 +65,9 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The motion in one drive by the tape, compared with the motion by the odometry.
+    """The motion in one drive: by the tape and by the odometry, in m or rad.
 
-    ``told``: the motion by the odometry, in m or rad.
-
-    ``true``: the motion by the tape, in m or rad.
-
-    ``sigma``: standard deviation of ``true``.
+    ``told``: by the odometry. ``true``, ``sigma``: by the tape.
     """
 
     drive: Drive
@@ -165,11 +151,9 @@ def result(
 ) -> Result:
     """Return the result, to show and to save.
 
-    ``ratios``: the ratios of all drives.
-
     ``now``: the driver's parameters before the calibration.
 
-    ``balance``: the balance of the motors that the driver has measured, or None.
+    ``balance``: the motors' balance as the driver measured it, or None.
     """
     findings, parameters, notes = [], {}, []
     names = ((COUNT, False),) if COUNT in now else tuple(zip(NAMES, (False, True), strict=True))

@@ -1,12 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The simulation of a wheel with a PI controller, after a step of the set-point.
-
-The controller is band-limited: G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to
-the duty in percent. The controller is discretised by the trapezoidal rule. The board computes its
-coefficients for the control period ``NOMINAL_S``, even if the real control period differs. The
-board computes the measured speed, in whole RPM, from the time between the last two encoder ticks.
-All candidates for the gains are simulated at the same time, as arrays.
+"""The simulation of a wheel with a band-limited PI controller, after a step of the set-point.
 
 This module knows the plant, the controller and the encoder; it does not know how plant and gains
 were found.
@@ -48,18 +42,15 @@ class PiGains:
 class Loop:
     """The control loop of a wheel. Times are in s.
 
-    ``period_s``: the real control period.
+    ``dead_s``: from a duty to its effect on the speed.
 
-    ``dead_s``: dead time from a duty to its effect on the speed.
+    ``whole_rpm``: the controller rounds the measured speed down to whole RPM.
 
-    ``whole_rpm``: whether the controller rounds the measured speed down to whole RPM.
-
-    ``nominal_s``: the control period for which the board computes its coefficients.
+    ``nominal_s``: the control period that the board assumes.
 
     ``feed_forward``: duty in percent for each RPM of the set-point.
 
-    ``low_pass``: coefficient of the set-point's low-pass filter, from 0 to 1. With 1 there is no
-    filter.
+    ``low_pass``: of the set-point, from 0 to 1. 1: no filter.
 
     ``sends_each_s``: period with which the board sends its ticks.
     """
@@ -95,18 +86,12 @@ def answer(
 ) -> Array:
     """Return the speed in RPM after a step of the set-point from standstill.
 
-    The first dimension of the result is time, in steps of ``STEP_S``. The other dimensions are the
-    common shape of the gains, ``dead_s``, ``begun`` and ``sent_s``.
+    Shape: steps of ``STEP_S``, then the common shape of the gains, ``dead_s``, ``begun`` and
+    ``sent_s``.
 
-    ``dead_s``: dead times to use instead of that of the loop.
+    ``dead_s``: replaces the loop's. ``begun``: wheel position between two marks, 0 to 1.
 
-    ``begun``: starting position of the wheel between two marks of the encoder, as a fraction of
-    their distance.
-
-    ``sent_s``: time at which the board first sends ticks, or None if the board does not send.
-
-    If a tick comes while the board sends, the board notices this tick only afterwards. So the
-    measured speed is too low at this tick, and too high at the next tick.
+    ``sent_s``: when the board first sends ticks, or None for never.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -128,6 +113,9 @@ def answer(
     errors, outputs = [np.zeros(len(kp))] * 2, [np.zeros(len(kp))] * 2
     per_rpm, half_s = loop.ticks_per_revolution / 60, loop.nominal_s / 2
     tn_s = np.maximum(tn_s, 1e-3)
+    # The controller is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to the duty
+    # in percent, discretised by the trapezoidal rule. The board takes ``nominal_s`` as its control
+    # period, even if the real one differs. ``seen``: RPM by the time between the last two ticks.
     for step in range(count):
         now_s = step * STEP_S
         if step % period == 0:
@@ -154,6 +142,8 @@ def answer(
         passed = np.floor(ticks) > np.floor(before)
         rate = np.maximum(rpm * per_rpm, 1e-9)
         at_s = now_s + STEP_S - (ticks - np.floor(ticks)) / rate
+        # The board notices a tick only after it has sent. The measured speed is too low at this
+        # tick, and too high at the next tick.
         if not calm:
             at_s = at_s + np.maximum(SENDS_S - (at_s - sends_s) % loop.sends_each_s, 0.0)
         seen = np.where(passed, 1.0 / (per_rpm * np.maximum(at_s - ticked_s, 1e-6)), seen)
@@ -165,12 +155,11 @@ def answer(
 class Traits:
     """Characteristics of a step response, as numbers or arrays.
 
-    ``overshoot``: fraction of the final speed, or of the target if the target is higher.
+    ``overshoot``: fraction of the final speed or of the target, whichever is higher.
 
-    ``settled_s``: time after which the speed stays in the band around its final value. This time is
-    infinite if the speed does not stay in the band, or if the final value is not the target.
+    ``settled_s``: infinite if the speed leaves the band, or does not end at the target.
 
-    ``error_s``: integral of the absolute error divided by the target, in s.
+    ``error_s``: integral of the absolute error divided by the target.
     """
 
     overshoot: Array
@@ -181,8 +170,7 @@ class Traits:
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
     """Return the characteristics of a response.
 
-    ``band``: allowed deviation from the final speed, as a fraction of the final speed. The final
-    speed is the mean of the last quarter of the response.
+    ``band``: allowed deviation, as a fraction of the final speed (mean of the last quarter).
     """
     comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
     overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
@@ -196,15 +184,7 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
 
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:
-    """Return the phase margin, in degrees: 180 plus the open loop's phase where its gain is 1.
-
-    The delay of the loop has three parts:
-
-    - the dead time
-    - half a control period, until a duty acts
-    - the time of one tick, because the measured speed is a mean over one tick, and half a tick old
-      on average
-    """
+    """Return the phase margin, in degrees: 180 plus the open loop's phase where its gain is 1."""
     kp, tn_s, td_s = np.broadcast_arrays(
         *(
             np.asarray(gain, dtype=np.float64)[..., None]
@@ -212,6 +192,8 @@ def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Ar
         )
     )
     omega = np.geomspace(1e-2, 0.999 * np.pi / loop.period_s, PHASE_POINTS)
+    # The delay: the dead time, half a control period until a duty acts, and one tick. The measured
+    # speed is a mean over one tick, and on average half a tick old.
     late_s = loop.dead_s + loop.period_s / 2 + 60.0 / (rpm * loop.ticks_per_revolution)
     sampled = 2j * np.tan(omega * loop.period_s / 2) / loop.nominal_s
     controller = kp * (1 + sampled * tn_s) / (sampled * tn_s * (1 + sampled * td_s))

@@ -38,7 +38,7 @@ class Measured:
     def overshoot(self) -> float:
         """Overshoot of the mean of all steps, as a fraction of the final speed.
 
-        The mean is smoothed over 0.2 s, because the peak of noisy samples would be too high.
+        The mean is smoothed over 0.2 s. Otherwise, noise would raise its peak.
         """
         grid_s = np.arange(0.0, min(one.times_s[-1] for one in self.steps), 0.02)
         mean = np.mean([np.interp(grid_s, one.times_s, one.rpm) for one in self.steps], axis=0)
@@ -62,17 +62,13 @@ class Measured:
 class WheelTuned:
     """The result for one wheel.
 
-    ``levels``: corrections of the encoder's two levels.
-
     ``fit``: the plant as fitted to the starts at full duty.
 
-    ``plant``: the plant with its gain and dead zone, for which the gains were tuned.
+    ``plant``: with gain and dead zone. The gains were tuned for it.
 
-    ``loop``: the wheel's control loop, with the fitted dead time.
+    ``loop``: with the fitted dead time.
 
-    ``tuned``: the new gains, and their predicted effect.
-
-    ``before``, ``after``: steps that were recorded with the previous and with the new gains.
+    ``before``, ``after``: records of steps with the previous and with the new gains.
     """
 
     name: str

@@ -2,12 +2,10 @@
 
 """``calibrate step`` for a board that records encoder ticks and accepts gains.
 
-1. Record steps of the set-point with the present gains, for comparison.
-2. Record the wheels at a constant duty, and find the corrections of their encoders.
-3. Record starts at full duty, and fit the plant of each wheel.
-4. Compute gains, record steps with these gains, and fit the dead time. Do this ``ROUNDS`` times.
-   Each round computes its gains with the dead time from the previous round.
-5. Compare the steps of the last round with those of step 1.
+1. Record steps with the present gains.
+2. Find the encoders' corrections at a constant duty.
+3. Fit each plant to starts at full duty.
+4. ``ROUNDS`` times: compute gains, record steps, fit the dead time for the next round.
 """
 
 import argparse
@@ -91,7 +89,7 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 class _Bench:
     """The robot on a box: it sets parameters and records the wheels.
 
-    ``show``: a function that is called after each record, with the number of records made so far.
+    ``show``: called after each record with the number of records.
     """
 
     def __init__(self, robot: Any, show: Callable[[int], object], responses: int) -> None:
@@ -171,10 +169,9 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Find the corrections for the two levels of each encoder's signal, and set them.
+    """Make the two levels of each encoder equally long on average, by corrections.
 
-    With the corrections, both levels have the same mean duration. During the measurement all
-    corrections are 1, because the board records corrected times.
+    All corrections must be 1 meanwhile, because the board records corrected times.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
@@ -185,11 +182,9 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant of a wheel. Its gain and dead zone come from the speeds at two duties.
+    """Return the plant of a wheel: gain and dead zone come from the speeds at two duties.
 
-    ``found``: the fit to starts at full duty, which includes the time constants and the speed.
-
-    ``free``: the measurement at half duty, which includes the speed.
+    ``found``: fit to starts at full duty. ``free``: measurement at half duty.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:

@@ -2,13 +2,7 @@
 
 """Find gains of a band-limited PI controller that suit a plant.
 
-Tn compensates the plant's slow time constant. The Tn that is written to the board is longer,
-because the board computes its coefficients for a longer control period than the real one. Kp is
-searched. If a phase margin is required, Td is searched too. Gains are allowed only if their
-overshoot is within the goal. Of the allowed gains, the tool takes those with the smallest sum of
-settling time and integrated error.
-
-Afterwards the dead time of a plant is fitted to steps that were recorded with the tuned gains.
+Afterwards the plant's dead time is fitted to recorded steps with these gains.
 """
 
 from collections.abc import Sequence
@@ -39,7 +33,7 @@ FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
 """Starting positions of a simulated wheel between two marks, as fractions of their distance.
 
-The position decides when ticks come within a control period, so it changes the response.
+The position decides in which control period a tick comes.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
 """Times at which the board first sends ticks, as fractions of its sending period.
@@ -59,18 +53,16 @@ With Td = 0, an oscillation from one control period to the next does not decay.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
-    """The goals of a tuning.
+    """The goals of a tuning, on a step of the set-point.
 
-    ``overshoot``: largest allowed overshoot, as a fraction of the speed.
+    ``overshoot``, ``band``: largest allowed overshoot and final deviation, as fractions of the
+    speed.
 
-    ``band``: allowed deviation from the final speed after settling, as a fraction of the speed.
+    ``destination``: set-point, as a fraction of the speed at full duty.
 
-    ``destination``: set-point of the step, as a fraction of the speed at full duty.
+    ``settled_s``: the tool warns the user about a longer settling time.
 
-    ``settled_s``: settling time in s. The tool warns the user if the settling time is longer.
-
-    ``phase_margin_deg``: smallest allowed phase margin. If this goal is None, Td is 0, and only the
-    overshoot limits the gain (gain optimum).
+    ``phase_margin_deg``: smallest allowed. None: Td is 0, and the overshoot limits the gain.
     """
 
     overshoot: float = 0.05
@@ -98,6 +90,8 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
     tds = [0.0] if goals.phase_margin_deg is None else [part * loop.nominal_s for part in TDS]
     low, high = 0.02, 5.0
     best: tuple[float, float] | None = None
+    # Tn compensates the plant's slow time constant. It is stretched, because the board computes its
+    # coefficients for a longer control period than the real one.
     scale, tn_s = 1.0 / plant.rpm_per_percent, plant.slow_s * loop.stretch
     for _ in range(ROUNDS):
         kps, used = np.meshgrid(scale * np.geomspace(low, high, CANDIDATES), tds, indexing="ij")
@@ -174,11 +168,9 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 
 
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
-    """Return the dead time, in s, with which the model explains the recorded steps best.
+    """Return the dead time, in s, with which the model explains all wheels' steps best.
 
-    ``wheels``: for each wheel its plant, its loop and its recorded steps. All wheels get the same
-    dead time. This dead time is at least ``LEAST_DEAD_S``. Gains for a dead time that is too short
-    make the speed overshoot.
+    At least ``LEAST_DEAD_S``, because gains for a shorter dead time make the speed overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

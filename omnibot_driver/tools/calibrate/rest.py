@@ -2,9 +2,8 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A measurement in one posture cannot distinguish three causes: a bias of the accelerometer, a tilt of
-the sensor, and a slope of the floor. Only the bias along gravity can be found, because the
-magnitude of gravity is known. This module knows readings; it does not know how they are recorded.
+A tilt or a slope looks like a sideways bias of the accelerometer. So only its bias along gravity is
+found. This module knows readings; it does not know how they are recorded.
 """
 
 from collections.abc import Callable
@@ -32,20 +31,15 @@ LOST_PART: Final = 0.02
 class Rest:
     """The evaluation of an IMU at rest. Arrays have the values of the sensor's axes x, y and z.
 
-    ``bias_radps``: mean rate of rotation.
-
-    ``bias_sigma``: standard deviation of ``bias_radps``, including the random walk of the bias
-    until the end of the measurement.
+    ``bias_sigma``: includes the bias's random walk until the end of the measurement.
 
     ``force_mps2``: mean specific force.
 
-    ``force_sigma``: standard deviation of ``force_mps2``.
-
     ``rate_noise``, ``force_noise``: standard deviation of a single reading.
 
-    ``readings``, ``period_s``: number and period of the readings.
+    ``readings``, ``period_s``: number and period.
 
-    ``curves``, ``noises``: Allan deviation of the gyro, and the fitted noise, for each axis.
+    ``curves``, ``noises``: the gyro's Allan deviation and its fitted noise.
     """
 
     bias_radps: Column
@@ -127,9 +121,7 @@ def rest(imu: Imu) -> Rest:
 def still(bias_radps: Column) -> Callable[[Log], None]:
     """Return a function that checks a growing log, and raises ToolError if the robot moves.
 
-    Call this function repeatedly.
-
-    ``bias_radps``: the bias that the driver has already subtracted from the gyro's readings.
+    ``bias_radps``: what the driver has subtracted from the gyro's readings.
     """
     seen = [0, 0]
     look = Look()
@@ -163,8 +155,7 @@ def _within(readings: Column, size: int) -> Column:
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
     """Return the standard deviation of the mean of ``readings``.
 
-    The result is the larger of two estimates. One comes from the noise of single readings, the
-    other from the means of blocks.
+    The larger of two estimates: by single readings, and by the means of blocks.
     """
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))

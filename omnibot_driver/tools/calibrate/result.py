@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 class Finding:
     """One row of the table of results.
 
-    ``sigma``: standard deviation of ``value``, or None if it is not known.
+    ``sigma``: standard deviation of ``value``, or None if unknown.
 
-    ``before``: the driver's present value, or None if the driver does not have this value.
+    ``before``: the driver's present value, or None.
     """
 
     name: str
@@ -35,13 +35,13 @@ class Finding:
 class Result:
     """The result of a calibration.
 
-    ``parameters``: values for the driver to load, by name.
+    ``parameters``: for the driver to load, by name.
 
-    ``record``: further content of the file, which the driver ignores.
+    ``record``: further content of the file. The driver ignores it.
 
     ``notes``: sentences for the user.
 
-    ``draw``: a function that draws the result into a figure of 9 by 6 inches.
+    ``draw``: draws into a figure of 9 by 6 inches.
     """
 
     findings: list[Finding]

@@ -2,8 +2,7 @@
 
 """The robot as a calibration uses it: receive its data, and move it.
 
-Every motion goes through ``drive`` or ``record``. Both end with stop commands, even after an error.
-If this process ends unexpectedly, the driver stops the robot after ``cmd_vel_timeout``. This module
+Every motion goes through ``drive`` or ``record``, which always end with stop commands. This module
 knows data and commands; it does not know what is calibrated.
 """
 
@@ -37,7 +36,7 @@ STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
 """Time, in s, from the request for a record to the start of the motion.
 
-In this time the driver repeats the request to the board, because a request can be lost.
+In this time the driver can repeat a lost request.
 """
 STOPPING_S: Final = 3.0
 STOOD_S: Final = 0.3
@@ -59,8 +58,7 @@ class Robot(Listener):
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
         """Number of commands that this node published but has not yet received back.
 
-        The key is a command's topic and values. A negative number means that another node published
-        the command.
+        Key: topic and values. A negative number shows a command of another node.
         """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
@@ -81,10 +79,9 @@ class Robot(Listener):
     ) -> Log:
         """Record data for ``seconds`` without commands; return the log.
 
-        ``show``: a function that is called with the completed fraction, from 0 to 1.
+        ``show``: called with the completed fraction.
 
-        ``states``: the states of the driver in which the robot may be; another state raises
-        ToolError.
+        ``states``: allowed states of the driver. Another state raises ToolError.
         """
         self._begin(states)
         began_s = now_s = time.monotonic()
@@ -105,17 +102,15 @@ class Robot(Listener):
         monitored: bool = True,
         show: Callable[[float], object] = lambda _seconds: None,
     ) -> Log:
-        """Move the robot by the law, within the bounds, then stop it; return the log of the motion.
+        """Move the robot by the law, within the bounds, then stop it; return the log.
 
         ``obeys``: whether a robot that does not move is a fault.
 
-        ``monitored``: whether the driver's motion monitor stays on. The monitor must be off while
-        the speed or the direction of the robot's motion is not calibrated.
+        ``monitored``: must be false while the motion's speed or direction is not calibrated.
 
-        ``show``: a function that is called with the seconds since the start.
+        ``show``: called with the seconds since the start.
 
-        On any fault, the robot is stopped and ToolError is raised. Faults are the e-stop, lost
-        data, a command of another node, and no motion.
+        Raises ToolError on an e-stop, lost data, another node's command, or no motion.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
@@ -142,11 +137,9 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Let the driver record the response to ``command``, then stop the robot.
+        """Let the driver record the response to ``command``; return the path of the record.
 
-        Return the path of the record. The tool requests the record while the robot is at rest, so
-        that the record begins before the motion. Raises ToolError on any fault, as ``drive`` does.
-        If nothing was recorded, the message gives the driver's reason.
+        The robot must be at rest at the request. Raises ToolError on any fault, as ``drive`` does.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)

@@ -74,11 +74,9 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
 def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
     """Return the result, to show and to save.
 
-    ``found``: the measured speeds.
-
     ``now``: the driver's parameters before the calibration.
 
-    Raises ToolError if there is an axis without a measured speed.
+    Raises ToolError if an axis lacks a measured speed.
     """
     by_axis = [[one for one in found if one.axis == axis] for axis in range(3)]
     if not all(by_axis):

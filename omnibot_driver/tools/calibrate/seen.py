@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The meaning of the user's answers about the directions in which the wheels turn.
+"""The user's answers about the directions in which the wheels turn.
 
-A pattern has one number for each of the wheels A, B and C, as seen from outside. The number is 1
-for counter-clockwise (positive in the manual's equations), -1 for clockwise, and 0 for still.
+A pattern has one number for each of the wheels A, B and C, seen from outside. 1: counter-clockwise
+(positive in the manual), -1: clockwise, 0: still.
 """
 
 from collections.abc import Sequence
@@ -54,9 +54,9 @@ def wanted(axis: int) -> Pattern:
 
 
 def wheel_sign(wheel: int, seen: Pattern) -> int:
-    """Return 1 if the wheel turned in the manual's direction, -1 if it turned in reverse.
+    """Return 1 if the wheel turned in the manual's direction, -1 if in reverse.
 
-    Raises Contradiction if this wheel did not turn, or if another wheel turned.
+    Raises Contradiction if it did not turn, or if another wheel turned.
     """
     name = WHEELS[wheel]
     turned = [n for n in range(3) if seen[n]]
@@ -81,11 +81,9 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return 1 if the wheels show a motion along +axis, -1 if they show one along -axis.
+    """Return 1 if the wheels show a motion along +axis, -1 along -axis.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw.
-
-    Raises Contradiction for any other pattern.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction for any other pattern.
     """
     expected = wanted(axis)
     if seen == expected:
@@ -101,8 +99,7 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    A mirror image has signs of x and y whose product is not the sign of yaw. If the user only
-    regards another side of the robot as its front, the product is the sign of yaw.
+    Another choice of the front changes the signs too, but keeps sign(x) sign(y) = sign(yaw).
     """
     x, y, yaw = signs
     return x * y != yaw

@@ -2,11 +2,8 @@
 
 """Plan commands, measure the speeds that result, and fit the scale.
 
-A *count* is the unit of the board's commands. The board accepts only whole counts. The tool
-commands only whole counts, so that a command has no rounding error. A speed is measured as the
-slope of the odometry's pose, in which rounding errors do not accumulate. The odometry's twist is
-not used. Each twist comes from a single displacement, whose rounding error does not average out.
-This module knows logs; it does not know the robot.
+A *count* is the unit of the board's commands. Commands are whole counts, so they have no rounding
+error. This module knows logs; it does not know the robot.
 """
 
 from collections.abc import Sequence
@@ -43,10 +40,9 @@ class Speed:
 
     ``counts``: the commanded counts.
 
-    ``measured``, ``sigma``: the speed by the odometry, and its standard deviation.
+    ``measured``, ``sigma``: by the odometry.
 
-    ``gyro``, ``gyro_sigma``: the yaw rate by the gyro, and its standard deviation. For x and y,
-    ``gyro`` is NaN.
+    ``gyro``, ``gyro_sigma``: by the gyro. NaN for x and y.
     """
 
     axis: int
@@ -63,8 +59,7 @@ class Scale:
 
     ``sigma``: standard deviation of ``value``.
 
-    ``excess``: ratio of the scatter of the speeds to their uncertainties. The ratio is 1 if the
-    scatter is as expected.
+    ``excess``: scatter of the speeds over the expected scatter.
     """
 
     value: float
@@ -75,12 +70,9 @@ class Scale:
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
     """Return commands in both directions along each axis, each with its duration in s.
 
-    ``top``: the largest speed along each axis.
+    ``top``: largest speeds. ``scales``: counts per m/s or rad/s.
 
-    ``scales``: counts per m/s or rad/s of each axis.
-
-    ``levels``: number of speeds along each axis, up to ``top``. Each speed is a whole number of
-    counts.
+    ``levels``: number of speeds by axis. Speeds are whole counts.
     """
     stairs = []
     for level in range(1, levels + 1):
@@ -96,11 +88,7 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
     """Return a speed for every command in the log that was sent for long enough.
 
-    ``scales``: counts per m/s or rad/s of each axis.
-
-    ``up``: the upward direction in the sensor's axes.
-
-    ``bias``: the gyro's bias.
+    ``scales``: counts per m/s or rad/s. ``up``: in the sensor's axes.
 
     Raises ToolError if the log contains no such command.
     """
@@ -113,6 +101,8 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
         if within.sum() < FEWEST or len(turned) < FEWEST:
             continue
         way = _way(odometry.pose[within], axis)
+        # Each twist has the rounding error of a single displacement. In poses, rounding errors do
+        # not accumulate.
         measured, sigma = _slope(odometry.stamp_s[within], way)
         found.append(
             Speed(
@@ -132,8 +122,7 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
     """Return the scale that fits the speeds best, weighted by their uncertainties.
 
-    The fitted line goes through the origin. Raises ToolError if the robot moved in the opposite
-    direction to its commands.
+    Raises ToolError if the robot moved in the opposite direction to its commands.
     """
     counts = np.array([one.counts for one in found], dtype=float)
     measured = np.array([one.measured if by == "odometry" else one.gyro for one in found])
@@ -153,10 +142,9 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """Return the time spans with a steady command, each with its begin, its end and the command.
+    """Return the time spans of steady speed as (begin, end, command), without zero commands.
 
-    A span begins when the speed has settled. Commands of zero have no span. After a pause between
-    commands a new span begins, because the driver may have dropped the command.
+    A pause between commands begins a new span: the driver may have dropped the command.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -179,8 +167,7 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 def _way(pose: Column, axis: int) -> Column:
     """Return the coordinate of each pose along one of the robot's axes.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. For x and y, the direction of the axis follows from the
-    mean heading of all poses.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. x and y are those of the mean heading.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

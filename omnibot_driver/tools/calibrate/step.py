@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""``calibrate step``: measure each wheel's step response, fit its motor, and find better gains.
+"""``calibrate step``: measure each wheel's step response, fit its motor, find better gains.
 
-One wheel at a time alternates between two speeds, first in one direction, then in the other.
+One wheel at a time alternates between two speeds, in each direction.
 """
 
 import argparse
@@ -25,7 +25,7 @@ from omnibot_driver.tools.needs import ToolError
 RUN_UP_S: Final = 2.0
 """Time, in s, that a wheel gets to reach the first speed from rest.
 
-The tool does not evaluate this part of a record, because friction affects a start from rest.
+Friction affects this start, so the tool does not evaluate it.
 """
 
 
@@ -81,8 +81,7 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    One step shows the response only at the ends of its odometry deltas. Each step begins at another
-    time within a delta. So all steps together show the response at more times.
+    Each step begins at another time within an odometry delta, to show all parts of the response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -101,9 +100,9 @@ def _wheels(names: str) -> str:
 
 
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
-    """Return the slow and the fast speed in rad/s, rounded to whole units of the board's command.
+    """Return the slow and the fast speed in rad/s, as whole units of the board's command.
 
-    Raises ToolError if the speeds are not allowed, or if both give the same command.
+    Raises ToolError if they are not allowed, or are the same command.
     """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:

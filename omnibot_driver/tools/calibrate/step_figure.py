@@ -74,10 +74,7 @@ def _draw_predictions(
 ) -> None:
     """Draw each motor's predicted response with the present and with the better gains.
 
-    ``command``: size of the step of the commanded speed.
-
-    ``load``: size of the step of the load, as a multiple of the effort for a speed of one count per
-    tick.
+    ``command``, ``load``: sizes of the steps. Load 1 is the effort for one count per tick.
     """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):

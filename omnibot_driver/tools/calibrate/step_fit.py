@@ -2,11 +2,8 @@
 
 """Fit models with uncertainties to recorded steps of one wheel.
 
-Time 0 of a step is its *onset*: the first control tick at which the board could use the command.
-The times of the ticks are known from the timestamps. But a command may take effect at another tick
-than the calculated one. This happens if the command arrives close to a tick, or if a busy computer
-delays the command. In such a case, the recorded step shows the tick at which the command took
-effect. This module knows commands and wheel rates; it does not know how they were recorded.
+Time 0 of a step is its *onset*: the first control tick that could use the command. ``aligned``
+corrects it. This module knows commands and wheel rates; it does not know how they were recorded.
 """
 
 import math
@@ -30,7 +27,7 @@ from omnibot_driver.tools.needs import ToolError
 ON_THE_WAY_S: Final = 0.0015
 """Time, in s, from the publication of a command to its last bit on the line.
 
-It is the latency of DDS, plus the transmission of 9 bytes at 115200 baud.
+DDS, plus 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
 """Number of odometry deltas before the onset that belong to the record of a step."""
@@ -49,18 +46,16 @@ DRAWS: Final = 100
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step from one commanded rate to another.
+    """One step from one commanded rate to another. Ticks are control ticks.
 
-    ``before_radps``, ``after_radps``: the commanded rates before and after the step.
+    ``end_ticks``: end of each odometry delta, from the onset.
 
-    ``end_ticks``: for each odometry delta, the number of control ticks from the onset to its end.
+    ``rate_radps``: mean rate in each delta, over its four ticks.
 
-    ``rate_radps``: for each odometry delta, the mean rate in the four ticks before its end.
+    ``last_radps``: commanded before ``before_radps``. The response to that change may still
+    continue.
 
-    ``last_radps``: the rate that was commanded before ``before_radps``.
-
-    ``last_ticks``: number of ticks from the change between these two rates to the onset. The
-    response to this earlier change may still continue at the onset.
+    ``last_ticks``: from that change to the onset.
     """
 
     before_radps: float
@@ -77,8 +72,7 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the predicted rates of this step's odometry deltas, in rad/s.
 
-        ``mean``: a function that returns the mean response of deltas to a unit step. Its argument
-        has the ticks at which the deltas end.
+        ``mean``: mean response to a unit step in deltas that end at the given ticks.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -93,13 +87,11 @@ class Step:
 class Fit:
     """A model with the parameter values that explain the steps best.
 
-    ``values``: these parameter values.
+    ``covariance``: of ``values``, scaled by the residuals.
 
-    ``covariance``: covariance of ``values``, scaled by the residuals.
+    ``rms_radps``: of the residuals.
 
-    ``rms_radps``: root mean square of the residuals.
-
-    ``samples``: number of odometry deltas that were used.
+    ``samples``: number of odometry deltas used.
     """
 
     model: Model
@@ -127,10 +119,9 @@ class Fit:
         return np.asarray(self.values[0] * told)
 
     def traits(self) -> dict[str, tuple[float, float]]:
-        """Return two characteristics of the step response, each with its standard deviation.
+        """Return "rise time" in s and "overshoot", each with its standard deviation.
 
-        "rise time" is the time in s from 10 % to 90 % of the step. "overshoot" is a fraction of the
-        step.
+        Rise: from 10 % to 90 % of the step. Overshoot: fraction of the step.
         """
         random = np.random.default_rng(0)
         draws = random.multivariate_normal(self.values, self.covariance, DRAWS)
@@ -209,13 +200,9 @@ def fit(model: Model, steps: Sequence[Step]) -> Fit:
 class WheelFound:
     """The results of one wheel.
 
-    ``steps``: the steps that were used.
+    ``steps``: the steps that were used. ``left_out``: number of rejected steps.
 
-    ``left_out``: number of rejected steps.
-
-    ``first``, ``second``: fits of a model of first order, and of a model of second order.
-
-    ``motor_fit``: fit of a motor in the manual's control loop.
+    ``first``, ``second``: models by order. ``motor_fit``: a motor in the manual's control loop.
     """
 
     name: str
@@ -243,9 +230,7 @@ class WheelFound:
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
     """Fit three models to a wheel's steps: first order, second order, and a motor.
 
-    The motor is simulated in the manual's control loop.
-
-    ``now``: the gains in the firmware.
+    ``now``: the gains in the firmware, for the manual's control loop around the motor.
     """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
@@ -255,10 +240,9 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 
 
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps with corrected onsets, because a command may have taken effect late.
+    """Return the steps with their onsets moved to the ticks that fit the model best.
 
-    Each onset is moved to the tick at which the step fits the model best. The median of the shifts
-    is subtracted, because a common shift of all steps would be a delay of the wheel.
+    A busy computer may delay a command, or a command may arrive close to a tick.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):
@@ -267,6 +251,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
             min(SOONER, key=lambda n, step=step: _misfit(guess, step.sooner(n)))  # type: ignore[misc]
             for step in steps
         ]
+        # A shift that all steps share is a delay of the wheel.
         middle = sorted(best)[len(best) // 2]
         best = [n - middle for n in best]
         if best == shifts:
@@ -276,9 +261,9 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 
 
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
-    """Return the steps that fit a common model well, and leave out the other steps.
+    """Return the steps that fit a common model well.
 
-    A step fits well if its misfit is at most ``UNLIKE`` times the median misfit.
+    Their misfit is at most ``UNLIKE`` times the median misfit.
     """
     guess = fit(model, steps)
     misfits = [_misfit(guess, step) for step in steps]

@@ -2,10 +2,8 @@
 
 """Models of a wheel's step response, as the odometry measures it.
 
-The odometry reports means over odometry deltas of 40 ms. Every model gives the angle that a wheel
-has turned by a given time, after a unit step of its rate at time 0. The mean rate of a delta is the
-difference of two such angles, divided by the length of the delta. This module knows models and
-times; it does not know measured data.
+A model gives the angle turned since a unit step. Differences of angles give the mean rates in
+odometry deltas of 40 ms. This module knows models and times; it does not know measured data.
 """
 
 from collections.abc import Callable
@@ -24,9 +22,9 @@ Source: manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md.
 """
 
 Turned = Callable[[Array, Array], Array]
-"""A function of a model's parameters without the gain, and of times in s.
+"""The angle turned in rad, after a unit step of the rate (1 rad/s).
 
-The function returns the angle turned after a unit step of the rate (1 rad/s), in rad.
+Arguments: the model's parameters without the gain, and times in s.
 """
 
 
@@ -34,11 +32,11 @@ The function returns the angle turned after a unit step of the rate (1 rad/s), i
 class Model:
     """A model of a step response.
 
-    ``names``, ``units``: names and units of the parameters. The first parameter is always the gain.
+    ``names``, ``units``: of the parameters. The first parameter is the gain.
 
-    ``start``, ``low``, ``high``: starting values and bounds of the parameters.
+    ``start``, ``low``, ``high``: starting values and bounds.
 
-    ``turned``: the function that gives the angle turned after a unit step.
+    ``turned``: gives the angle after a unit step.
     """
 
     title: str
@@ -66,10 +64,9 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 
 
 def second_order(parameters: Array, time_s: Array) -> Array:
-    """Return the angle turned by a model of second order after a unit step, with any damping.
+    """Return the angle turned after a unit step: (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²).
 
-    The model is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). It has a zero (Z), because a PI loop
-    with feed-forward around a motor of first order has a zero.
+    A PI loop with feed-forward around a motor of first order has the zero Z.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))

@@ -13,15 +13,14 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains
 UNLIKE_ONE: Final = 0.02
 """Difference of a wheel's gain from 1 above which the tool recommends ``calibrate scale``."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
+"""Standard deviation of an odometry delta's rate by quantisation, in rad/s.
 
-A delta is quantised twice: by the encoder, and by the protocol's unit of 0.1 mm.
+Two causes: the encoder, and the protocol's unit of 0.1 mm.
 """
 MANY: Final = 1.5
-"""Multiple of ``QUANTUM_RADPS`` above which the tool warns the user about the residuals.
+"""Multiple of ``QUANTUM_RADPS`` above which the tool warns about the residuals.
 
-On a computer that delayed commands, the residuals were twice ``QUANTUM_RADPS``, and the fitted
-delay was 4 ms too long.
+Example of delayed commands: residuals of twice ``QUANTUM_RADPS``, and a delay 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.
@@ -31,10 +30,9 @@ Above this ratio, the tool regards the motor model as wrong.
 
 
 def result_of(found: list[WheelFound], now: Gains) -> Result:
-    """Find better gains, and return the result.
+    """Find better gains, one set for all wheels, and return the result.
 
-    ``now``: the gains in the firmware. The better gains are the same for all wheels, because the
-    firmware has only one set of gains.
+    ``now``: the gains in the firmware, which has only one set.
     """
     motors = [wheel.motor for wheel in found]
     better = better_gains(motors, now)

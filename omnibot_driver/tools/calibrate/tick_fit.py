@@ -2,12 +2,9 @@
 
 """Fit a plant to the times between encoder ticks of a wheel that starts at full duty.
 
-The plant, from duty to speed, is of first or second order, whichever fits the records better. A
-record begins with the first tick after its request, so it does not show when the duty was applied.
-Therefore a record does not show the dead time. It shows only how the times between ticks become
-shorter. The positions of the encoder's marks are fitted as well (``tick_marks``).
-
-This module knows times between ticks; it does not know how they were recorded.
+The plant has first or second order, whichever fits better. A record begins at its first tick, so it
+does not show the dead time. This module knows times between ticks; it does not know how they were
+recorded.
 """
 
 import math
@@ -29,14 +26,13 @@ FEWEST_TICKS: Final = 30
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """A wheel, as a plant with the duty in percent as input and the speed in RPM as output.
+    """A wheel, as a plant from duty in percent to speed in RPM.
 
-    ``rpm_per_percent``: gain.
+    ``slow_s``, ``fast_s``: time constants. ``fast_s`` is 0 for first order.
 
-    ``slow_s``, ``fast_s``: time constants. ``fast_s`` is 0 for a plant of first order.
+    ``dead_zone_percent``: duty up to which the wheel does not turn.
 
-    ``dead_zone_percent``: duty up to which the wheel does not turn. The final speed is the gain
-    times the duty above it.
+    Final speed: ``rpm_per_percent`` times the duty above the dead zone.
     """
 
     rpm_per_percent: float
@@ -53,16 +49,11 @@ class Plant:
 class PlantFit:
     """The fit of a plant to records of starts.
 
-    ``final_rpm``: final speed at the duty of the records.
+    ``sigmas``: of ``final_rpm``, ``slow_s`` and ``fast_s``, scaled by the residuals.
 
-    ``slow_s``, ``fast_s``: time constants.
+    ``rms``: of the relative residuals.
 
-    ``sigmas``: standard deviations of ``final_rpm``, ``slow_s`` and ``fast_s``, scaled by the
-    residuals.
-
-    ``rms``: root mean square of the relative residuals.
-
-    ``samples``, ``order``: number of residuals, and order of the plant.
+    ``samples``: number of residuals. ``order``: of the plant.
     """
 
     final_rpm: float
@@ -95,8 +86,7 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     """Fit a plant to records of starts from standstill, all at the same duty.
 
-    ``records``: for each record, the times between ticks in s. The first time of a record is not
-    used, because it includes the standstill.
+    ``records``: times between ticks in s. The first one includes the standstill, and is not used.
 
     Raises ToolError if a record is too short.
     """

@@ -2,12 +2,9 @@
 
 """Find the positions of an encoder's marks from several records of a wheel.
 
-The marks on the encoder's disc are not exactly evenly spaced. So the times between ticks have
-errors that repeat with each turn of the wheel. Each record begins at an unknown mark. The input of
-this module is the relative error of each time between ticks: its difference from the time that
-evenly spaced marks would give.
-
-This module knows these errors; it does not know how the wheel moved.
+Uneven marks cause relative errors of the times between ticks that repeat with each turn. Each
+record begins at an unknown mark. This module knows these errors; it does not know how the wheel
+moved.
 """
 
 from collections.abc import Sequence
@@ -30,8 +27,7 @@ OUTLIER: Final = 4.5
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
-If the marks are evenly spaced, a fit explains less than a fifth of the variance, by chance. This
-holds for three records of two turns each.
+Evenly spaced marks explain less than 0.2, by three records of two turns.
 """
 
 
@@ -67,10 +63,9 @@ class Marks:
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
-    """Return the marks that explain the errors of these records, or None if no pattern repeats.
+    """Return the marks that explain the records' errors, or None if no pattern repeats.
 
-    ``rows``: for each record, the relative errors of the times between ticks. An unknown error is
-    NaN.
+    ``rows``: relative errors by record, NaN if unknown.
 
     ``marks``: number of marks on the disc.
     """
@@ -105,13 +100,9 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return, for each distance between marks, the median of its errors over all rows.
+    """Return the median error of each distance between marks, shifted to a mean of zero.
 
-    The result is shifted to a mean of zero.
-
-    ``rows``: relative errors, by record.
-
-    ``firsts``: for each row, the index of the distance with which it begins.
+    ``rows``: relative errors, by record. ``firsts``: each row's first distance.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Read records of the times between a wheel's ticks, and measure the levels of its encoder.
+"""Read records of the times between a wheel's ticks, and measure the encoder's levels.
 
-A record is a CSV file that the driver has written. This module knows files and times; it does not
-know the plant.
+A record is a CSV file of the driver. This module knows files and times; it does not know the plant.
 """
 
 import csv
@@ -21,23 +20,21 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest accepted fraction of missing times in a record."""
 UNLIKE: Final = 1.5
-"""Largest accepted ratio of a time between ticks to the median of these times.
+"""Largest accepted ratio between a time and the median time, up or down.
 
-For a time below the median, the ratio is that of the median to the time. A larger ratio shows that
-the board missed an edge of the encoder's signal, or noticed it late.
+Beyond it, the board missed an edge or noticed it late.
 """
 SMOOTHED: Final = 4
 """Number of successive times between ticks from which one speed is computed.
 
-A displaced mark changes the sum of these times by no more than it changes a single time. So the
-relative error of the sum is smaller.
+A displaced mark changes their sum by no more than one time.
 """
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Return the times between ticks in s, by side. A time that is missing in the record is NaN.
+    """Return the times between ticks in s, by side; NaN where the record has none.
 
-    Raises ToolError if the file cannot be read, or if too many times are missing.
+    Raises ToolError if the file cannot be read, or lacks too many times.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -62,12 +59,9 @@ def read(path: Path) -> dict[str, Column]:
 class Levels:
     """Corrections of the two levels of an encoder's signal, for one wheel.
 
-    ``short``, ``long``: factors that make the durations of the short and the long level equal to
-    their mean.
+    ``short``, ``long``: factors that give both levels the same duration.
 
-    ``sigma``: standard deviation of the factors.
-
-    ``rpm``: speed of the wheel during the measurement.
+    ``sigma``: of the factors. ``rpm``: speed in the measurement.
     """
 
     short: float
@@ -77,15 +71,14 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Return the corrections of an encoder's two levels, for a wheel that turns at constant duty.
+    """Return the corrections of an encoder's levels, for a wheel at constant duty.
 
-    While the board makes the record, both corrections must be 1. The two levels alternate. The
-    level with the shorter mean time is the short level. After a missed edge, the function decides
-    anew which level is the short one. Raises ToolError if the ticks are not regular.
+    Both corrections must be 1 in the record. Raises ToolError if the ticks are not regular.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)
     ways: tuple[list[float], list[float]] = ([], [])
+    # After a missed edge, it is unknown which level is the short one.
     for run in _runs(ticks_s, good):
         even, odd = run[::2], run[1::2]
         shorter, longer = (even, odd) if even.mean() <= odd.mean() else (odd, even)

@@ -3,7 +3,7 @@
 """A least-squares fit of a plant to the times between encoder ticks of several starts.
 
 This module knows the motion of a plant, the marks and the noise; it does not know files, and does
-not choose between a plant of first and of second order.
+not choose the plant's order.
 """
 
 import math
@@ -45,11 +45,9 @@ LAGS: Final = 60
 Even such distant residuals are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
-"""The board has missed a mark if two successive times have a sum of relative errors above this.
+"""Sum of two successive relative errors above which the board has missed a mark.
 
-If the board only noticed a mark late, the sum is near 0: the first time is too long, and the second
-is too short by the same amount. A time with a missed mark is not twice as long as usual, because
-the board's clock loses up to 6 ms at a missed mark.
+A late mark gives a sum near 0. A missed mark may give less than 1: the clock loses up to 6 ms.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which the board cannot miss a mark.
@@ -77,8 +75,7 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    ``values`` contains the sum and the ratio of the time constants. With these two values, the
-    search has only one optimum.
+    ``values`` has their sum and ratio. With these, the search has only one optimum.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -90,8 +87,6 @@ class Search:
 
     ``intervals``: for each record, the times between ticks in s.
 
-    ``order``: order of the plant, 1 or 2.
-
     The array of values has, in this order:
 
     - the logarithm of the final rate in ticks per second
@@ -99,9 +94,6 @@ class Search:
     - the ratio of the time constants, if the order is 2
     - for each record, the time of its first mark in s
     - the positions of the marks in ticks, while the marks are fitted
-
-    The first mark is given by its time and not by its distance. Just after the start, the distance
-    is too small: it grows with the cube of the time.
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -125,6 +117,8 @@ class Search:
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
+            # The first mark is given by its time. Its distance would be too small: just after the
+            # start, it grows with the cube of the time.
             begins_s = [(0.5 * total_s**2 / self._rate) ** (1 / 3)] * records
             starts.append(np.array([math.log(self._rate), math.log(total_s), 0.3, *begins_s]))
         return self._best(starts)
@@ -142,10 +136,9 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return, for each record, the relative errors of its times between ticks.
+        """Return, by record, the relative errors of the times between evenly spaced marks.
 
-        An error is the difference from the time that evenly spaced marks would give. Around a mark
-        that the board missed, the errors are NaN.
+        NaN around a mark that the board missed.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -158,7 +151,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        From then on, the search counts a time with a missed mark as the time for two distances.
+        From then on, such a time counts for two distances.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -185,10 +178,9 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Measure the correlation of the residuals at these values, and remove it from now on.
+        """Measure the residuals' correlation at these values, and remove it from now on.
 
-        While the positions of the marks are not known, the correlation comes from the marks.
-        Afterwards, it comes from the changing load.
+        Its cause: the marks, until they are fitted; then the changing load.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -207,9 +199,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        The covariance follows from all residuals. If the scatter between records is larger, the
-        covariance is increased. The reason for such a scatter is a slowly changing load, which
-        affects a whole record.
+        A larger scatter between records increases it, because a slowly changing load affects whole
+        records.
         """
         own = 1 + self.order
         found = self._search(values)

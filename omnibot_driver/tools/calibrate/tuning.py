@@ -2,16 +2,7 @@
 
 """Find gains of the manual's control law that suit a motor, and predict their effect.
 
-The gains are compared by the integral of the absolute error: after a step of the command, and after
-a step of the load. Examples of a load are a floor, a sagging battery and dry friction. Each
-integral is divided by its value with the present gains. Both quotients have the same weight. The
-limits are:
-
-- Ms, the peak of the sensitivity, is at most 1.6. With this limit, the loop tolerates an error of a
-  factor 2.6 in gain, or of 36° in phase.
-- The overshoot after a step of the command is at most 5 %.
-- K_VP and K_VI are each at most the effort for a speed of one count per tick. So an error of one
-  encoder count has little effect.
+The best gains have the smallest absolute errors after steps of command and load.
 """
 
 from collections.abc import Sequence
@@ -31,6 +22,7 @@ from omnibot_driver.tools.calibrate.wheel_loop import (
     sensitivity_peak,
 )
 
+# This limit of the sensitivity's peak tolerates a factor of 2.6 in gain, or 36° in phase.
 LARGEST_MS: Final = 1.6
 LARGEST_OVERSHOOT: Final = 0.05
 HORIZON_TICKS: Final = 400
@@ -45,18 +37,13 @@ ROUNDS: Final = 3
 class Behaviour:
     """The behaviour of a motor with some gains, as numbers or arrays.
 
-    ``rise_s``: time from 10 % to 90 % of a step.
-
-    ``overshoot``: fraction of the step.
+    ``rise_s``: from 10 % to 90 % of a step. ``overshoot``: fraction of it.
 
     ``command_error_s``: integral of the absolute error after a step of 1.
 
-    ``load_error_s``: the same integral after a step of the load. The size of this step is the
-    effort for a speed of one count per tick.
+    ``load_error_s``: the same, after a load of the effort for one count per tick.
 
     ``ms``: peak of the sensitivity; 1 is the most robust value.
-
-    ``stable``: whether the response settles.
     """
 
     rise_s: Array
@@ -88,13 +75,11 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the gains within the limits that are best for all these motors together.
 
-    The function searches a grid that becomes narrower in each round.
-
-    ``now``: the present gains. The behaviour with each candidate is compared with the behaviour
-    with ``now``.
+    ``now``: the present gains. Errors are compared with those of ``now``.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)
+    # K_VP and K_VI are at most ``need``, so an error of one encoder count has little effect.
     forward, proportional, integral = (0.0, 1.0), (0.02, 1.0), (1e-3, 1.0)
     best = Gains(need, 0.02 * need, 1e-3 * need)
     for _ in range(ROUNDS):

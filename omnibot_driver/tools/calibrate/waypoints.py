@@ -26,11 +26,9 @@ ANGULAR_BRAKING: Final = 0.4
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
     """Return a law that drives the robot through these poses, and stops it at each pose.
 
-    ``places``: poses relative to the start of the motion, with unwrapped yaw.
+    ``places``: relative to the start, with unwrapped yaw.
 
-    ``speed``: largest speed in m/s.
-
-    ``turning``: largest yaw rate in rad/s.
+    ``speed``, ``turning``: largest, in m/s and rad/s.
     """
     number = 0
 

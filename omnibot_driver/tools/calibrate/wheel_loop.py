@@ -2,10 +2,9 @@
 
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-Speeds are in encoder counts per control tick of 10 ms, efforts in PWM steps, and times in ticks.
-The loop is linear. This model is valid for changes between two speeds in the same direction: dry
-friction is constant there, and has no effect. This module knows the motor and the control law; it
-does not know measurements or radians.
+Units: counts per tick of 10 ms, PWM steps, ticks. Both speeds must have the same direction, so that
+dry friction is constant. This module knows the motor and the control law; it does not know
+measurements or radians.
 """
 
 from dataclasses import dataclass
@@ -49,13 +48,9 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The response of a wheel, with one value for each tick.
+    """The response of a wheel by tick, from the first tick with the new command.
 
-    ``speed``: speed of the wheel during the tick.
-
-    ``effort``: effort that the control law computes in the tick.
-
-    The first tick is the first one in which the control law uses the new command.
+    ``speed``: during the tick. ``effort``: computed in the tick.
     """
 
     speed: Array
@@ -65,18 +60,9 @@ class Answer:
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
 ) -> Answer:
-    """Return the response to a step of the commanded speed and a simultaneous step of the load.
+    """Return the response to simultaneous steps of the commanded speed and the load.
 
-    ``load``: size of the step of the load, in PWM steps.
-
-    The control law is that of the manual ("Wheel control"). The feed-forward is outside the
-    accumulator:
-
-    - u(k) = K_ff v + w(k)
-    - w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k)
-
-    An effort acts from the next tick on, delayed by the motor's ``delay_ticks``. The delay may be a
-    fraction of a tick.
+    ``load``: in PWM steps. The control law is that of the manual ("Wheel control").
     """
     shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
     whole, part = divmod(motor.delay_ticks, 1.0)
@@ -86,6 +72,8 @@ def answer(
     feedback, before = np.zeros(shape), np.zeros(shape)
     for tick in range(ticks):
         error = command - turned
+        # u(k) = K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort acts
+        # from the next tick on, and later by ``delay_ticks``.
         feedback = feedback + gains.proportional * (error - before) + gains.integral * error
         before = error
         late = tick + int(whole) + 1
@@ -102,9 +90,9 @@ def answer(
 
 
 def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
-    """Return Ms, the inverse of the smallest distance between the loop's Nyquist curve and -1.
+    """Return Ms: 1 / the smallest distance of the loop's Nyquist curve from -1.
 
-    For a stable loop, Ms is the largest amplification of a disturbance; 1 is best.
+    Ms is a stable loop's largest amplification of a disturbance; 1 is best.
     """
     frequency = np.geomspace(1e-3, np.pi, points)
     z = np.exp(1j * frequency)
@@ -123,9 +111,9 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     decay = np.exp(-1.0 / lag)
 
     def way(share: float) -> float:
-        """Return how many counts the wheel turns from rest in a time of ``share`` ticks.
+        """Return how many counts the wheel turns from rest in ``share`` ticks.
 
-        The effort is constant. With this effort the wheel's final speed is one count per tick.
+        The effort is that of a final speed of one count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 

@@ -15,11 +15,10 @@ Column = NDArray[np.float64]
 
 
 def correlation(rows: Sequence[Column], lags: int) -> Column:
-    """Return a robust estimate of the autocorrelation of residuals, for lags from 0 to ``lags``.
+    """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
-    If ``lags`` is larger than 1, the estimate decreases linearly to the last lag (taper). If
-    ``lags`` is 1, the value at lag 1 shows the cause of the residuals. A value of nearly -0.5 shows
-    displaced marks. A value of 0 shows independent errors of successive times.
+    With one lag: -0.5 shows displaced marks, 0 independent errors. With several, the estimate
+    tapers.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -41,8 +40,7 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 def whitener(of_lags: Column, length: int) -> Column:
     """Return the matrix that removes this autocorrelation from a row of residuals.
 
-    The matrix is the inverse of the Cholesky factor of the covariance. The upper left part of the
-    matrix is the matrix for a shorter row.
+    Its upper left part is the matrix for a shorter row.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]
