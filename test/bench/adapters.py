@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How a USB adapter delivers the bytes of a line: by ticks, in pieces, or in packets with a timer.
+"""How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
 This module knows the baud rate of the line; it does not know the frames. All times are in s.
 """
@@ -43,7 +43,7 @@ def pieces(ticks: Ticks, random: Random) -> Iterator[Handed]:
 def packets(timer_s: float) -> Adapter:
     """Make an adapter like those of FTDI, with a latency timer of ``timer_s``.
 
-    It delivers a packet when it holds 62 bytes, or all that it holds when the timer runs out.
+    A packet has 62 bytes, or fewer when the timer runs out.
     """
 
     def handed(ticks: Ticks, random: Random) -> Iterator[Handed]:

@@ -2,11 +2,10 @@
 
 """Measure the cost of discovery in a fleet, with and without a Fast DDS discovery server.
 
-All drivers run on this computer, but they use only UDP, as drivers on several computers do. The
-program prints rows of the table in docs/fleet.md.
+The program prints rows of the table in docs/fleet.md. All traffic is UDP. Run this as root, in a
+network namespace without other traffic:
 
-``unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]`` runs it in its own network
-namespace, so that no other traffic is counted. This needs root.
+    unshare --net .venv/bin/python test/bench/discovery.py [NUMBER ...]
 """
 
 import os
@@ -22,9 +21,9 @@ PORT: Final = "11811"
 WINDOW_S: Final = 30.0
 """Length of a measurement window, in s."""
 SETTLE_S: Final = 10.0
-"""Time in s to wait for the start of the drivers, and later for the end of the observer's traffic.
+"""Time in s to wait for the drivers' start, and for the end of the observer's traffic.
 
-It is a fixed time, because no event reports the last packet.
+No event reports the last packet.
 """
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """

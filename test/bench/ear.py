@@ -2,12 +2,12 @@
 
 """A subscriber in its own process. It records the time of each message until stdin is closed.
 
-The arguments are namespaces. At the end the program prints one JSON object, which has two lists
-with an array for each namespace:
+Arguments: namespaces. At the end it prints a JSON object. Both lists have an array for each
+namespace:
 
-``heard``: for each Imu message, the steady clock's time in s, and the acceleration along x.
+``heard``: for each Imu, the steady clock's time in s, and the acceleration along x.
 
-``odometries``: for each Odometry message, an array with only the time.
+``odometries``: for each Odometry, an array with only the time.
 """
 
 import json

@@ -2,8 +2,7 @@
 
 """The Fejemis's part of ``make bench``: how long a front angle takes to reach the drive half.
 
-The two simulated halves run on two pseudo-terminals in their own process. The driver's link runs in
-this process, without ROS. Other processes keep the computer busy.
+The simulated halves have their own process. Other processes keep the computer busy.
 """
 
 import contextlib
@@ -44,9 +43,9 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both halves in real time, and send how long each front angle took, in s, to ``results``.
+    """Run both halves in real time; send each front angle's delay, in s, to ``results``.
 
-    The simulated wheel swings from side to side, so that recent angles differ from each other.
+    The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()
     drive, _ = masters

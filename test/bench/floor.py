@@ -2,13 +2,12 @@
 
 """The floor: the smallest program that has the same output as the driver, without any checks.
 
-``measurements PORT NAMESPACE``: the program publishes an Imu for every IMU frame, and an Odometry
-and a JointState for every delta. It trusts the second byte of anything that looks like a frame.
+``measurements PORT NAMESPACE``: publish an Imu for every IMU frame, an Odometry and a JointState
+for every delta.
 
-``commands PORT NAMESPACE``: the program writes a frame for every cmd_vel.
+``commands PORT NAMESPACE``: write a frame for every cmd_vel.
 
-``bare PORT NAMESPACE``: the program has the driver's topics and services, but does nothing. It
-shows how much memory ROS itself needs.
+``bare PORT NAMESPACE``: only have the driver's topics and services, to show the memory of ROS.
 
 Each message or frame has one number, by which the benchmark recognizes it.
 """

@@ -2,9 +2,8 @@
 
 """Command several robots in turn, 40 times a second each, for a number of seconds.
 
-The arguments are the seconds and the namespaces. The program prints a JSON list with an array for
-each namespace. Each array has two numbers for each command: the steady clock's time in s, and the
-forward speed in the board's units.
+Arguments: seconds and namespaces. Output: a JSON list with an array for each namespace. Each
+command has the steady clock's time in s and the speed in the board's units.
 """
 
 import json

@@ -2,8 +2,7 @@
 
 """The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-The driver and the floor each have a board. Both boards send the same bytes, which were recorded at
-rest.
+Driver and floor get the same bytes, which were recorded at rest.
 """
 
 import bisect
@@ -38,9 +37,9 @@ No event reports that they are ready.
 class Stage:
     """Boards on pseudo-terminals, which all send the same recorded stream.
 
-    ``paths``: the names of the terminals.
+    ``paths``: names of the terminals.
 
-    ``heard``: for each board, a list of its reads of commands, each with its time and bytes.
+    ``heard``: by board, its reads of commands as (time, bytes).
     """
 
     def __init__(self, boards: int) -> None:

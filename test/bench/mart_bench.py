@@ -1,12 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART's part of ``make bench``: the latency of commands, and the cost of the regular queries.
+"""The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-There are two simulated controllers on UDP. One is for the driver, and one is for the floor, the
-smallest program that sends as many queries.
-
-The driver computes a new speed from the encoder's count. It sends the speed only after the reply to
-the current query. A stop does not wait for this reply.
+Driver and floor have a simulated controller each, on UDP. The driver sends a speed only after the
+reply to the current query, but a stop at once.
 """
 
 import time
@@ -106,11 +103,9 @@ def _medians(late: list[list[float]], windows: int) -> list[list[float]]:
 def _latencies(
     sent: list[tuple[float, float]], heard: list[tuple[float, bytes]], *, stops: bool
 ) -> list[float]:
-    """Return how long each command took to reach the controller, in µs.
+    """Return how long each command to a moving robot took to reach the controller, in µs.
 
-    Only commands to a moving robot are measured.
-
-    ``stops``: whether to measure stops. If false, changes of speed are measured.
+    ``stops``: measure stops, instead of changes of speed.
     """
     found = []
     for (_, before), (at, speed) in pairwise(sent):

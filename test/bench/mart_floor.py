@@ -2,9 +2,8 @@
 
 """The floor for a MART: the smallest program with the same output, without any checks.
 
-``HOST PORT NAMESPACE``: the program asks for the encoder and the heading, 16 times a second each.
-It publishes an Odometry and a JointState for each count, and trusts each datagram. It sends RM or
-RMCS for every cmd_vel.
+``HOST PORT NAMESPACE``: ask for encoder and heading 16 times a second. Publish an Odometry and a
+JointState for each count. Send RM or RMCS for every cmd_vel.
 """
 
 import socket

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command several MART robots in turn, with another speed every second, which is sometimes zero.
+"""Command several MART robots in turn, with another speed every second, sometimes zero.
 
-The arguments are the seconds and the namespaces. The program prints a JSON list with an array for
-each namespace. Each array has two numbers for each speed: the steady clock's time in s at its first
-publication, and the speed in m/s.
+Arguments: seconds and namespaces. Output: a JSON list with an array for each namespace. Each speed
+has the steady clock's time in s of its first publication, and its value in m/s.
 """
 
 import json

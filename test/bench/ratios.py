@@ -9,11 +9,9 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of one measurement, which was repeated for the driver and the floor in turn.
+    """The results of one measurement, repeated for the driver and the floor in turn.
 
-    ``ours``: the values of the driver.
-
-    ``floor``: the values of the floor. Values at the same position were measured together.
+    ``ours``, ``floor``: the values of driver and floor, in pairs.
 
     ``goal``: the largest allowed ratio of driver to floor.
     """

@@ -2,8 +2,8 @@
 
 """The performance report, which ``make bench`` writes into docs/internals/performance.md.
 
-Each figure is measured together with its floor on the same machine. ``--quick`` shortens all
-measurements, to test that the program runs. The exit code is 1 if a goal is missed.
+``--quick`` shortens all measurements, to test that the program runs. The exit code is 1 if a goal
+is missed.
 """
 
 import argparse

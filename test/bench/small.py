@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Driver and floor on a small computer, which is simulated by limiting their processor time.
+"""Driver and floor on a small computer: each gets a share of one core, by Linux's cgroups.
 
-Each gets a share of one core, as a quota of Linux's cgroups. The quota's period is the shortest
-that the kernel permits, so the processes run slowly but evenly. Only root can set up a cgroup.
+The quota's period is the shortest that the kernel permits, so the processes run evenly. This needs
+root.
 """
 
 import math
@@ -84,11 +84,9 @@ class Group:
 
 
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
-    """Return the rows of a table: the results of driver and floor for each share of one core.
+    """Return the rows of a table: driver and floor for each share of one core.
 
-    ``seconds``: the length of the measurement for each share.
-
-    If cgroups cannot be changed, return one sentence instead.
+    ``seconds``: for each share. Without cgroups, return one sentence.
     """
     try:
         return _table(parts, seconds)

@@ -2,9 +2,8 @@
 
 """Timers that measure the processor time of each stage of the driver's reader.
 
-This code runs in the driver's process before the driver starts. At the end of the process it writes
-a JSON object to the file that the variable SPLIT names. The object has the seconds of each stage.
-It also has, as ``passed``, the seconds for which the reader ran.
+The driver's process runs this first. At its end, it writes a JSON object to the file in the
+variable SPLIT: each stage's seconds, and the reader's whole time as ``passed``.
 """
 
 import atexit

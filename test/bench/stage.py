@@ -2,8 +2,8 @@
 
 """Simulated boards on pseudo-terminals that send the nominal stream and record commands.
 
-Within each tick of 10 ms the boards send one after the other, so that their readers are measured in
-turn. All have the same kind of adapter. Every IMU frame has a number in its first word.
+Within each tick of 10 ms, the boards send one after the other. Every IMU frame has a number in its
+first word.
 """
 
 import heapq
@@ -65,9 +65,9 @@ class Stage:
 
     ``paths``: the names of the terminals, one for each board.
 
-    ``said[n]``: for each tick, the time at which board n delivered the last byte of the IMU frame.
+    ``said[n]``: by tick, when board n delivered the IMU frame's last byte.
 
-    ``heard[n]``: the reads in which board n received commands, each with its time and bytes.
+    ``heard[n]``: board n's reads of commands, as (time, bytes).
     """
 
     def __init__(self, boards: int, adapter: Adapter = pieces) -> None:

@@ -2,8 +2,7 @@
 
 """Relays of growing size between the floor and a correct relay. Each step adds one task.
 
-The arguments are the step, which is a key of STEPS, the port and the namespace. The relay publishes
-serialized messages and writes nothing to the port.
+Arguments: the step (a key of STEPS), the port, the namespace. The relay writes nothing to the port.
 """
 
 import os

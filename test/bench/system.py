@@ -38,10 +38,9 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
     "16 ms timer": (None, 1.25, None, None),
     "whole ticks": (1.10, 1.25, 1.5, 1.10),
 }
-"""Largest allowed ratios of driver to floor, for each adapter. None means that there is no limit.
+"""Largest allowed ratios of driver to floor, for each adapter. None: unlimited.
 
-The four ratios are of the median latency of measurements, its 99th percentile, the processor time,
-and the latency of cmd_vel.
+Latency (median, 99th percentile), processor time, latency of cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Write the kernel's number and the name of each thread to a file.
+"""Write the kernel's number and the name of each thread to the file in the variable NAMES.
 
-The variable NAMES has the name of the file. This code runs in the driver's process before the
-driver starts.
+The driver's process runs this before the driver starts.
 """
 
 import os

@@ -2,9 +2,8 @@
 
 """Make all pictures for the README and the documents that a program can make: ``make pictures``.
 
-Each module of this folder has a function ``main(folder)``, which writes pictures into that folder.
-Each module runs in its own process, two at the same time. Most of them wait for robots that drive
-in real time.
+Each module's ``main(folder)`` writes pictures into that folder. Each module runs in its own
+process, two at the same time.
 """
 
 import os

@@ -17,11 +17,9 @@ Array = NDArray[np.float64]
 
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
-"""``WIDTH`` and ``HEIGHT``: size of the picture in pixels.
+"""The picture's size in pixels, the rows computed at once, and the rays for each pixel.
 
-``BAND``: the number of rows that are computed at once.
-
-``FINER``: the number of rays for each pixel, in each direction.
+``FINER``: number of rays in each direction.
 """
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
@@ -52,13 +50,11 @@ def pose(origin: Any) -> Array:
 
 @dataclass
 class Hits:
-    """The places where rays enter and leave a solid, and the normals of its surface at the places.
+    """The places where rays enter and leave a solid, and the normals of its surface there.
 
-    All arrays have one element for each ray that meets the solid.
+    ``rays``: indices of the rays that meet the solid, one for each element of the other arrays.
 
-    ``rays``: the indices of these rays.
-
-    ``near``, ``far``: the distances at which a ray enters and leaves the solid.
+    ``near``, ``far``: distances at which a ray enters and leaves.
     """
 
     rays: NDArray[np.intp]
@@ -110,9 +106,7 @@ class Solid:
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
         """Return the normals of the surface where rays meet it, at the distances ``at``.
 
-        ``axis``: for each ray, the axis across which the face lies.
-
-        ``sign``: 1 for normals along the ray, -1 for normals against it.
+        ``axis``: across the face. ``sign``: 1 along the ray, -1 against it.
         """
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))
@@ -220,9 +214,9 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 
 
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
-    """Draw the clear solids over the colours behind them, from the lowest solid to the highest.
+    """Draw the clear solids over the colours behind them, from the lowest to the highest.
 
-    A face that is seen at a flat angle covers more of the colour behind it.
+    A face covers more if it is seen at a flat angle.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

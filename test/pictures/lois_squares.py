@@ -2,9 +2,8 @@
 
 """Picture of squares of 5 m that a simulated LOIS ECU drives: the true path and that of ``odom``.
 
-Both firmware variants drive a square to the left and one to the right. The wheels have the size
-that the driver assumes, and the gains are those of the ECU's own host. The errors are printed as
-rows of a table.
+Both firmware variants drive to the left and to the right, with the gains of the ECU's own host. The
+errors are printed as rows of a table.
 """
 
 import math

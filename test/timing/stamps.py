@@ -2,9 +2,8 @@
 
 """The timing report, which writes the accuracy of stamps into docs/internals/time.md.
 
-``--seconds`` is the length of each stream. ``--seeds`` is the number of streams in each cell. The
-clocks of these streams have the skews of ``SKEWS`` in turn. ``--readers`` measures only the readers
-of a busy computer.
+``--seconds``: length of each stream. ``--seeds``: streams in each cell, with the clock skews of
+``SKEWS`` in turn. ``--readers``: measure only the readers of a busy computer.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A test rig: a simulated board with planted errors, a real driver, and a user who answers.
+"""A test rig: a simulated board, a real driver, and a user who answers.
 
-Planted errors are known to the test. A calibration must find them.
+The board has planted errors, which a calibration must find.
 """
 
 import math

@@ -41,10 +41,9 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The robot has reversed axes, another delta frame and a turned IMU.
+    """The tool finds reversed axes, another delta frame and a turned IMU. A driver loads the file.
 
-    The tool finds all of these. The user's first answer is impossible, so the tool says why and
-    asks again. At the end, a driver loads the written file.
+    The user's first answer is impossible, so the tool asks again.
     """
     with rig(
         tmp_path,
@@ -114,10 +113,9 @@ def walk(*answers: str) -> Found:
 def test_an_axis_is_reversed_against_what_the_driver_has(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """One axis is reversed, and the tool finds the signs of the axes.
+    """One axis is reversed. The tool finds it, and notes that the signs mirror the robot.
 
-    A note says that these signs mirror the robot. The answer "r" repeats the motion, and an invalid
-    answer repeats the question.
+    The answer "r" repeats the motion, an invalid answer the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

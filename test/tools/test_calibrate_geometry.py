@@ -38,11 +38,7 @@ def arguments(*words: str) -> argparse.Namespace:
 
 
 def paths() -> list[tuple[str, Column, bool]]:
-    """Return all drives of the calibration, each with its odometry path.
-
-    Each item is the name of the drive, the path, and whether the user measures the heading at the
-    end of the drive. The path goes exactly through the planned places of the drive.
-    """
+    """Return all drives: name, exact path, and whether the user measures the final heading."""
     found = []
     for drive in geometry.plan(1.0, 3, squares=True):
         places = [Pose(), *drive.places]
@@ -93,10 +89,9 @@ def test_any_geometry_is_found_within_what_is_claimed(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """The sizes of 60 robots with slip are fitted.
+    """The sizes of 60 robots with slip are fitted. The claimed uncertainties are true.
 
-    The claimed uncertainties agree with the true errors. An error divided by its claimed
-    uncertainty has a standard deviation near 1.
+    Error / claimed uncertainty has a standard deviation near 1.
     """
     scores = []
     for seed in range(60):
@@ -109,11 +104,7 @@ def test_claimed_uncertainties_are_the_true_ones() -> None:
 
 @given(st.integers(0, 3))
 def test_rolling_with_the_believed_sizes_is_the_way_itself(number: int) -> None:
-    """``rolled`` computes the path of a robot with given sizes.
-
-    Here the sizes are those that the tool assumes. The result is the given path, relative to its
-    first pose.
-    """
+    """``rolled`` with the assumed sizes returns the given path, relative to its first pose."""
     path = paths()[number + 2][1] + [3.0, -2.0, 0.0]
     assert rolled(path, PERFECT, 1.0, BASE_M) == pytest.approx(path - path[0], abs=1e-9)
 
@@ -141,10 +132,10 @@ def test_readings_with_a_wrong_sign_are_turned_away() -> None:
 def test_planted_sizes_are_found_on_the_simulated_robot(
     factors: tuple[float, float, float], base: float, slip: float
 ) -> None:
-    """A robot in simulated time has other sizes than usual. ``calibrate geometry`` finds them.
+    """``calibrate geometry`` finds the sizes of a robot in simulated time.
 
-    Slip shortens every distance, as a smaller wheel would. The sizes in the driver's parameters
-    have no effect, because the board computes its odometry with its own sizes.
+    Slip acts as smaller wheels do. The driver's sizes have no effect: the board computes its
+    odometry.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}

@@ -134,10 +134,9 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
     shown: str, found: dict[str, float]
 ) -> None:
-    """The driver has measured the balance of the motors. The tool writes it to the file.
+    """The tool writes the motors' balance to the file after the driver has measured it.
 
-    As long as the robot has not driven forward, the driver does not know the balance. Then the tool
-    does not write it.
+    Before the robot has driven forward, the balance is unknown.
     """
     robot = Encoder(motor_balance=1.0)
     robot.diagnosed = {"Motor balance": shown}.__getitem__

@@ -42,7 +42,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
     """The robot has slow odometry and does not move. The tool reports this only after 3 s.
 
-    The error does not mention scales, because this robot has no parameter for them.
+    This robot lacks scales, so the error does not mention them.
     """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
@@ -228,8 +228,7 @@ def test_everything_that_may_be_written_is_a_parameter() -> None:
 def test_files_that_will_not_do_are_told_before_anything_moves(tmp_path: Path) -> None:
     """The user names an unsuitable file for the calibration or the picture. The tool rejects it.
 
-    Examples are a file of ROS parameters, an invalid value, a file in place of a folder, and an
-    unknown type of picture.
+    Examples: ROS parameters, an invalid value, an unknown type of picture.
     """
     ros = tmp_path / "driver.yaml"
     ros.write_text("/**:\n  ros__parameters:\n    port: x\n")

@@ -141,7 +141,7 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
 def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
     """The robot is commanded, but does not move. The tool reports this.
 
-    In the test, ``linear_scale`` is one count per m/s, so the driver rounds every command to zero.
+    With a scale of one count per m/s, every command is rounded to zero.
     """
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):
@@ -210,7 +210,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
 ) -> None:
     """The robot does not come to rest after Stop. The error says to cut the robot's power.
 
-    If another error ended the motion, the advice is added to that error.
+    This advice is also added to an earlier error.
     """
     monkeypatch.setattr(robot_module, "STANDING", -1.0)
     monkeypatch.setattr(robot_module, "STANDS_WITHIN_S", 0.5)
@@ -289,10 +289,9 @@ def test_ctrl_c_at_an_open_question_ends_it(
 
 
 def test_a_driver_that_is_gone_ends_it(robot: Robot, rigged: Rig) -> None:
-    """The driver is killed during a motion.
+    """The driver is killed during a motion. Its guard stops the robot.
 
-    Its guard stops the robot, and the tool reports missing data. This is the last test of the
-    module, because it ends the driver that the tests share.
+    The tool reports missing data. This must be the module's last test: the driver is shared.
     """
 
     def kill() -> None:

@@ -25,9 +25,7 @@ ASSUMED = (70.0, 70.0, 500.0)
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
     """Return the log of a drive in which the commands are planned with the scales ``ASSUMED``.
 
-    ``true``: the scales that the board really has.
-
-    ``gyro``: a factor on the rate that the robot's gyro measures.
+    ``true``: the board's scales. ``gyro``: a factor on the measured rate.
     """
     random = np.random.default_rng(seed)
     log, now_s, pose = Log(), 0.0, np.zeros(3)
@@ -76,7 +74,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 ) -> None:
     """Planned commands are whole counts of the board, and are not above ``top``.
 
-    There is one exception: if ``top`` is less than one count, commands of one count are allowed.
+    Exception: one count is always allowed.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -127,9 +125,9 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 def test_planted_scales_are_found_and_applied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A board has other scales than usual. ``calibrate scale`` finds them through a real driver.
+    """``calibrate scale`` finds the board's unusual scales, and ``--apply`` sets them.
 
-    ``--apply`` sets them in the driver. In this test, the driver takes stamped commands.
+    The driver takes stamped commands.
     """
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:

@@ -23,10 +23,9 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wheel B has another motor than the other wheels.
+    """Wheel B has another motor. ``calibrate step`` finds its constants, right within 5 %.
 
-    ``calibrate step`` finds the motor's constants. Gain, PWM per count and time constant are right
-    within 5 %. The tolerance allows for a busy test machine.
+    The tolerance allows for a busy test machine.
     """
     monkeypatch.setattr(step, "RUN_UP_S", 1.3)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:

@@ -48,11 +48,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """Return the direction "up" for three postures of the robot, as the mounted sensor measures it.
-
-    In the first posture the robot is level. In the second its nose is raised, and in the third its
-    left side.
-    """
+    """Return "up" as the mounted sensor measures it: level, nose raised, left side raised."""
     bodies = (
         (0.0, 0.0, 1.0),
         (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
@@ -225,7 +221,7 @@ def resting(
 def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
     """The user turns the robot by hand. A turn to the right, or by too little, is a contradiction.
 
-    The angle is measured about the vertical, after the gyro's bias is subtracted.
+    The angle is about the vertical, without the gyro's bias.
     """
     level, bias = np.array([0.0, 0.0, -1.0]), np.array([0.0, 0.0, 0.1])
 
@@ -308,8 +304,7 @@ def test_the_wrong_frame_turns_with_the_robot(
 ) -> None:
     """The robot drives in one direction of the room before and after a turn.
 
-    With the right delta frame, the odometry shows the same direction in both drives. With the wrong
-    frame, the direction changes by the angle of the turn. Any other change is an error.
+    In the wrong frame, the direction turns with the robot. Any other change is an error.
     """
 
     def heading(rad: float) -> Drift:
@@ -324,10 +319,9 @@ def test_the_wrong_frame_turns_with_the_robot(
 
 
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
-    """The robot turns on the spot. This shows whether the driver interprets the deltas correctly.
+    """A turn on the spot shows whether the driver interprets the deltas correctly.
 
-    The expected numbers are calculated by hand: 0.5 rad/s is 20 mrad in 40 ms, or 24 counts of each
-    wheel.
+    By hand: 0.5 rad/s is 20 mrad in 40 ms, or 24 counts of each wheel.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)

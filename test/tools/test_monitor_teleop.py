@@ -71,10 +71,9 @@ def test_a_repeated_key_ends_sooner_than_a_new_one() -> None:
 
 @pytest.mark.parametrize("key_first", [True, False])
 def test_keys_that_waited_while_it_was_suspended_move_nobody(key_first: bool) -> None:
-    """The user presses keys while the program is suspended.
+    """Keys that are pressed while the program is suspended are discarded. Later keys steer.
 
-    The program discards these keys. Keys that are pressed later steer the robot. The order in which
-    key presses and commands are processed does not matter.
+    The order of key presses and commands does not matter.
     """
     dead_man = DeadMan()
     dead_man.press("w", 0.0)

@@ -72,10 +72,9 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """The board is lost for a while.
+    """The board is lost for a while. The report names the loss once, by the driver's state.
 
-    The driver's state shows this, and the report names the loss once. It does not also report the
-    gaps in the board's data.
+    The gaps in its data are not reported too.
     """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
@@ -96,7 +95,7 @@ def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
     """Timestamps jump ahead by 20 ms and slowly return. The report calls this a jump, not a gap.
 
-    A driver that could not read for some time gives such timestamps.
+    Cause: a driver that could not read for some time.
     """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
@@ -125,9 +124,9 @@ def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) ->
 
 
 def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
-    """The messages of a topic end early. The report shows a gap from there to the end of the log.
+    """The messages of a topic end early. The report shows a gap up to the end of the log.
 
-    If the driver's state explains the end, the report shows no gap.
+    It shows none if the driver's state explains the end.
     """
     drive.imu.drop(17.0, 99.0)
     gap = said(drive, "Gaps", "imu/data_raw has 1 gap, 301 messages")

@@ -77,10 +77,9 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """Messages of the IMU or of odometry are lost during a turn of 2 s.
+    """IMU or odometry messages are lost during a turn of 2 s. Gyro and wheels are not compared.
 
-    The report does not compare gyro and wheels there, because the next pose contains the whole turn
-    in one step.
+    The next pose contains the whole turn in one step.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The profile and the core of a toy board: two serial lines of text, two wheels, and no IMU.
+"""A toy board: two serial lines of text, two wheels, and no IMU.
 
-The line ``drive`` receives the commands ``v LEFT RIGHT``, in mm/s.
-
-The line ``sense`` sends ``d WAY TURN``, in mm and mrad, every 0.4 s.
+The line ``drive`` receives ``v LEFT RIGHT``, in mm/s. The line ``sense`` sends ``d WAY TURN``, in
+mm and mrad, every 0.4 s.
 """
 
 import re

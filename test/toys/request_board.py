@@ -1,12 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The profile and the core of a toy board: requests over UDP, and one blocking move at a time.
+"""A toy board: requests over UDP, and one blocking move at a time.
 
-``WHERE`` is answered by ``at WAY TURN``: the motion since the last such reply, in mm and mrad.
+``WHERE``: the reply ``at WAY TURN`` is the motion since the last reply, in mm and mrad.
 
-``MOVE V W``, in mm/s and mrad/s, moves the robot for 0.2 s and is then answered by ``ok``.
+``MOVE V W``: move for 0.2 s, in mm/s and mrad/s, then reply ``ok``.
 
-``HALT`` on the next higher port ends a move at once.
+``HALT``, on the next higher port: end a move at once.
 """
 
 import math

@@ -107,10 +107,9 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A port makes a real terminal exclusive. So programs that use no locks are refused, too.
+    """A port makes a real terminal exclusive until it is closed, but never a pseudo-terminal.
 
-    When the port is closed, the terminal is no longer exclusive. A pseudo-terminal is never made
-    exclusive.
+    So programs that use no locks are refused, too.
     """
 
     def exclusive() -> bool:

@@ -6,16 +6,13 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are the random ones of ``judge_step.py``, with 24 starts of 120 ticks each. The program
-prints the bound for three kinds of noise in the times between marks:
+The robots are those of ``judge_step.py``. The program prints the bound for three kinds of noise:
 
 - "each time": every time has an independent error of 10 %.
-- "other marks": the marks are misplaced differently in each turn, which changes the times by 10 %.
-- "same marks": the marks have the same places in each turn, so a fit can find the places. Only the
-  rounding of the times to 0.1 ms remains.
+- "other marks": the marks are misplaced differently in each turn, by 10 %.
+- "same marks": the same in each turn. Only the rounding to 0.1 ms remains.
 
-In all three cases, the load changes by 0.5 % from record to record. The rate of the wheel changes
-with the load.
+In each case, the load and the rate change by 0.5 % from record to record.
 """
 
 from random import Random
@@ -36,8 +33,7 @@ Column = NDArray[np.float64]
 def times_s(values: Column) -> Column:
     """Return the times in s at which a starting wheel passes its marks.
 
-    ``values``: the final rate in marks per s, the slow time constant in s, the fast one in s, and
-    the places of the marks.
+    ``values``: final rate (marks/s), slow and fast time constant (s), places of the marks.
     """
     rate, slow_s, fast_s = values[:3]
     grid_s = np.linspace(0.0, 1.0, 20_000) ** 2 * (SAMPLES + 3) / rate * 1.5

@@ -2,13 +2,11 @@
 
 """Judge the fit and the tuning of wheels on random robots with unknown motors.
 
-Run this by hand, with the number of robots and optionally the seed of the first one:
+Run this by hand, with the number of robots and optionally the first seed (10 s for each wheel):
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_fit.py 20
 
-The program needs ten seconds for each wheel. Unlike ``judge_step.py``, it needs no driver. Its
-records come from the simulated motors and encoders alone. Its steps come from the complete
-simulated board with the public firmware.
+No driver runs. The steps come from the simulated board with the public firmware.
 """
 
 import sys

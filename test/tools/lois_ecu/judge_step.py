@@ -2,13 +2,11 @@
 
 """Judge ``calibrate step`` on random robots with a LOIS ECU and unknown motors.
 
-Run this by hand, with the number of robots and optionally the seed of the first one:
+Run this by hand, with the number of robots and optionally the first seed (2 min for each robot):
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-The program needs about two minutes for each robot. After the calibration, each robot makes a step
-with the gains that were found. In this step, its marks are evenly spaced. The program prints the
-overshoot of the true wheel speeds.
+It prints the overshoot of the true wheel speeds with the found gains and even marks.
 """
 
 import contextlib
@@ -49,9 +47,9 @@ def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
 
 
 def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) -> list[float]:
-    """Return the overshoot of each wheel's true speed in a step with the gains that were found.
+    """Return the overshoot of each wheel's true speed in a step with the found gains.
 
-    The overshoot is relative to the final speed or to the target, whichever is higher.
+    It is relative to the final speed or the target, whichever is higher.
     """
     robot = SimulatedRobot(folder, motors, mark_noise=0.0)
     found = pi_step._gains({wheel.name: wheel.tuned for wheel in wheels})

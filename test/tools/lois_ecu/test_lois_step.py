@@ -90,10 +90,9 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """Misplaced marks change the times between ticks by 10 %.
+    """Misplaced marks change the times between ticks by 10 %. The fit finds their places.
 
-    The fit finds the places of the marks. With these places the remaining error is less than 1 %.
-    It comes from the rounding of the clock.
+    An error of less than 1 % remains, from the rounding of the clock.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -142,7 +141,7 @@ def test_records_that_are_too_short_are_refused() -> None:
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
     """An encoder has short and long ticks in turn. The tool finds the correction of each.
 
-    The first tick may be short or long, and some edges are missed.
+    The first tick may be short or long. Some edges are missed.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -175,8 +174,7 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
     """The board sends data during a step, which delays its controller.
 
-    The gains are tuned for an overshoot of at most 5 %. With the delay, 95 % of the overshoots are
-    below 8 %.
+    The gains are for an overshoot of 5 %. 95 % of the overshoots are below 8 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
@@ -188,9 +186,9 @@ def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plan
 
 
 def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
-    """The board sends its ticks after the end of a step. This does not change the step's response.
+    """A board that sends its ticks during a step changes the step's response.
 
-    If the board sends them during the step, the response changes.
+    If it sends them afterwards, the response stays the same.
     """
     loop, gains = replace(LOOP, sends_each_s=100.0), PiGains(0.8, 0.6, 0.1)
     calm = answer(PLANT, gains, loop, 31.0, 3.0)
@@ -208,10 +206,9 @@ def test_goals_that_nothing_meets_are_told() -> None:
 
 
 def test_a_phase_margin_is_that_of_the_open_loop() -> None:
-    """The phase margin is compared with that of a simple open loop, which is calculated by hand.
+    """The phase margin is compared with that of a simple open loop, calculated by hand.
 
-    With small lags the open loop is Kp K / (s Tn). Its gain is 1 at the angular frequency Kp K /
-    Tn.
+    With small lags it is Kp K / (s Tn), with gain 1 at Kp K / Tn.
     """
     loop = Loop(1e-6, 10**9, nominal_s=1e-6)
     plant = Plant(1.0, 0.5, 0.0)
@@ -239,10 +236,9 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
 def test_a_step_is_predicted_as_the_simulated_board_makes_it(
     firmware: Firmware, gains: PiGains
 ) -> None:
-    """The tool predicts a step. The step of the simulated board agrees with the prediction.
+    """The tool predicts a step as the simulated board, a separate program, makes it.
 
-    The simulated board is a separate program. Its controller runs 11 or 5 times a second, depending
-    on the firmware.
+    Its controller runs 11 or 5 times a second, depending on the firmware.
     """
     motor = MotorSettings(
         rpm_per_percent=0.66,
@@ -289,8 +285,7 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
     """The times of a record have overflowed. The tool refuses the record.
 
-    The manual gives 100 ns as the unit of these times. In this unit, the time between two ticks of
-    a usual wheel exceeds the largest number that a record can hold.
+    A usual time between ticks overflows in the manual's unit, 100 ns.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
@@ -312,8 +307,7 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
 
-    ``calibrate step`` finds corrections, plants and gains, and sets them in the driver. All these
-    parameters are allowed in the driver's calibration file.
+    ``calibrate step`` sets corrections, plants and gains. All are allowed in the calibration file.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
