@@ -2,8 +2,8 @@
 
 """A subscriber in its own process. It records the time of each message until stdin is closed.
 
-Arguments: namespaces. At the end it prints a JSON object. Both lists have an array for each
-namespace:
+The arguments are namespaces. The output is a JSON object with two lists, each with an array for
+each namespace:
 
 ``heard``: for each Imu, the steady clock's time in s, and the acceleration along x.
 

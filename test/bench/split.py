@@ -3,7 +3,7 @@
 """Timers that measure the processor time of each stage of the driver's reader.
 
 The driver's process runs this first. At its end, it writes a JSON object to the file in the
-variable SPLIT: each stage's seconds, and the reader's whole time as ``passed``.
+variable SPLIT: seconds by stage, and the reader's whole time as ``passed``.
 """
 
 import atexit

@@ -12,9 +12,9 @@ PROMPT = [line for line in LINES if "block" not in line]
 @pytest.mark.parametrize("line", PROMPT)
 @pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
 def test_lost_bytes_shift_no_stamps(line: str, scenario: str) -> None:
-    """One byte in 1000 is lost. The stamps stay even within 0.2 ms (RMS), and right within 0.5 ms.
+    """One byte in 1000 is lost. The stamps stay even within 0.2 ms (RMS).
 
-    This holds for 99 %, after 2 s, apart from a constant offset.
+    99 % are right within 0.5 ms. The first 2 s and a constant offset do not count.
     """
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(line, scenario, 1e-3, skew, seed, 15.0)

@@ -115,7 +115,7 @@ def test_an_axis_is_reversed_against_what_the_driver_has(
 ) -> None:
     """One axis is reversed. The tool finds it, and notes that the signs mirror the robot.
 
-    The answer "r" repeats the motion, an invalid answer the question.
+    The answer "r" repeats the motion. An invalid answer repeats the question.
     """
     found = walk("r", "what?", "+00", "0+0", "00+", "-+0", "++-", "---")
     assert found.axis_signs == (1, -1, 1)

@@ -134,8 +134,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 ) -> None:
     """``calibrate geometry`` finds the sizes of a robot in simulated time.
 
-    Slip acts as smaller wheels do. The driver's sizes have no effect: the board computes its
-    odometry.
+    Slip shortens distances as smaller wheels do. The driver's sizes have no effect.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}

@@ -187,8 +187,7 @@ def misses(
 ) -> tuple[float, float]:
     """Return two mean errors of the odometry at the ends of the drives, in m.
 
-    First with the present geometry, then with ``found``. Both use one radius for all wheels, as the
-    driver does.
+    The first is by the present geometry, the second by ``found`` with one radius for all wheels.
     """
     before: list[float] = []
     after: list[float] = []

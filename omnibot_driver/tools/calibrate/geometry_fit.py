@@ -47,11 +47,13 @@ class Reading:
 class Geometry:
     """The robot's sizes, as ratios to the assumed sizes.
 
+    ``wheels``, ``base``: of the wheels' mean radius, and of the base radius.
+
     ``unlike``: relative difference of each wheel's radius from the mean, (3,).
 
     ``covariance``: (4, 4), of ``wheels``, ``base`` and the first two of ``unlike``.
 
-    ``excess``: ratio of the residuals to the expected residuals, at least 1.
+    ``excess``: residuals / expected residuals, at least 1.
     """
 
     wheels: float

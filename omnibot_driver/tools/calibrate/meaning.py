@@ -33,7 +33,7 @@ DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
 
-0 if the deltas are interpreted correctly, otherwise 2 or more.
+The ratio is 0 for correctly interpreted deltas, otherwise 2 or more.
 """
 ALIKE: Final = 0.35
 """Two angles are regarded as equal if they differ by at most this fraction of the robot's turn."""

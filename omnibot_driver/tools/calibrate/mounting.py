@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find how the IMU is mounted, from gravity in three postures of the robot.
+"""Find how the IMU is mounted, from gravity: level, front raised, left side raised.
 
-Postures: level, front raised, left side raised. A turn to the left shows whether gyro and gravity
-agree. This module knows IMU readings; it does not know who holds the robot.
+A turn to the left shows whether gyro and gravity agree. This module knows IMU readings; it does not
+know who holds the robot.
 """
 
 import math

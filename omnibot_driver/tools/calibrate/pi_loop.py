@@ -50,7 +50,7 @@ class Loop:
 
     ``feed_forward``: duty in percent for each RPM of the set-point.
 
-    ``low_pass``: of the set-point, from 0 to 1. 1: no filter.
+    ``low_pass``: coefficient of the set-point's filter. 1: no filter.
 
     ``sends_each_s``: period with which the board sends its ticks.
     """
@@ -84,10 +84,9 @@ def answer(
     begun: Array | float = 0.0,
     sent_s: Array | None = None,
 ) -> Array:
-    """Return the speed in RPM after a step of the set-point from standstill.
+    """Return the speed in RPM after a step of the set-point from standstill, by ``STEP_S``.
 
-    Shape: steps of ``STEP_S``, then the common shape of the gains, ``dead_s``, ``begun`` and
-    ``sent_s``.
+    Its further dimensions are those of the gains, ``dead_s``, ``begun`` and ``sent_s``.
 
     ``dead_s``: replaces the loop's. ``begun``: wheel position between two marks, 0 to 1.
 

@@ -2,8 +2,8 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A tilt or a slope looks like a sideways bias of the accelerometer. So only its bias along gravity is
-found. This module knows readings; it does not know how they are recorded.
+Tilt, slope and sideways bias look equal, so only the bias along gravity is found. This module knows
+readings; it does not know how they are recorded.
 """
 
 from collections.abc import Callable

@@ -242,7 +242,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with their onsets moved to the ticks that fit the model best.
 
-    A busy computer may delay a command, or a command may arrive close to a tick.
+    A command from a busy computer, or close to a tick, takes effect late.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

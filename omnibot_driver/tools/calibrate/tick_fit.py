@@ -2,9 +2,8 @@
 
 """Fit a plant to the times between encoder ticks of a wheel that starts at full duty.
 
-The plant has first or second order, whichever fits better. A record begins at its first tick, so it
-does not show the dead time. This module knows times between ticks; it does not know how they were
-recorded.
+The plant has first or second order. A record begins at its first tick, so it does not show the dead
+time. This module knows times between ticks; it does not know how they were recorded.
 """
 
 import math

@@ -2,9 +2,8 @@
 
 """Find the positions of an encoder's marks from several records of a wheel.
 
-Uneven marks cause relative errors of the times between ticks that repeat with each turn. Each
-record begins at an unknown mark. This module knows these errors; it does not know how the wheel
-moved.
+Uneven marks cause errors of the times between ticks, in each turn the same. Records begin at
+unknown marks. This module knows these errors; it does not know how the wheel moved.
 """
 
 from collections.abc import Sequence

@@ -47,7 +47,7 @@ Even such distant residuals are correlated, because the load changes slowly.
 MISSED: Final = 0.42
 """Sum of two successive relative errors above which the board has missed a mark.
 
-A late mark gives a sum near 0. A missed mark may give less than 1: the clock loses up to 6 ms.
+Late mark: near 0. Missed mark: less than 1, because the board's clock loses up to 6 ms.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which the board cannot miss a mark.

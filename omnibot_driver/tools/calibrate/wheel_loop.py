@@ -2,9 +2,9 @@
 
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-Units: counts per tick of 10 ms, PWM steps, ticks. Both speeds must have the same direction, so that
-dry friction is constant. This module knows the motor and the control law; it does not know
-measurements or radians.
+Units: counts per tick of 10 ms, PWM steps, ticks. The direction must not change: the dry friction
+is constant. This module knows the motor and the control law; it does not know measurements or
+radians.
 """
 
 from dataclasses import dataclass

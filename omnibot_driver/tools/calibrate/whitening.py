@@ -17,8 +17,7 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
-    With one lag: -0.5 shows displaced marks, 0 independent errors. With several, the estimate
-    tapers.
+    One lag: -0.5 shows displaced marks, 0 shows independent errors. More lags are tapered.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

@@ -9,8 +9,8 @@ Run this by hand:
 The robots are those of ``judge_step.py``. The program prints the bound for three kinds of noise:
 
 - "each time": every time has an independent error of 10 %.
-- "other marks": the marks are misplaced differently in each turn, by 10 %.
-- "same marks": the same in each turn. Only the rounding to 0.1 ms remains.
+- "other marks": the marks have other places in each turn, 10 % off.
+- "same marks": the marks keep their places. Only the rounding to 0.1 ms remains.
 
 In each case, the load and the rate change by 0.5 % from record to record.
 """

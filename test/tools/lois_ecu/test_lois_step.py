@@ -208,7 +208,7 @@ def test_goals_that_nothing_meets_are_told() -> None:
 def test_a_phase_margin_is_that_of_the_open_loop() -> None:
     """The phase margin is compared with that of a simple open loop, calculated by hand.
 
-    With small lags it is Kp K / (s Tn), with gain 1 at Kp K / Tn.
+    With small lags, the loop is Kp K / (s Tn). Its gain is 1 at Kp K / Tn.
     """
     loop = Loop(1e-6, 10**9, nominal_s=1e-6)
     plant = Plant(1.0, 0.5, 0.0)
@@ -236,9 +236,9 @@ def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
 def test_a_step_is_predicted_as_the_simulated_board_makes_it(
     firmware: Firmware, gains: PiGains
 ) -> None:
-    """The tool predicts a step as the simulated board, a separate program, makes it.
+    """The tool's prediction of a step agrees with the step of a simulated board.
 
-    Its controller runs 11 or 5 times a second, depending on the firmware.
+    The board's controller runs 11 or 5 times a second, depending on the firmware.
     """
     motor = MotorSettings(
         rpm_per_percent=0.66,
