@@ -2,8 +2,7 @@
 
 """A subscriber in its own process. It records the time of each message until stdin is closed.
 
-The arguments are namespaces. The output is a JSON object with two lists, each with an array for
-each namespace:
+The arguments are namespaces. The output is a JSON object. By namespace, it has:
 
 ``heard``: for each Imu, the steady clock's time in s, and the acceleration along x.
 

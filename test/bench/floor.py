@@ -9,7 +9,7 @@ for every delta.
 
 ``bare PORT NAMESPACE``: only have the driver's topics and services, to show the memory of ROS.
 
-Each message or frame has one number, by which the benchmark recognizes it.
+The benchmark recognizes each message or frame by a number.
 """
 
 import os

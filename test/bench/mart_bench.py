@@ -2,8 +2,8 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-Driver and floor have a simulated controller each, on UDP. The driver sends a speed only after the
-reply to the current query, but a stop at once.
+Driver and floor have a simulated controller each, on UDP. The driver sends a speed after the
+current reply, but a stop at once.
 """
 
 import time

@@ -73,7 +73,7 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str) -> None:
     """A reader is late because the computer is busy. The stamps are as accurate as usual.
 
-    Readers in parts are left out: some of their stamps are wrong by a tick.
+    Readers in parts are left out: they misplace some stamps by a tick.
     """
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(reader, scenario, 0.0, skew, seed, 15.0)

@@ -120,7 +120,7 @@ def test_where_no_line_is_left_all_are_lost(ends: Ends, lines: Several) -> None:
 
 
 def test_a_line_that_is_full_does_not_delay_the_others(ends: Ends, lines: Several) -> None:
-    """One line is full. A write does not wait for it, and the other line gets its data at once.
+    """One line is full. A write does not wait for it. The other line gets its data at once.
 
     Later the full line is reported as missing, and its old data is discarded.
     """

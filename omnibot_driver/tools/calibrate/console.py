@@ -90,8 +90,7 @@ class Console:
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
         """Show the progress of a task while the context lasts.
 
-        The context provides a function. The caller calls this function with the completed fraction,
-        from 0 to 1.
+        The caller reports the completed fraction, 0 to 1, to the context's function.
         """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")

@@ -21,9 +21,7 @@ PICTURES = (".png", ".svg", ".pdf")
 def output_file(given: str | None, drivers: str, table: Table) -> Path:
     """Return the path of the result: ``given``, else ``drivers``, else ``DEFAULT``.
 
-    ``drivers``: the driver's calibration file.
-
-    Raises ToolError if the file cannot be written, or is not a calibration file.
+    ``drivers``: the driver's calibration file. Raises ToolError if the file is not suitable.
     """
     try:
         path = calibration.locate(given or drivers or DEFAULT)
@@ -43,7 +41,7 @@ def output_file(given: str | None, drivers: str, table: Table) -> Path:
 def picture_file(given: str | None, subcommand: str) -> Path:
     """Return the path of the picture, by default ``calibrate_<subcommand>.png``.
 
-    ``given``: a file, a folder, or None for the current folder.
+    ``given``: a file, a folder, or None.
 
     Raises ToolError if the file cannot be written, or if its suffix is not in ``PICTURES``.
     """

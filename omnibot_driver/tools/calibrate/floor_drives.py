@@ -38,9 +38,9 @@ def measured(
 ) -> list[Measured]:
     """Run each drive and let the user measure it; return the measurements.
 
-    ``go``: runs a drive; returns its odometry poses. ``measure``: asks the user about them.
+    ``go``: returns a drive's odometry poses. ``measure``: asks the user about them.
 
-    Raises ToolError if the user does not confirm that there is room, or if a drive fails.
+    Raises ToolError if a drive fails, or if the user denies that there is room.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
@@ -82,9 +82,7 @@ def driven(
 ) -> Column:
     """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``: size of the whole turn. ``seconds``: expected duration.
-
-    Raises ToolError if the drive fails.
+    ``turn_rad``: size of the whole turn. Raises ToolError if the drive fails.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(

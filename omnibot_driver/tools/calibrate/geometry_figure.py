@@ -19,7 +19,7 @@ def draw(
 ) -> None:
     """Draw each drive's path with the old and with the new geometry, and its measured end.
 
-    Beside the paths, draw the errors, in standard deviations of the reading.
+    Also draw the errors, in standard deviations of the reading.
     """
     left, right = figure.subplots(1, 2, width_ratios=(3, 2))
     placed = [one for one in readings if not np.isnan(one.end[:2]).any()]

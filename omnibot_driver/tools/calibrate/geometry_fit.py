@@ -47,11 +47,11 @@ class Reading:
 class Geometry:
     """The robot's sizes, as ratios to the assumed sizes.
 
-    ``wheels``, ``base``: of the wheels' mean radius, and of the base radius.
+    ``wheels``: of the wheels' mean radius. ``base``: of the base radius.
 
-    ``unlike``: relative difference of each wheel's radius from the mean, (3,).
+    ``unlike``: relative deviation of each wheel from the mean, (3,).
 
-    ``covariance``: (4, 4), of ``wheels``, ``base`` and the first two of ``unlike``.
+    ``covariance``: of ``wheels``, ``base``, ``unlike[:2]``.
 
     ``excess``: residuals / expected residuals, at least 1.
     """
@@ -85,7 +85,7 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
     ``drift``: standard deviation of a wheel's distance of 1 m by slip, in m.
 
-    Raises ToolError if the fit fails, or if a radius is off by more than ``UNKNOWN``.
+    Raises ToolError if the fit fails, or if a radius differs by more than ``UNKNOWN``.
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -116,9 +116,9 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
     """Return the poses, (n, 3), of the same wheel rotations with other radii.
 
-    ``path``: poses by the assumed radii. The new path begins at the origin.
+    ``path``: poses by the assumed radii. The result begins at the origin.
 
-    ``factors``: new/assumed radius of each wheel, (3,), or of each step, (n - 1, 3).
+    ``factors``: new/assumed radius of each wheel, (3,), or by step, (n - 1, 3).
 
     ``base``: new/assumed base radius.
     """

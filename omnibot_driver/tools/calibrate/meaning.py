@@ -92,8 +92,8 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
     None if the motions fit neither method, e.g. because a busy computer delayed commands.
     """
     # In velocity control the speed is constant, and doubles with the command. In positional control
-    # the command is a position a few mm away. The robot stops there, or still drives there at a
-    # speed that both commands share.
+    # the command is a position a few mm from the origin of the board's frame. The robot has stopped
+    # there, or still drives there at a speed that does not depend on the command.
     both = slow, fast
     if any(one.late_mps <= max(STANDS_PART * slow_mps, STOPS_PART * one.early_mps) for one in both):
         return "position"
@@ -113,7 +113,7 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     """Return whether the frame of the odometry deltas is set correctly, "earth" or "body".
 
-    ``before``, ``after``: the same command before and after a turn by ``turned_rad``.
+    ``before``, ``after``: by the same command, around a turn by ``turned_rad``.
 
     Raises ToolError if neither frame fits.
     """

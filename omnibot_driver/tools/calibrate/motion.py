@@ -19,10 +19,9 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A control law: the command by the time in s and the pose, both since the start.
+"""A control law: the command by the time in s and the unwrapped pose, since the start.
 
-None ends the motion. ``cmd_vel``: m/s, m/s, rad/s. ``wheel_cmd``: rad/s of wheels A, B, C. The yaw
-is unwrapped.
+None ends the motion. Units: m/s, m/s, rad/s for ``cmd_vel``, rad/s for ``wheel_cmd``.
 """
 
 LOOK_S: Final = 1.0
@@ -38,7 +37,7 @@ SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 """Speeds below which the tool does not check that the robot moves, because of friction.
 
-Linear, turning: in m/s and rad/s, or both in rad/s of a wheel.
+(Linear, turning): m/s and rad/s, or rad/s of a wheel.
 """
 
 
@@ -46,9 +45,9 @@ Linear, turning: in m/s and rad/s, or both in rad/s of a wheel.
 class Bounds:
     """Limits of one motion. For ``wheel_cmd``, rad/s of a wheel replaces m/s.
 
-    ``speed``, ``turning``: largest commands, in m/s and rad/s.
+    ``speed``, ``turning``: in m/s and rad/s.
 
-    ``way``, ``turn``: largest distance and turn by the odometry, in m and rad.
+    ``way``, ``turn``: from the start by the odometry, in m and rad.
 
     ``seconds``: longest duration.
 

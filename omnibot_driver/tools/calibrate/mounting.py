@@ -96,8 +96,7 @@ def bias(imu: Imu) -> Array:
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     """Return the mounting from "up" in three postures, as unit vectors in the sensor's axes.
 
-    Raises Contradiction if a tilt is too small or too large, or if the tilts are not at a right
-    angle.
+    Raises Contradiction if a tilt is too small or too large, or if the tilts are not square.
     """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)

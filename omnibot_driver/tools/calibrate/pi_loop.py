@@ -42,9 +42,7 @@ class PiGains:
 class Loop:
     """The control loop of a wheel. Times are in s.
 
-    ``dead_s``: from a duty to its effect on the speed.
-
-    ``whole_rpm``: the controller rounds the measured speed down to whole RPM.
+    ``whole_rpm``: the controller rounds the measured speed down.
 
     ``nominal_s``: the control period that the board assumes.
 
@@ -52,7 +50,7 @@ class Loop:
 
     ``low_pass``: coefficient of the set-point's filter. 1: no filter.
 
-    ``sends_each_s``: period with which the board sends its ticks.
+    ``sends_each_s``: period of the board's messages with ticks.
     """
 
     period_s: float
@@ -68,7 +66,7 @@ class Loop:
     def stretch(self) -> float:
         """Written time constant divided by the time constant that results on the board.
 
-        The ratio differs from 1 because the board's control period is not the nominal period.
+        The board computes with ``nominal_s`` instead of ``period_s``.
         """
         return self.nominal_s / self.period_s
 
@@ -86,11 +84,11 @@ def answer(
 ) -> Array:
     """Return the speed in RPM after a step of the set-point from standstill, by ``STEP_S``.
 
-    Its further dimensions are those of the gains, ``dead_s``, ``begun`` and ``sent_s``.
+    Further dimensions: the common shape of the gains and the last three arguments.
 
     ``dead_s``: replaces the loop's. ``begun``: wheel position between two marks, 0 to 1.
 
-    ``sent_s``: when the board first sends ticks, or None for never.
+    ``sent_s``: when the board first sends ticks, or None.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -156,7 +154,7 @@ class Traits:
 
     ``overshoot``: fraction of the final speed or of the target, whichever is higher.
 
-    ``settled_s``: infinite if the speed leaves the band, or does not end at the target.
+    ``settled_s``: infinite if the speed does not stay at the target.
 
     ``error_s``: integral of the absolute error divided by the target.
     """

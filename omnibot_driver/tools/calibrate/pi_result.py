@@ -64,11 +64,9 @@ class WheelTuned:
 
     ``fit``: the plant as fitted to the starts at full duty.
 
-    ``plant``: with gain and dead zone. The gains were tuned for it.
+    ``plant``: the plant for which the gains were tuned.
 
-    ``loop``: with the fitted dead time.
-
-    ``before``, ``after``: records of steps with the previous and with the new gains.
+    ``before``, ``after``: steps with the previous and with the new gains.
     """
 
     name: str

@@ -184,7 +184,7 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 def _plant(found: PlantFit, free: Levels) -> Plant:
     """Return the plant of a wheel: gain and dead zone come from the speeds at two duties.
 
-    ``found``: fit to starts at full duty. ``free``: measurement at half duty.
+    ``found``: at full duty. ``free``: at half duty.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:

@@ -38,7 +38,7 @@ The position decides in which control period a tick comes.
 SENT: Final = np.arange(0.0, 1.0, 0.125)
 """Times at which the board first sends ticks, as fractions of its sending period.
 
-This time decides which ticks the board notices late, so it changes the response.
+The time decides which ticks the board notices late.
 """
 DISTURBED: Final = 0.02
 """Overshoot that is allowed beyond the goal if the board sends ticks during a step."""
@@ -55,14 +55,13 @@ With Td = 0, an oscillation from one control period to the next does not decay.
 class Goals:
     """The goals of a tuning, on a step of the set-point.
 
-    ``overshoot``, ``band``: largest allowed overshoot and final deviation, as fractions of the
-    speed.
+    ``overshoot``, ``band``: largest overshoot and final deviation, as fractions of the speed.
 
     ``destination``: set-point, as a fraction of the speed at full duty.
 
-    ``settled_s``: the tool warns the user about a longer settling time.
+    ``settled_s``: a longer settling time causes a warning.
 
-    ``phase_margin_deg``: smallest allowed. None: Td is 0, and the overshoot limits the gain.
+    ``phase_margin_deg``: None: Td is 0, and the overshoot limits the gain.
     """
 
     overshoot: float = 0.05
@@ -170,7 +169,7 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, with which the model explains all wheels' steps best.
 
-    At least ``LEAST_DEAD_S``, because gains for a shorter dead time make the speed overshoot.
+    At least ``LEAST_DEAD_S``: too short a value makes the speed overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)

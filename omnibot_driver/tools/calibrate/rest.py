@@ -20,8 +20,7 @@ from omnibot_driver.tools.needs import ToolError
 BLOCK_S: Final = 1.0
 """Length of a block of readings, in s.
 
-The scatter of the readings within a block shows the noise. The scatter of the blocks' means shows
-the drift.
+Scatter within blocks shows noise. Scatter of the blocks' means shows drift.
 """
 FEWEST: Final = 100
 LOST_PART: Final = 0.02
@@ -33,11 +32,7 @@ class Rest:
 
     ``bias_sigma``: includes the bias's random walk until the end of the measurement.
 
-    ``force_mps2``: mean specific force.
-
     ``rate_noise``, ``force_noise``: standard deviation of a single reading.
-
-    ``readings``, ``period_s``: number and period.
 
     ``curves``, ``noises``: the gyro's Allan deviation and its fitted noise.
     """

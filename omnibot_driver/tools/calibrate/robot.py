@@ -104,9 +104,9 @@ class Robot(Listener):
     ) -> Log:
         """Move the robot by the law, within the bounds, then stop it; return the log.
 
-        ``obeys``: whether a robot that does not move is a fault.
+        ``obeys``: whether it is a fault if the robot does not move.
 
-        ``monitored``: must be false while the motion's speed or direction is not calibrated.
+        ``monitored``: must be false before speed and direction are calibrated.
 
         ``show``: called with the seconds since the start.
 
@@ -137,9 +137,9 @@ class Robot(Listener):
         return self.log
 
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
-        """Let the driver record the response to ``command``; return the path of the record.
+        """Record the response to ``command``; return the path of the driver's record.
 
-        The robot must be at rest at the request. Raises ToolError on any fault, as ``drive`` does.
+        The robot must be at rest. Raises ToolError on any fault, as ``drive`` does.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)

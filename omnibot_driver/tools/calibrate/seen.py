@@ -83,7 +83,7 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 def axis_sign(axis: int, seen: Pattern) -> int:
     """Return 1 if the wheels show a motion along +axis, -1 along -axis.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction for any other pattern.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction otherwise.
     """
     expected = wanted(axis)
     if seen == expected:
@@ -99,7 +99,7 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    Another choice of the front changes the signs too, but keeps sign(x) sign(y) = sign(yaw).
+    Another choice of the front keeps sign(x) sign(y) = sign(yaw).
     """
     x, y, yaw = signs
     return x * y != yaw

@@ -70,9 +70,7 @@ class Scale:
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
     """Return commands in both directions along each axis, each with its duration in s.
 
-    ``top``: largest speeds. ``scales``: counts per m/s or rad/s.
-
-    ``levels``: number of speeds by axis. Speeds are whole counts.
+    ``top``: largest speeds. ``scales``: counts per m/s or rad/s. ``levels``: speeds by axis.
     """
     stairs = []
     for level in range(1, levels + 1):
@@ -90,7 +88,7 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 
     ``scales``: counts per m/s or rad/s. ``up``: in the sensor's axes.
 
-    Raises ToolError if the log contains no such command.
+    Raises ToolError without such a command.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -144,7 +142,7 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
     """Return the time spans of steady speed as (begin, end, command), without zero commands.
 
-    A pause between commands begins a new span: the driver may have dropped the command.
+    A pause begins a new span: the driver may have dropped the command.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -165,9 +163,9 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the coordinate of each pose along one of the robot's axes.
+    """Return the coordinate of each pose along one of the robot's axes, at the mean heading.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. x and y are those of the mean heading.
+    ``axis``: 0 for x, 1 for y, 2 for yaw.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

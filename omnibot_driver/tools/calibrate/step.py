@@ -81,7 +81,7 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    Each step begins at another time within an odometry delta, to show all parts of the response.
+    Steps begin at different times within an odometry delta, to show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):
@@ -102,7 +102,7 @@ def _wheels(names: str) -> str:
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
     """Return the slow and the fast speed in rad/s, as whole units of the board's command.
 
-    Raises ToolError if they are not allowed, or are the same command.
+    Raises ToolError if they are not allowed, or are equal.
     """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:

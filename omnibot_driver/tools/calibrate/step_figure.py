@@ -74,7 +74,7 @@ def _draw_predictions(
 ) -> None:
     """Draw each motor's predicted response with the present and with the better gains.
 
-    ``command``, ``load``: sizes of the steps. Load 1 is the effort for one count per tick.
+    ``load``: size of its step. 1 is the effort for one count per tick.
     """
     times_ms = 1000 * TICK_S * (np.arange(PREDICTED_TICKS) + 0.5)
     for name, gains, colour in (("now", now, "C0"), ("better", better, "C1")):

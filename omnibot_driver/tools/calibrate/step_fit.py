@@ -2,8 +2,8 @@
 
 """Fit models with uncertainties to recorded steps of one wheel.
 
-Time 0 of a step is its *onset*: the first control tick that could use the command. ``aligned``
-corrects it. This module knows commands and wheel rates; it does not know how they were recorded.
+Time 0 of a step is its *onset*: the first control tick that could use the command. This module
+knows commands and wheel rates; it does not know how they were recorded.
 """
 
 import math
@@ -52,10 +52,9 @@ class Step:
 
     ``rate_radps``: mean rate in each delta, over its four ticks.
 
-    ``last_radps``: commanded before ``before_radps``. The response to that change may still
-    continue.
+    ``last_radps``: commanded before ``before_radps``. Its effect may still continue.
 
-    ``last_ticks``: from that change to the onset.
+    ``last_ticks``: from the change between these two rates to the onset.
     """
 
     before_radps: float
@@ -230,7 +229,7 @@ class WheelFound:
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
     """Fit three models to a wheel's steps: first order, second order, and a motor.
 
-    ``now``: the gains in the firmware, for the manual's control loop around the motor.
+    ``now``: the gains in the firmware, in the motor's control loop.
     """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
@@ -242,7 +241,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with their onsets moved to the ticks that fit the model best.
 
-    A command from a busy computer, or close to a tick, takes effect late.
+    A command may take effect late, e.g. on a busy computer.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):

@@ -66,7 +66,7 @@ def first_order(parameters: Array, time_s: Array) -> Array:
 def second_order(parameters: Array, time_s: Array) -> Array:
     """Return the angle turned after a unit step: (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²).
 
-    A PI loop with feed-forward around a motor of first order has the zero Z.
+    The zero Z comes from the PI loop with feed-forward.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))

@@ -2,8 +2,8 @@
 
 """Fit a plant to the times between encoder ticks of a wheel that starts at full duty.
 
-The plant has first or second order. A record begins at its first tick, so it does not show the dead
-time. This module knows times between ticks; it does not know how they were recorded.
+A record begins at its first tick, so it does not show the dead time. This module knows times
+between ticks; it does not know how they were recorded.
 """
 
 import math
@@ -31,7 +31,7 @@ class Plant:
 
     ``dead_zone_percent``: duty up to which the wheel does not turn.
 
-    Final speed: ``rpm_per_percent`` times the duty above the dead zone.
+    The final speed is the gain times the duty above the dead zone.
     """
 
     rpm_per_percent: float
@@ -85,10 +85,11 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     """Fit a plant to records of starts from standstill, all at the same duty.
 
-    ``records``: times between ticks in s. The first one includes the standstill, and is not used.
+    ``records``: times between ticks in s. The first one is not used.
 
     Raises ToolError if a record is too short.
     """
+    # The first time of a record includes the standstill.
     intervals = [record[1:] for record in records]
     if not intervals or min(map(len, intervals)) < FEWEST_TICKS:
         raise ToolError(

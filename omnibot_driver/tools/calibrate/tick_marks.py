@@ -56,7 +56,7 @@ class Marks:
     def expected(self, first: int, count: int) -> Column:
         """Return the relative errors that the marks cause in ``count`` times between ticks.
 
-        ``first``: index in ``steps`` of the distance that belongs to the first of these times.
+        ``first``: index in ``steps`` for the first of these times.
         """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 

@@ -32,7 +32,7 @@ A displaced mark changes their sum by no more than one time.
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Return the times between ticks in s, by side; NaN where the record has none.
+    """Return the times between ticks in s, by side. A missing time is NaN.
 
     Raises ToolError if the file cannot be read, or lacks too many times.
     """
@@ -73,7 +73,7 @@ class Levels:
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of an encoder's levels, for a wheel at constant duty.
 
-    Both corrections must be 1 in the record. Raises ToolError if the ticks are not regular.
+    Both corrections must be 1 in the record. Raises ToolError for irregular ticks.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

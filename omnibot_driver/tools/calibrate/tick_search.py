@@ -89,11 +89,11 @@ class Search:
 
     The array of values has, in this order:
 
-    - the logarithm of the final rate in ticks per second
-    - the logarithm of the sum of both time constants in s
-    - the ratio of the time constants, if the order is 2
-    - for each record, the time of its first mark in s
-    - the positions of the marks in ticks, while the marks are fitted
+    - log of the final rate (ticks/s)
+    - log of the sum of both time constants (s)
+    - ratio of the time constants, if the order is 2
+    - time of each record's first mark (s)
+    - positions of the marks (ticks), while they are fitted
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:

@@ -37,13 +37,13 @@ ROUNDS: Final = 3
 class Behaviour:
     """The behaviour of a motor with some gains, as numbers or arrays.
 
-    ``rise_s``: from 10 % to 90 % of a step. ``overshoot``: fraction of it.
+    ``rise_s``: from 10 % to 90 % of a step.
 
     ``command_error_s``: integral of the absolute error after a step of 1.
 
     ``load_error_s``: the same, after a load of the effort for one count per tick.
 
-    ``ms``: peak of the sensitivity; 1 is the most robust value.
+    ``ms``: peak of the sensitivity; 1 is best.
     """
 
     rise_s: Array

@@ -72,7 +72,7 @@ def turn(angle_rad: float, turning: float) -> Law:
 def square(side_m: float, sign: int) -> list[Pose]:
     """Return the poses of a square: four times forward, each followed by a quarter turn.
 
-    ``sign``: 1 for turns to the left, -1 for turns to the right.
+    ``sign``: 1 to the left, -1 to the right.
     """
     places = []
     place = Pose()

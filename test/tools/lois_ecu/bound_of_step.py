@@ -6,13 +6,13 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are those of ``judge_step.py``. The program prints the bound for three kinds of noise:
+The robots are those of ``judge_step.py``. There are three kinds of noise:
 
 - "each time": every time has an independent error of 10 %.
 - "other marks": the marks have other places in each turn, 10 % off.
 - "same marks": the marks keep their places. Only the rounding to 0.1 ms remains.
 
-In each case, the load and the rate change by 0.5 % from record to record.
+The load and the rate change by 0.5 % between records.
 """
 
 from random import Random

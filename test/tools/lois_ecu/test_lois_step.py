@@ -208,7 +208,7 @@ def test_goals_that_nothing_meets_are_told() -> None:
 def test_a_phase_margin_is_that_of_the_open_loop() -> None:
     """The phase margin is compared with that of a simple open loop, calculated by hand.
 
-    With small lags, the loop is Kp K / (s Tn). Its gain is 1 at Kp K / Tn.
+    With small lags: Kp K / (s Tn), with gain 1 at Kp K / Tn.
     """
     loop = Loop(1e-6, 10**9, nominal_s=1e-6)
     plant = Plant(1.0, 0.5, 0.0)
