@@ -2,11 +2,10 @@
 
 """Measure whether the odometry's covariance covers its error, on networks of all kinds.
 
-The measure is the normalised squared error (NEES). With an honest covariance its mean is 3, and
-0.1 % of the values exceed 16.3. A mean below 3 shows a covariance that is larger than necessary.
+The measure is the normalised squared error (NEES). An honest covariance has a mean of 3.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50`` makes 50 drives for each
-network. The results are in docs/boards/mart.md.
+``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: 50 drives for each network.
+Results: docs/boards/mart.md.
 """
 
 import math

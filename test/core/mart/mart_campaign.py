@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds, in simulated time.
+"""Random drives on networks of all kinds. At the end the robot must rest and the server answer.
 
-At the end of each drive the robot must be at rest, and the server must still answer.
-
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60`` makes 60 drives for each
-network. The results are in docs/boards/mart.md.
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: 60 drives for each
+network. Results: docs/boards/mart.md.
 """
 
 import sys
@@ -36,11 +34,9 @@ FIRMWARES: tuple[Firmware, ...] = ("documented", "firmware", "source")
 class Outcome(NamedTuple):
     """The result of one drive.
 
-    ``ended``: whether the robot is at rest at the end, and the server still answers.
+    ``ended``: whether the robot rests at the end, and the server answers.
 
-    ``stop_s``: the longest time from a stop to standstill in this drive, in s.
-
-    ``way_m``: the driven distance in m.
+    ``stop_s``: the longest time from a stop to standstill.
     """
 
     ended: bool

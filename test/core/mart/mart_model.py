@@ -2,15 +2,7 @@
 
 """A model of a MART server, its network and its driver, for a search of all reachable states.
 
-The modelled driver may send any command that the tables of ``states`` allow, in any order. So it
-does more than the real driver.
-
-At each step a datagram may arrive, be lost, be late, or come twice, and the IMU may die. The number
-of commands from the user is not limited.
-
-The model has no clock. A late copy of a command arrives at any later step, or is lost. The real
-driver sends some commands only after the longest network delay. The modelled driver sends these
-commands only when no late copy is left.
+The model has no clock. A late copy of a command arrives at any later step, or is lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -46,14 +38,13 @@ class Driver(NamedTuple):
 
     ``pending``: the command that awaits a reply.
 
-    ``unanswered``: the number of stops that got no answer.
+    ``unanswered``: the number of stops without an answer.
 
     ``moved``: whether the last motion was a controlled move.
 
-    ``counted``: whether the encoder was read after the robot stopped. A reading does not count if a
-    harmful late copy was still on its way.
+    ``counted``: whether the encoder was read after the stop, without harmful copies left.
 
-    ``greeted``: whether the driver has already stopped the server once.
+    ``greeted``: whether the driver has stopped the server once.
     """
 
     state: State = State.UNKNOWN
@@ -69,9 +60,9 @@ class Driver(NamedTuple):
 class World(NamedTuple):
     """The state of the server, the driver and the network together.
 
-    ``copies``: late commands that are still on their way to the server.
+    ``copies``: late commands to the server.
 
-    ``replies``: late replies that are still on their way to the driver.
+    ``replies``: late replies to the driver.
     """
 
     server: Server = Server()
@@ -90,6 +81,8 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
     row = BY_TEXT[word]
     if not rules(driver.state, word, driver.motion):
         return False
+    # The real driver waits for the longest network delay. The model has no clock, so it waits until
+    # no copy is left.
     if (row in STARTS or row.kind is Kind.CHECK) and any(
         BY_TEXT[copy] in HARMFUL_LATE for copy in world.copies
     ):
@@ -146,8 +139,7 @@ def steps(world: World, rules: Rules = table) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    A late copy of the move's command arrives before the move ends, or is lost. A copy that has
-    arrived waits in the server's queue, and begins as soon as the move ends.
+    A copy of the command that arrived meanwhile begins at the end of the move.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -204,10 +196,10 @@ def sweeps_first(driver: Driver) -> bool:
 def _asked(world: World) -> Step:
     """Return the step in which the driver asks what still moves, after a stop on the stop port.
 
-    First the driver asks for the server's name. The answer shows that all earlier datagrams have
-    arrived or are lost. Then the driver asks whether a motion is in progress, and reads the encoder
-    to see whether the robot moves. If a reply is lost, nothing changes.
+    A lost reply changes nothing.
     """
+    # The driver first asks for the server's name. The answer shows that all earlier datagrams have
+    # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
     _, reply = execute(world.server, "CHECK")
     driver = Driver(State.STOPPING, Motion.UNKNOWN)
     if reply == "conflict" and not world.server.moving:
@@ -263,8 +255,7 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    A late reply is never taken for the reply to a check or to a controlled move. The replies to
-    these take longer than any late reply.
+    Replies to CHECK and to MOVES take longer than late replies.
     """
     driver = world.driver
     state = driver.state

@@ -2,8 +2,8 @@
 
 """A search through all reachable worlds of ``mart_model`` for one that must not occur.
 
-``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3`` searches with up to 3
-late copies at a time. The results are in docs/boards/mart.md.
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: up to 3 late copies.
+Results: docs/boards/mart.md.
 """
 
 import sys
@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    If the IMU is dead, or the driver has given up, only a crash of the server is wrong.
+    Without an IMU, only a crash is wrong.
     """
     server, driver = world.server, world.driver
     if server.crashed:
@@ -65,12 +65,9 @@ def _can_stop(world: World) -> bool:
 class Found(NamedTuple):
     """The result of a search.
 
-    ``worlds``: the number of reachable worlds.
+    ``worlds``, ``steps``: how many worlds are reachable, and how many steps connect them.
 
-    ``steps``: the number of steps between these worlds.
-
-    ``bad``: the steps to the first world that must not occur, and then what is wrong in that world.
-    ``bad`` is empty if no such world was found.
+    ``bad``: the steps to the first forbidden world, then its fault. Empty if none was found.
     """
 
     worlds: int

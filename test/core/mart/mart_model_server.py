@@ -2,7 +2,7 @@
 
 """A small model of the MART server: the effect of each command in each state of the server.
 
-``test_mart_search`` compares the model with the simulated firmware, command by command.
+``test_mart_search`` compares the model with the simulated firmware.
 """
 
 from typing import Final, NamedTuple
@@ -25,11 +25,10 @@ KIND: Final = {
 class Server(NamedTuple):
     """The state of the modelled server.
 
-    ``port``: the state of the command port: "free", "busy" with a controlled move, "waits" for a
-    dead IMU, or "hung".
+    ``port``: the command port: "free", "busy" with a controlled move, "waits" for a dead IMU, or
+    "hung".
 
-    ``released``: whether the stop port has stopped an uncontrolled motion that the server still
-    regards as in progress.
+    ``released``: the stop port has stopped a motion that the server believes in progress.
     """
 
     motion: Motion = Motion.NONE

@@ -2,20 +2,9 @@
 
 """A bounded search that runs the real driver against the simulated firmware.
 
-``mart_model`` searches without a bound, but its driver is a model. A *wish* is what a user may
-want, such as "forward". There are three sets of trials:
+A *wish* is what a user may want, such as "forward".
 
-``pairs``: every pair of wishes.
-
-``eights``: sequences of eight wishes. Over all sequences, each wish follows every other wish.
-
-``beginnings``: a driver starts while the robot may already be moving. The network is interrupted
-for various times.
-
-In each trial of ``pairs`` and ``eights``, one datagram is lost, late or doubled, or the IMU dies
-when it is sent. There is such a trial for each datagram, in both directions.
-
-``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets.
+``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
 
 import copy
@@ -51,8 +40,7 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
 MOST_DATAGRAMS: Final = 7
 """At most this many datagrams of a wish are disturbed in each direction, one in each trial.
 
-The driver's regular queries are not counted. Later datagrams are only the repeated stops of an
-e-stop.
+Regular queries are not counted.
 """
 PROOF_S: Final = 0.25
 """Time in s after the death of the IMU.
@@ -73,24 +61,15 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 class Trial(NamedTuple):
     """One run of the search: wishes with one disturbed datagram, or a driver that starts.
 
-    For wishes:
-
-    ``wishes``: what the user wants, in order.
-
     ``way``: the direction of the disturbed datagram: 0 to the server, 1 from the server.
 
-    ``number``: the number of the disturbed datagram in that direction, from 0, without regular
-    queries.
+    ``number``: the datagram's number in that direction, from 0, without regular queries.
 
-    ``fate``: what happens to it.
+    ``met``: what the server is executing when the driver starts.
 
-    For a driver that starts:
+    ``away_s``: the length of a first interruption of the network.
 
-    ``met``: the command that the server is executing at that time, or empty.
-
-    ``away_s``: the time in s for which the network is interrupted at first.
-
-    ``back_s``: the time in s for which the network then works, before it is interrupted for 1 s.
+    ``back_s``: the time from its end to a second interruption of 1 s.
 
     ``ways``: the directions that are interrupted.
     """

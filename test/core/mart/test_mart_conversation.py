@@ -90,10 +90,9 @@ def test_a_reply_answers_the_pending_request() -> None:
     ],
 )
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
-    """A late reply to an earlier request arrives while another request is pending.
+    """A late reply arrives while another request is pending.
 
-    The late reply has a form, or a reason of failure, that the pending command never returns. So
-    the driver discards it.
+    The pending command never returns such a form or reason. The driver discards the reply.
     """
     talk = conversation()
     talk.ask(word.request(), 1.0)
@@ -103,9 +102,9 @@ def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, la
 
 
 def test_no_late_ok_proves_the_imu() -> None:
-    """An ok that comes 0.3 s after a check of the IMU belongs to an earlier command.
+    """An ok comes 0.3 s after a check of the IMU. A check takes at least 0.32 s.
 
-    A check takes at least 0.32 s, and a reply to an earlier command is at most 0.3 s late.
+    So the ok is a late reply.
     """
     talk = conversation()
     talk.ask(words.CHECK.request(0), 1.0)
@@ -115,10 +114,9 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The server answers RST IMU very soon, so a late ok cannot be distinguished from the reply.
+    """The server answers RST IMU so soon that the reply looks like a late ok.
 
-    So the driver sends RST IMU only when two kinds of ok can no longer arrive: a late copy of the
-    last one, and the reply to a request that the driver has given up.
+    RST IMU waits until the last late ok is gone.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -133,10 +131,9 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """The reply to a sonar query is lost, so the driver gives up that query.
+    """A sonar query was given up. Another sonar query waits for the lost reply.
 
-    Another sonar query waits until the lost reply can no longer arrive. ENC, which driving needs,
-    is sent at once, and its answer is marked as doubtful.
+    ENC does not wait, but its answer is doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -191,9 +188,9 @@ def test_a_stop_is_repeated_until_it_is_answered() -> None:
 
 
 def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> None:
-    """The driver sends a stop only 0.1 s after a start, so the start may arrive after the stop.
+    """The driver sends a stop 0.1 s after a start. The stop may overtake the start.
 
-    Only the reply to a later stop proves that the robot is stopped.
+    Only the reply to a later stop proves rest.
     """
     stop = stopping(Motion.REFERENCE, started_s=9.9)
     assert stop.due(10.0) == (words.SRM,)
@@ -203,10 +200,9 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """After a start and a stop, two replies arrive, and both are ok.
+    """After a start and a stop, two ok arrive, perhaps two copies of the start's reply.
 
-    Both may be copies of the reply to the start, so they do not prove the stop. The reply to the
-    second stop, "no motion", is unambiguous.
+    A "no motion" proves the stop.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -216,10 +212,9 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """The driver sends two stops soon after a start, and gets two equal replies.
+    """Two stops follow a start. For 0.6 s, both replies may answer the first stop.
 
-    Both may be replies to the first stop, which may have arrived before the start. A copy comes at
-    most 0.6 s after the first stop was sent, so only a later reply proves the stop.
+    The first stop may have overtaken the start.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
@@ -267,8 +262,7 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
     """A second motion begins, and an encoder count of the motion before arrives.
 
-    Either this count is late, or the server has not received the start. In both cases the pose must
-    not change.
+    The pose does not change.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -288,7 +282,7 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
     """During a motion, a smaller encoder count arrives after a larger one.
 
-    The network has delayed or doubled it, so the pose does not move back.
+    The network has delayed or doubled the count. The pose stays.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -301,7 +295,7 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
     """After a turn, a late encoder count of 3 is read as a turn of 3°.
 
-    The wheel has turned much farther, so the odometry uses the wheel.
+    The wheel has turned farther, so the odometry uses the wheel.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -329,8 +323,7 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
     """A check of the IMU usually takes a while.
 
-    But if the IMU is missing or the command is unknown, the server answers at once. The driver
-    accepts such an early failure.
+    The driver accepts an early failure: the IMU is missing, or the command unknown.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -19,9 +19,9 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize(("left", "firmware"), [(True, "source"), (False, "firmware")])
 def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmware) -> None:
-    """The robot drives a square, to the left or right, and returns to within 10 cm of its start.
+    """The robot drives a square and returns to within 10 cm of its start.
 
-    The odometry is off by less than 6 cm after 8 m.
+    The odometry's error is below 6 cm.
     """
     bench = MartBench(firmware, motor_inequality=0.05).ready()
     side = 2.0 if left else -2.0
@@ -34,10 +34,9 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
-    """The robot drives straight ahead, with a gyro without noise, so its heading hardly changes.
+    """The gyro has no noise, so the heading hardly changes on a straight drive.
 
-    A constant heading is a sign of a dead IMU. The small corrections of the driver's steering are
-    enough to show that the IMU works.
+    The driver's small steering corrections show a working IMU.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -49,7 +48,7 @@ def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) ->
 def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
     """For each motion the driver sends one check of the IMU, one start and one stop.
 
-    For a turn on the spot it also sends SSP, which sets the speed.
+    A turn also needs SSP, for its speed.
     """
     bench = MartBench().ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.17, 0.0), (0.0, 0.5), (0.3, 0.0)):
@@ -71,7 +70,7 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 ):
     """On a slow network with losses, the driver checks the IMU before each start.
 
-    It sends the start less than 0.2 s after the check has ended.
+    The start follows within 0.2 s.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
@@ -91,10 +90,9 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """After a curve, the next RM is lost, so the server does not set the relative heading to zero.
+    """RM is lost after a curve. The server keeps the curve's heading.
 
-    The driver sends RM again. The heading of the curve, which the server still reports, does not
-    turn the odometry.
+    The driver sends RM again. The old heading does not turn the odometry.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -119,9 +117,9 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By chance, the first heading in RM is equal to the last heading of the motion before.
+    """By chance, the first heading in RM equals the last heading of the motion before.
 
-    So RM seems to be lost, until the encoder shows that the robot moves. The drive is as commanded.
+    The encoder then shows that RM arrived.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -192,9 +190,9 @@ def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> Non
 
 
 def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() -> None:
-    """The driver publishes odometry 20 times a second, but asks the sonars only at rest.
+    """Odometry comes 20 times a second. The sonars are asked only at rest.
 
-    A sonar query takes 55 ms. A distance of infinity means that nothing is near.
+    A sonar query takes 55 ms. Infinity: nothing is near.
     """
     bench = MartBench(front_m=3.0).ready()
     seen = len(bench.odometry)

@@ -19,10 +19,9 @@ pytestmark = pytest.mark.slow
 def test_a_dead_imu_refuses_motion_until_it_is_back(
     firmware: Firmware, wish: tuple[float, float] | str
 ) -> None:
-    """With a dead IMU, the driver does not send commands that would start the motors, and says why.
+    """With a dead IMU, the driver starts no motor and says why.
 
-    On a server that has RST IMU, the driver repeats the check by itself. It allows motion when the
-    IMU is back. On a server without RST IMU, a check could move the robot, so motion stays refused.
+    With RST IMU, the driver notices when the IMU is back.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -71,10 +70,9 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The server rejects an RM.
+    """The server rejects an RM, so that RM has arrived. The next RM follows soon.
 
-    The rejection proves that RM has arrived, so the stop before the next RM can be short. Two
-    seconds after the command, the speed is right.
+    After two seconds the speed is right.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 3.0)
@@ -88,10 +86,9 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The server rejects one RM and obeys the next, so it has no defect.
+    """The server rejects one RM and obeys the next. Then the robot moves without a command.
 
-    Within three seconds of the rejection, the robot moves without a command. The driver only
-    reports this, and does not refuse further motion.
+    Further motion stays allowed.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -121,10 +118,9 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects RM because of an obstacle.
+    """The server rejects RM because of an obstacle that ended an earlier B.
 
-    But this obstacle ended an earlier motion, B, and the front sonar shows no obstacle. So the
-    driver sends RM again, and reports no obstacle.
+    The sonar shows no obstacle, so the driver repeats RM.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
@@ -147,11 +143,9 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The IMU dies while the robot moves, and the heading stays constant.
+    """The IMU dies in a motion. The robot stops, and motion waits for a restart.
 
-    The driver stops the robot within 1.2 s and reports the server as lost. It refuses motion until
-    the server is restarted. With the public source the heading changes only during RM, so only RM
-    is tested there.
+    With the public source, the heading changes only in RM.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -188,7 +182,7 @@ def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
 def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
     """The motor board reports a trip or a short circuit while the robot drives.
 
-    The driver stops the robot, names the fault, and refuses motion as long as the board reports it.
+    The driver stops the robot, names the fault and refuses motion.
     """
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
@@ -206,11 +200,9 @@ def test_a_trip_or_a_short_halts_and_is_told_by_name(bits: int) -> None:
 def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     driving: bool, stuck: Stuck, firmware: Firmware
 ) -> None:
-    """One or both motors are stuck.
+    """One or both motors are stuck, so the driver switches both off.
 
-    The driver switches both off until a stop and a new command come. If only the right wheel is
-    stuck, the left one turns the robot for a while. Nothing measures this turn, but the covariance
-    covers it.
+    Until then the left wheel may turn the robot. The covariance covers this turn.
     """
     bench = MartBench(firmware).ready()
     if driving:
@@ -230,9 +222,9 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """The server rejects RM although the robot moves, and SRM finds no motion to stop.
+    """The server rejects RM although the robot moves, and SRM finds no motion.
 
-    So the driver begins a controlled turn, which takes over the motors and then ends.
+    A controlled turn takes over the motors and ends.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
@@ -246,8 +238,7 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
     """The server rejects an RM. Five seconds later the robot moves without a command.
 
-    If the rejected RM had started the robot, it would have moved at once. So the driver does not
-    suspect the server, and still allows motion.
+    The RM would have started the robot at once.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -263,9 +254,9 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
-    """Another program stops the robot, and the server rejects RMCS because it knows of no motion.
+    """Another program stops the robot, so the server rejects RMCS: no motion is known.
 
-    The driver reports the other program, and the robot drives on.
+    The driver names the other program, and the robot drives on.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 2.0)
@@ -282,7 +273,7 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
 ) -> None:
     """The server reports a failed move at once, while the wheels still roll out.
 
-    The driver does not report the roll-out as a motion without a command.
+    The roll-out is not reported as a motion.
     """
     bench = MartBench(firmware, motor_lag_s=0.12).ready()
     bench.go_to(1.5, 0.0, 0.0)
@@ -299,10 +290,9 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
 def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_failed(
     twist: tuple[float, float], dead_units: float, firmware: Firmware
 ) -> None:
-    """The driver does not know yet how many units the motors need, so the first start is too weak.
+    """The motors need more units than the driver knows, so the first start is too weak.
 
-    The next start is stronger, and the robot moves. The driver blames neither a stuck motor nor the
-    IMU.
+    The next start is stronger.
     """
     bench = MartBench(firmware, dead_zone_units=dead_units).ready()
     bench.command(*twist, 6.0)
@@ -324,8 +314,7 @@ def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
 ) -> None:
     """A parameter has a wrong sign or scale.
 
-    The driver stops the robot, and a notice names the parameter. With an inverted heading, the
-    robot turns more and more before it is stopped.
+    The driver stops the robot, and a notice names the parameter.
     """
     bench = MartBench(settings=settings, encoder_sign=encoder_sign, motor_inequality=0.03).ready()
     bench.command(0.3, 0.0, 6.0)

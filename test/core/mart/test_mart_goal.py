@@ -23,9 +23,9 @@ from omnibot_driver.simulator.mart import Firmware
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """The robot turns up to 9° farther than requested, and drives up to 30 % farther.
+    """The robot turns up to 9° and drives up to 30 % too far.
 
-    The driver learns this, and the robot reaches each goal within the permitted number of moves.
+    The driver corrects its requests, and needs at most the permitted moves.
     """
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
@@ -61,7 +61,7 @@ def test_a_move_is_slow_if_the_normal_one_is_faster_than_the_limits(
 ) -> None:
     """The driver requests a SLOW move if a normal one would exceed the speed limits.
 
-    The server's normal speed is 30 units: 0.26 m/s, or 1.3 rad/s in a turn on the spot.
+    Normal is 0.26 m/s or 1.3 rad/s.
     """
     settings, surplus = MartSettings(**limits), Surplus()
     to_the_left = next_move(Move(Pose(0.0, 1.0, 0.0)), Pose(), settings, surplus)
@@ -83,10 +83,9 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """The driver repeats the same move ten times.
+    """The driver repeats the same move ten times, often with an equal encoder count.
 
-    The encoder often ends at the same count each time. An equal count does not mean that the move
-    was lost, so the odometry adds every move.
+    The odometry adds every move.
     """
     bench, goal = MartBench(firmware).ready(), Pose()
     for _ in range(10):
@@ -124,8 +123,7 @@ def test_a_goal_that_is_replaced_within_a_move_is_followed_by_the_next_at_once(
 ) -> None:
     """A new goal replaces the first one during a move.
 
-    The reply to that move shows that it has ended. The driver begins the next move at once, and
-    does not assume that the server was restarted.
+    After the move's reply, the next move begins at once.
     """
     bench = MartBench(firmware).ready()
     assert bench.job(Job.LOG).success
@@ -159,7 +157,7 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 def lose_moves_and_copy_a_check(bench: MartBench) -> None:
     """Change the network: it loses all turns of goals, and doubles the next RST IMU.
 
-    The copy of RST IMU arrives 0.29 s late, and so does the reply to the copy.
+    Copy and reply are 0.29 s late each.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
@@ -195,10 +193,9 @@ def lose_moves_and_copy_a_check(bench: MartBench) -> None:
 def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     firmware: Firmware, before: tuple[float, float], stops_s: float | None
 ) -> None:
-    """The turn of a goal is lost, and a late ok of the IMU check seems to confirm it.
+    """The turn of a goal is lost. A late ok of the IMU check seems to confirm the turn.
 
-    The encoder still has the count of the motion before. The odometry does not add that count
-    again.
+    The old count is not added again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
@@ -215,10 +212,9 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> None:
-    """After each move of a goal, the network loses the first reply to ENC.
+    """The first reply to ENC after each move is lost, but the server answers HELLO.
 
-    A duplicate of the move would block the server in the same way. The server answers HELLO, so
-    there is none, and the driver asks for the count again.
+    So the driver repeats ENC.
     """
     bench = MartBench(firmware).ready()
     way, counts_lost = bench.robot.network[0].from_board, set[int]()
@@ -278,10 +274,9 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 
 
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_ends_the_goal() -> None:
-    """A copy of a move arrives at the server, which executes it after the move itself.
+    """The server executes a move, and then a late copy of the move.
 
-    The encoder count covers only the copy, so the driver discards the goal and learns nothing from
-    it.
+    The encoder counts only the copy. The driver discards the goal.
     """
     bench = MartBench().ready()
     first_distance(bench, 2.0)

@@ -65,8 +65,7 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
     """Without a dock, the robot drives at most the permitted distance.
 
-    The server drives farther than requested, so the driver requests less. Obstacles do not stop a
-    docking move.
+    Moves exceed their request, so the driver requests less. Obstacles do not stop docking.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))
@@ -172,7 +171,7 @@ def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None
 def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
     """Only the last piece of a file is shorter than the others.
 
-    If a shorter piece comes earlier, the pieces are in the wrong order, and the download fails.
+    An earlier short piece shows a wrong order, so the download fails.
     """
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
@@ -201,10 +200,9 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A stop interrupts the download of the log, after EXIT has already ended the server.
+    """A stop interrupts the download of the log, after EXIT has ended the server.
 
-    A second download is not possible, so the result tells the user to copy the file from the
-    controller.
+    The user must copy the file from the controller.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -219,9 +217,9 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
-    """After a straight drive, the heading is often exactly zero, as it is after a restart.
+    """After a straight drive, the heading is often exactly zero, as after a restart.
 
-    The driver must not conclude that the server was restarted and its log is lost.
+    The log can still be downloaded.
     """
     for seed in range(6):
         bench = MartBench(firmware, seed=seed).ready()
@@ -234,8 +232,7 @@ def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
 def test_only_a_log_that_was_started_ends_the_server() -> None:
     """The log can be downloaded only after it was started.
 
-    The download sends EXIT, which ends the server. The result says that the controller must be
-    started again.
+    The download sends EXIT, which ends the server.
     """
     bench = MartBench().ready()
     with pytest.raises(RequestRefused, match="start_log"):
@@ -251,9 +248,9 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
-    """A server is restarted after its log was started, so it no longer has a log.
+    """After a restart the server has lost its log. The driver refuses the download.
 
-    The driver refuses the download, because EXIT would end the server and bring no file.
+    EXIT would end the server without a file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -265,10 +262,9 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 
 
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
-    """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
+    """After a lost reply, the repeated stop finds no motion, as after a restart.
 
-    The heading shows that the server was not restarted, so the log can still be downloaded.
-    Otherwise the user would have to call ``~/start_log`` again, which deletes the file.
+    The heading shows that the log still exists.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -316,10 +312,9 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 
 @given(st.floats(0.0, 4e9))
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
-    """After a drive, the driver never sets a correct clock to an earlier time.
+    """After a drive, the driver never sets a correct clock back.
 
-    The server ignores the seconds, and the datagram may take 1 s. So the driver sets the clock only
-    at the end of a minute, to the next full minute.
+    The server ignores the seconds, so the driver sends the next full minute.
     """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))
@@ -335,10 +330,9 @@ def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """The clock is set back between two drives.
+    """The clock is set back, so the next RM reports a heading of about 1e15 degrees.
 
-    The next RM then reports a heading of about 1e15 degrees. The driver reports this once and sends
-    RM again. The drive and the odometry are then right.
+    The driver repeats RM once.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

@@ -33,9 +33,9 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     twist: tuple[float, float], quiet_s: float
 ) -> None:
-    """Two equal motions end with equal encoder counts. All replies to the second motion are lost.
+    """Two equal motions end with equal encoder counts. All replies to the second one are lost.
 
-    The driver must not conclude from the equal count that the second start was lost.
+    The odometry adds both motions.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     for _ in range(2):
@@ -57,10 +57,9 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The ok of RST IMU comes twice. L, which starts a turn, and all queries after it are lost.
+    """The ok of RST IMU comes twice, and L is lost.
 
-    The second ok seems to be the reply to L. But the encoder count is still that of the motion
-    before, so the robot has not turned.
+    The encoder count is unchanged, so the second ok does not confirm L.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -89,9 +88,9 @@ def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
 
 
 def reversed_by_1000() -> MartOdometry:
-    """Return the odometry of a robot that reversed by 1000 counts, when its second motion begins.
+    """Return the odometry of a robot that reversed by 1000 counts, as its second motion begins.
 
-    The encoder still has the count of the first motion.
+    The encoder count is still the old one.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))
@@ -106,9 +105,9 @@ def reversed_by_1000() -> MartOdometry:
 
 
 def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
-    """The server answers the stop of a second motion with "no motion", so it never got the start.
+    """The server answers the stop of a second motion with "no motion".
 
-    The encoder count is unchanged, and the covariance hardly grows.
+    The server never got the start, so the covariance hardly grows.
     """
     odometry = reversed_by_1000()
     before = odometry.doubt.total([]).xx
@@ -121,10 +120,9 @@ def test_a_start_that_the_server_has_not_obeyed_adds_no_doubt() -> None:
 
 
 def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
-    """After a second motion the encoder count is the same as before it.
+    """After a second motion the encoder count is unchanged.
 
-    Either the start was lost, or an equal motion has ended. The covariance covers both cases, even
-    after a later count that is certain.
+    Either the start was lost, or the motions were equal. The covariance covers both.
     """
     odometry = reversed_by_1000()
     odometry.stand(8.0)
@@ -138,7 +136,7 @@ def test_a_start_that_was_obeyed_or_not_is_covered_by_the_covariance() -> None:
 def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
     """An ok arrives after the start, but the encoder count does not change.
 
-    So the ok was a copy of an earlier one, and the robot did not start.
+    The ok was a copy, and the robot did not start.
     """
     odometry = reversed_by_1000()
     odometry.started(5.1, sure=True)
@@ -152,9 +150,9 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies to two stops show that the motion had begun, or None if unknown.
+    """Return whether the replies show that the motion had begun, or None if unknown.
 
-    The driver sent the start at 8 s, and the stops at 10 s and 10.3 s.
+    Start at 8 s, stops at 10 s and 10.3 s.
     """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)
@@ -166,10 +164,9 @@ def stopped(*replies: tuple[float, bytes]) -> bool | None:
 
 
 def test_the_reply_to_a_stop_tells_whether_the_motion_had_begun() -> None:
-    """The reply to the first stop shows whether the motion had begun before that stop.
+    """The reply to the first stop shows whether the motion had begun.
 
-    A "no motion" after the second stop does not show it. The first stop may have ended the motion,
-    and its reply may have been lost.
+    "No motion" after a second stop does not: the first stop may have ended the motion.
     """
     assert stopped((10.2, b"fail no motion")) is False
     assert stopped((10.4, b"ok"), (10.41, b"fail no motion")) is True
@@ -224,7 +221,7 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
     """The driver waits for a missing reply, and a copy of an older reply arrives.
 
-    The copy is not the missing reply. So a query whose reply has the same form still waits.
+    A query of the same form still waits.
     """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
@@ -239,7 +236,7 @@ def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
 def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -> None:
     """The driver leaves more than 0.35 s between two sonar queries.
 
-    Both sonars report -1 if nothing is near, so only the time shows whether a reply is a copy.
+    Both sonars report -1 if nothing is near, so replies differ only in time.
     """
     polls, asked_s = Polls(), {words.SFC: -1.0, words.SRC: -1.0}
     for tick in range(1000):
@@ -253,9 +250,9 @@ def test_the_sonars_are_asked_so_far_apart_that_their_replies_differ_in_time() -
 
 
 def test_one_doubtful_count_moves_no_robot_that_stands() -> None:
-    """A doubtful encoder count may be the reply of a sonar. A single one does not change the pose.
+    """A doubtful encoder count may be the reply of a sonar.
 
-    The third doubtful count in a row is accepted.
+    Only the third doubtful count in a row changes the pose.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(1167, at(1.0))
@@ -301,10 +298,9 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 
 
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
-    """The odometry is reset during a controlled move.
+    """The odometry is reset during a controlled move. The final count covers the whole move.
 
-    The encoder count at the end covers the whole move. So the pose includes the part before the
-    reset, and the covariance covers this error.
+    The covariance covers the error.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -337,10 +333,9 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """A speed change that arrives twice acts twice. Only the heading can show that.
+    """Only the heading shows that a speed change arrived twice.
 
-    In B the heading may be unknown, so a single change is at most 5 units there. In RM it is at
-    most 15.
+    So a single change is at most 15 units in RM, and 5 in B.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

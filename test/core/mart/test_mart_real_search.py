@@ -22,12 +22,9 @@ pytestmark = pytest.mark.slow
 
 @pytest.mark.parametrize("seed", range(12))
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
-    """The user has two wishes, one after the other. One datagram is lost, late or doubled.
+    """One datagram is lost, late or doubled, or the IMU dies.
 
-    The server does not hang, and the robot is at rest at the end.
-
-    In other trials the IMU dies instead. Then no later motion begins, and the robot is at rest or
-    the driver reports the server as lost.
+    The server never hangs. The robot rests, or the server is reported lost.
     """
     trial = Random(seed).choice(list(real_search.pairs()))
     assert trouble(trial) == ""
@@ -35,18 +32,18 @@ def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> N
 
 @pytest.mark.parametrize("seed", range(8))
 def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> None:
-    """A driver starts while the robot may be moving, and the network is interrupted for some time.
+    """A driver starts while the robot may be moving, and the network is interrupted.
 
-    The server does not hang, and the robot is at rest at the end.
+    The robot rests at the end.
     """
     trial = Random(seed).choice(list(real_search.beginnings()))
     assert trouble(trial) == ""
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during RM without a network. Its first command that arrives is SL.
+    """A driver starts during RM. Its first command that arrives is SL.
 
-    SL ends RM on the stop port. A later SRM would hang the server, so the driver does not send SRM.
+    SRM after SL would hang the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""

@@ -19,11 +19,9 @@ pytestmark = pytest.mark.slow
 def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     motion: tuple[float, float], firmware: Firmware, boot_s: float
 ) -> None:
-    """The IMU dies during a motion and comes back.
+    """The IMU dies in a motion and comes back, but the stop port stays hung.
 
-    The server ends the motion, but its stop port stays hung. The server would not answer the next
-    RM, and nothing could stop the robot. So the driver refuses motion until a heading of zero or a
-    long silence shows that the server was restarted.
+    Motion waits for a zero heading or a long silence.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -49,10 +47,9 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
 def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
     wanted: tuple[float, float], boot_s: float
 ) -> None:
-    """The server is restarted during a motion, and the motors still run.
+    """The server restarts during a motion, and the motors still run.
 
-    The driver stops the robot. The driver sends neither voltage queries nor motions until the
-    server is up, because either would crash the server.
+    Voltage queries and motions would crash the server until it is up.
     """
     for offset_s in (0.0, 0.23, 0.46, 0.71):
         bench = MartBench().ready()
@@ -69,10 +66,9 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(seed: int) -> None:
-    """The network loses replies.
+    """The network loses replies. After a loss, the driver sends HELLO.
 
-    After a loss, the driver sends HELLO, and the answer shows that the server is there. So the
-    driver does not take each loss for a restart.
+    The answer shows that the server has not restarted.
     """
     bench = MartBench("source", NetworkFaults(lose=0.1), seed=seed).ready()
     appeared = set()
@@ -86,9 +82,9 @@ def test_a_network_that_loses_one_datagram_of_ten_is_not_taken_for_an_absence(se
 def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_soon(
     after_s: float,
 ) -> None:
-    """The server is restarted during the check of the IMU, and does not answer the check.
+    """The server restarts during the check of the IMU, and does not answer.
 
-    The driver assumes a restart, and sends no motion until the server is ready.
+    The driver sends no motion until the server is ready.
     """
     bench = MartBench().ready()
     bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
@@ -105,10 +101,9 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
 def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
     boot_s: float, x_m: float, y_m: float, firmware: Firmware
 ) -> None:
-    """The server is restarted during a controlled move of 3 m. The motors keep their last command.
+    """The server restarts in a move of 3 m. The motors keep their last command.
 
-    The driver notices the restart and stops the robot within 5 s. It does not wait for the end of
-    the move, which could take a minute.
+    The driver stops the robot within 5 s.
     """
     bench = MartBench(firmware).ready()
     bench.go_to(x_m, y_m, 0.0)
@@ -131,10 +126,9 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
 ) -> None:
-    """A restart of the server erases the speed that SSP has set.
+    """A restart erases the speed of SSP, and L alone would not turn the robot.
 
-    Without that speed, L does not turn the robot. So the driver sends SSP again before the next
-    turn.
+    The driver sends SSP again.
     """
     bench = MartBench(firmware).ready()
     for _ in range(3):

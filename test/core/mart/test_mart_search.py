@@ -2,7 +2,7 @@
 
 """Tests that no sequence of commands, losses, copies and delays makes a MART fail.
 
-A failure is a server that hangs, or a robot that cannot be stopped.
+A failure: the server hangs, or the robot cannot be stopped.
 """
 
 from collections.abc import Callable
@@ -140,9 +140,9 @@ def compared(server: Server) -> Server:
 
 @pytest.mark.parametrize("word", [*SAID, "the IMU dies"])
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
-    """The model and the simulated firmware are compared in every state in which the server answers.
+    """The model and the simulated firmware agree in every state in which the server answers.
 
-    A busy server queues commands, so only its stop port is compared.
+    A busy server answers only its stop port.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

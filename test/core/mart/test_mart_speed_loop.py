@@ -39,8 +39,7 @@ def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
 ) -> None:
     """The driver has measured a drive and a turn on the spot.
 
-    Then it chooses the units for another turn. The units are off by at most one, even if the motors
-    need several units to begin.
+    The units for another turn are off by at most one.
     """
     settings = MartSettings()
     per_unit_mps = settings.speed_per_unit * slope

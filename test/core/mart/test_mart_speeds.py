@@ -45,10 +45,9 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
 
 @pytest.mark.parametrize("dead_units", [0.0, 2.0, 6.0])
 def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: float) -> None:
-    """In a curve the inner wheel is so slow, 0.01 m/s to 0.02 m/s, that its motor hardly turns.
+    """The inner wheel of a curve is so slow that its motor hardly turns.
 
-    The curve is still as fast as commanded. The last curve leads backward, where the heading is
-    unknown.
+    The curve is still as fast as commanded, even backward.
     """
     bench = MartBench(
         "source", volts=22.0, motor_inequality=0.05, dead_zone_units=dead_units
@@ -71,9 +70,9 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
 def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
     dead_units: float, firmware: Firmware
 ) -> None:
-    """The driver does not know the motors yet, so the first turn would be 25 % to 40 % too slow.
+    """The motors are unknown, so the first turn is 25 % to 40 % too slow.
 
-    The driver begins the turn again, once. Two seconds after the command, the rate is right.
+    The driver begins the turn again, once.
     """
     bench = MartBench(firmware, dead_zone_units=dead_units).ready()
     bench.command(0.0, 0.5, 2.0)
@@ -116,9 +115,9 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
-    """A turn on the spot shows only the mean speed of the two motors, not their difference.
+    """A turn on the spot shows only the mean speed of the two motors.
 
-    So a straight drive backward is as straight after such turns as before.
+    A later straight drive backward is as straight as before.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(
@@ -135,9 +134,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Slow turns are up to 17 % too fast, because units are whole numbers.
+    """Units are whole numbers, so slow turns are up to 17 % too fast.
 
-    The motor balance that the driver has measured does not change by this.
+    The measured motor balance does not change.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):
@@ -164,9 +163,9 @@ def test_an_acceleration_limit_of_the_speed_delays_no_turn_on_the_spot(noise_mps
 
 @pytest.mark.parametrize("dead_units", [0.0, 3.0])
 def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units: float) -> None:
-    """The driver ramps a turn up, but the server cannot change the rate of a turn.
+    """The server cannot change the rate of a turn.
 
-    So the turn begins only when the ramp has reached the final rate.
+    So the turn begins only when the driver's ramp has reached the final rate.
     """
     bench = MartBench(dead_zone_units=dead_units).ready()
     ramp = SessionSettings(
@@ -183,7 +182,7 @@ def test_a_turn_on_the_spot_begins_when_the_ramp_of_its_command_ends(dead_units:
 def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
     """The sender ramps a turn up. At the first, low rates the motors do not turn.
 
-    The driver learns from this how many units the motors need, and reports no fault.
+    The driver reports no fault.
     """
     bench = MartBench(dead_zone_units=3.0).ready()
     for step in range(60):
@@ -208,10 +207,9 @@ def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
-    """The first drive is a curve backward.
+    """The first drive is a curve backward, where the server reports no heading.
 
-    In B the server reports no heading, so nothing is measured. The driver takes the balance of the
-    motors from the user's setting, and the curve is right.
+    The balance of the motors comes from the user's setting.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench("source", settings=settings, motor_inequality=unequal).ready()
@@ -246,8 +244,7 @@ def test_motors_that_differ_by_more_than_is_assumed_are_shown_as_measured() -> N
 def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_step() -> None:
     """The commanded rate of a turn falls slowly.
 
-    The driver does not begin the turn again each time. A turn is begun again only if its commanded
-    rate stays the same for a while.
+    The driver restarts a turn only after the rate has stayed the same for a while.
     """
     bench = MartBench("source", dead_zone_units=4.0).ready()
     for tick in range(20):

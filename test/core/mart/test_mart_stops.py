@@ -37,9 +37,9 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """An e-stop comes during a start: during the check of the IMU, or before RM is answered.
+    """An e-stop comes during the check of the IMU, or before RM is answered.
 
-    The robot is at rest afterwards, and stays at rest.
+    The robot rests and stays at rest.
     """
     bench = MartBench(firmware, faults=NetworkFaults(delay_s=0.02), seed=1).ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.2, 0.0), (0.0, 0.5)):
@@ -69,9 +69,9 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
 def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
     faults: NetworkFaults, seed: int
 ) -> None:
-    """On a bad network, motions of all kinds follow each other without a pause.
+    """On a bad network, motions follow each other. Then the driver shuts down.
 
-    Then the driver shuts down. The robot is at rest within 3 s, and the server still answers.
+    The robot rests within 3 s, and the server answers.
     """
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.1), (0.2, -0.4)):
@@ -90,9 +90,9 @@ def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
 
 
 def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
-    """A late copy of a start makes the robot move while the driver believes that it is at rest.
+    """A late copy of a start moves the robot at rest.
 
-    The driver's regular queries show the motion, and the driver stops it within 1 s.
+    The driver's regular queries show the motion, and the driver stops it.
     """
     bench = MartBench().ready()
     bench.command(0.3, 0.0, 2.0)
@@ -106,9 +106,9 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """A late copy of a controlled move reaches the server, whose command port then does not answer.
+    """The server executes a late copy of a controlled move, and does not answer.
 
-    This silence is the only sign of the move. After an e-stop the robot is at rest within 1 s.
+    An e-stop still ends the move within 1 s.
     """
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)
@@ -125,9 +125,9 @@ def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
 def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a move, the answer to HELLO arrives before the reply to the move, which is 0.25 s late.
+    """After a move, the answer to HELLO arrives before the move's late reply.
 
-    The driver waits for the late reply, which ends the move as usual.
+    The late reply ends the move as usual.
     """
     bench = MartBench().ready()
     receive = bench.session.inbound.receive
@@ -154,9 +154,9 @@ def test_a_move_of_which_the_name_comes_before_the_reply_is_over_as_usual(
 def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The stop of a turn is lost. The server would have answered it with an angle.
+    """The stop of a turn is lost. Its reply would have been an angle.
 
-    A late encoder count looks like such an angle, but the driver does not accept it.
+    A late encoder count looks like that angle.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
@@ -187,10 +187,9 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     start: bytes, twist: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The ok of a start is 0.4 s late and comes twice.
+    """The ok of a start comes twice. The stop in between is lost.
 
-    In between, the driver sends a stop, which is lost. The driver does not take the second ok for
-    the reply to the stop.
+    The second ok is not the stop's reply.
     """
     bench = MartBench().ready()
     while not bench.said()[-1].startswith(start):
@@ -214,10 +213,9 @@ def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
 def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
     firmware: Firmware,
 ) -> None:
-    """One motion follows another, and the new one has its speed 1.5 s after the command.
+    """One motion follows another. The new one has its speed within 1.5 s.
 
-    A reply to the stop may look like a copy of an earlier reply, so the driver repeats the stop.
-    The server then answers "no motion". The driver does not take this for a restart of the server.
+    "No motion" after a repeated stop does not mean a restart.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)
@@ -290,9 +288,9 @@ def test_a_restarted_driver_stops_what_it_meets() -> None:
 def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops_the_robot(
     wish: str,
 ) -> None:
-    """During a motion, the driver has stop commands ready at any time. It is killed at any moment.
+    """The driver is killed at any moment of a motion.
 
-    For one second, the guard repeats these commands. The robot comes to rest.
+    The guard repeats the driver's stop commands for one second, and the robot rests.
     """
     twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
     seen = set()
@@ -333,7 +331,7 @@ def test_a_robot_that_is_pushed_under_the_estop_gets_stops_only() -> None:
 def test_a_network_that_is_cut_while_a_command_waits_is_reported(motion: str) -> None:
     """A command waits for the check of the IMU, and the network is cut.
 
-    The driver repeats the check, gets no answer, and reports that no data comes from the board.
+    The driver reports that no data comes from the board.
     """
     bench = MartBench().ready()
     bench.robot.receive = lambda *_: None  # type: ignore[method-assign]

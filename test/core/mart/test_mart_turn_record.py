@@ -117,10 +117,9 @@ def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
 
 @pytest.mark.parametrize("inequality", [-0.05, 0.05])
 def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequality: float) -> None:
-    """The server reports no heading in these moves, and one wheel turns 5 % faster.
+    """One wheel turns 5 % faster, and the server reports no heading.
 
-    Without the records, each turn would be measured by the right wheel alone. The robot would miss
-    the last goal by 0.2 m.
+    Without the records, the last goal would be missed by 0.2 m.
     """
     bench = MartBench("source", motor_inequality=inequality).ready()
     for goal in GOALS:
@@ -135,10 +134,9 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The manual does not say what the file contains, so a server may give no angle.
+    """The manual does not specify the file, so a server may give no angle.
 
-    The robot reaches its goals without it. The driver requests the record of three turns, and then
-    no more.
+    The driver requests only three records.
     """
     bench = MartBench("source").ready()
     if missing == "angle":
@@ -152,10 +150,9 @@ def test_a_server_without_records_is_asked_three_times(
 
 
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
-    """The public server leaves each file open that it sends, so it must not send many.
+    """One motor turns 10 % faster. A few records show the ratio.
 
-    One motor turns 10 % faster. After some turns, the driver measures turns by the right wheel and
-    the ratio that the records have shown.
+    The driver then stops asking: the public server never closes a sent file.
     """
     bench = MartBench("source", motor_inequality=0.1).ready()
     for _ in range(2):
@@ -170,9 +167,9 @@ def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -
 
 
 def test_the_record_of_an_earlier_turn_is_not_used() -> None:
-    """The server's file system is full, so LAST TURN sends the file of an earlier turn again.
+    """The server's file system is full. LAST TURN sends an earlier turn with the same angle.
 
-    The earlier turn was requested with the same angle. The robot turns further this time.
+    That record is not used.
     """
     bench = MartBench("source").ready()
     for yaw_rad in (math.pi / 2, math.pi, -math.pi / 2, 0.0):
@@ -189,9 +186,9 @@ def test_the_record_of_an_earlier_turn_is_not_used() -> None:
 
 @pytest.mark.parametrize("lost", [b"LAST TURN", b"ok MCSpin"])
 def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes) -> None:
-    """The request or the reply is lost, so the driver does not wait long for it.
+    """The request for a record or its reply is lost.
 
-    The user's next command starts a motion at once. The server is not regarded as absent.
+    The next command still starts a motion at once.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -210,10 +207,9 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The network duplicates the driver's LAST TURN. The copy and its replies are late.
+    """The network doubles the driver's LAST TURN.
 
-    The user calls ~/download_last_move meanwhile. The driver sends this request only after the
-    replies to the copy can no longer arrive.
+    The user's ~/download_last_move waits until late replies to the copy can no longer arrive.
     """
     bench = MartBench("source").ready()
     go(bench, Pose(0.5, 0.0, 0.0))
@@ -251,9 +247,9 @@ def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
 
 
 def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> None:
-    """The odometry is reset, and the record of a turn from before arrives.
+    """The odometry is reset, and the record of an earlier turn arrives.
 
-    The driver discards the record, because the new frame begins at the present heading.
+    The driver discards the record: the new frame begins at the present heading.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
@@ -265,9 +261,9 @@ def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> Non
 
 
 def test_a_record_makes_the_heading_more_certain_but_not_better_than_the_gyro() -> None:
-    """A record reduces the variance of the heading to that of an angle from the gyro.
+    """A record reduces the heading's variance to that of a gyro angle.
 
-    A record with an impossible angle, or a second record of the same turn, has no effect.
+    An impossible angle or a second record has no effect.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
