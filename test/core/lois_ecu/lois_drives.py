@@ -111,9 +111,7 @@ class Drive:
 
     ``true``: true pose at the time of the last estimate.
 
-    ``way_m``: true length of the way, in m.
-
-    ``turned_rad``: sum of the absolute values of all true turns, in rad.
+    ``turned_rad``: sum of the absolute values of all true turns.
     """
 
     true: Pose
@@ -172,11 +170,11 @@ def wrong(firmware: Firmware, seed: int) -> LoisSettings:
 
 
 class Rig:
-    """A simulated board and the driver that talks to it, by default with ``HOST_GAINS``.
+    """A simulated board and its driver, by default with ``HOST_GAINS``.
 
-    ``estimates``: all estimates of the odometry, each with the true pose at its time.
+    ``estimates``: all estimates of the odometry, each with the true pose.
 
-    ``loss``: probability that a byte is lost, in either direction.
+    ``loss``: probability that a byte is lost.
     """
 
     def __init__(

@@ -30,7 +30,7 @@ def float32(number: float) -> float:
 def reports(seconds: float, *, firmware: bool) -> list[tuple[float, Report]]:
     """Return the reports of a drive along a curve at 0.5 m/s, with their times in s.
 
-    Ticks, odometry and headings come every 0.4 s. Position, time and date come every 1.2 s.
+    Position, time and date come every 1.2 s.
     """
     said: list[tuple[float, Report]] = []
     for step in range(1, int(seconds / 0.4) + 1):

@@ -2,7 +2,7 @@
 
 """The error of a LOIS robot's odometry after a drive, on both kinds of firmware.
 
-``test/integrity/lois_odometry.py`` prints the errors of many drives. A few of them are run here.
+``test/integrity/lois_odometry.py`` runs many drives.
 """
 
 import math
@@ -22,7 +22,7 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
     """The robot drives 5 m forward with wheels of the right size.
 
-    The odometry is as accurate as promised for such a drive: within 2 % and 3°.
+    The odometry is right within 2 % and 3°, as promised.
     """
     one = driven(firmware, name)
     assert one.way_m > 5.0
@@ -32,9 +32,9 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """The robot turns on the spot, so one wheel turns backward.
+    """The public firmware counts no ticks of the wheel that turns backward.
 
-    The public firmware counts no ticks of this wheel. The angle is still right within 3 %.
+    The angle is still right within 3 %.
     """
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
@@ -44,10 +44,9 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 @BOTH
 @pytest.mark.parametrize("name", ["curve", "in place", "reverse", "jerky"])
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
-    """Wheels of wrong sizes slip on uneven ground. The error of the pose fits the covariance.
+    """Wheels of wrong sizes slip on uneven ground. The covariance fits the error of the pose.
 
-    The limit is exceeded by chance in one drive of 10,000. ``test/integrity/lois_odometry.py``
-    checks the mean of many drives.
+    One drive of 10,000 exceeds the limit by chance.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
@@ -56,8 +55,7 @@ def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
 def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
     """The robot drives a square with turns on the spot.
 
-    The public firmware counts no ticks of a wheel that turns backward. The error is still within 3
-    sigma.
+    The public firmware counts no ticks of a wheel that turns backward.
     """
     one = motion(nominal("firmware", 1000), name, side_m=1.0)
     assert off_m(one) < 0.15
@@ -79,10 +77,9 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """One byte in a hundred is lost. This damages 60 % of the groups of lines.
+    """One lost byte in a hundred damages 60 % of the groups of lines.
 
-    The tick counters in the other groups also count the ticks of the damaged groups. So the
-    odometry is hardly worse.
+    The tick counters of the next groups include the lost ticks.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)

@@ -21,10 +21,9 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """The robot drives backward. The public firmware then counts no ticks and reports integer RPM.
+    """Backward, the public firmware counts no ticks and reports integer RPM.
 
-    So the estimated heading drifts. In eight drives, the error of the position is 4.9 % of the way
-    on average, and 13 % at most.
+    So the heading drifts. The mean error is 4.9 % of the way.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -38,11 +37,9 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the boot gains, the right wheel oscillates and comes to rest.
+    """With the boot gains, the right wheel stops. The board still reports its last speed.
 
-    The board then still reports the wheel's last speed. If the covariance is right, the normalised
-    squared error of half of all drives is below 2.4. A few drives with the boot gains are far
-    above.
+    The median is checked, because a few drives are worse.
     """
     seeds = range(1000, 1005)
     drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
@@ -54,10 +51,9 @@ def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> Non
 def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_again(
     seed: int,
 ) -> None:
-    """A wheel is commanded 19 RPM backward. It slows from 41 to 20 RPM and then stops.
+    """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
 
-    The board still reports 20 RPM. An odometry that believed this report would turn by 600° in 15
-    s.
+    An odometry that believed 20 RPM would turn by 600°.
     """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -67,7 +63,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """A wheel is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
 
-    The wheel is at rest, because a rolling wheel would become slower.
+    A rolling wheel would slow down, so the wheel rests.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -78,9 +74,9 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
-    """The robot drives backward with the user's gains. In some drives a wheel overshoots at first.
+    """The robot drives backward with the user's gains. Wheels overshoot or roll too fast.
 
-    In others, it rolls at 46 RPM instead of 34. The odometry is still right within 10 % of the way.
+    The odometry is still right within 10 %.
     """
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
@@ -89,10 +85,9 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """Too much feed-forward makes the wheels too fast backward.
+    """Backward, too much feed-forward makes the wheels too fast, and no ticks are counted.
 
-    Report 0x20 shows the true speed, but the firmware counts no ticks. The estimated distance is
-    still right within 3 %.
+    Report 0x20 shows the true speed.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
@@ -102,9 +97,9 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM some ticks follow each other so soon that the firmware loses their speed.
+    """At 62 RPM, some ticks follow so soon that the firmware loses their speed.
 
-    The filter therefore adds to the yaw variance. At 32 RPM it adds nothing.
+    So the filter adds yaw variance, but not at 32 RPM.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

@@ -57,7 +57,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
     """The estimated delay is 0 until the unit of the board's clock is known.
 
-    After a restart of the board, the estimate is 0 again, with a sigma of 12 ms.
+    After a restart, the delay is 0 and sigma 12 ms.
     """
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0

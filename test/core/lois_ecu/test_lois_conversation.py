@@ -51,9 +51,9 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
 
 @pytest.mark.slow
 def test_a_restarted_board_is_configured_again() -> None:
-    """The board restarts, and its low pass has gain 0, so the wheels would not turn.
+    """The board restarts with a low pass of gain 0. The wheels would not turn.
 
-    The driver configures the board again, and the robot drives.
+    The driver configures the board again.
     """
     rig = Rig(nominal("firmware"))
     rig.run(5.0)
@@ -112,9 +112,9 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """The user wants lines without checksum, which value 4 of command 0x11 selects.
+    """The user wants lines without checksum: value 4 of command 0x11.
 
-    The command overwrites the left wheel's "short correction", which the driver then restores.
+    The command overwrites the left wheel's "short correction". The driver restores the value.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):
@@ -128,9 +128,9 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
-    """The robot stops after a forward drive, and its ticks prove that it is at rest.
+    """After a forward drive, the ticks prove that the robot rests.
 
-    The public firmware counts no ticks backward. So rest is not proved after a backward drive.
+    The public firmware counts no ticks backward, so rest is unproved there.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -153,10 +153,9 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """The robot is stopped and started again at several speeds.
+    """The firmware keeps the last measured speed of a wheel at rest. The wheel might not start.
 
-    The firmware keeps the last measured speed of a wheel at rest, so the wheel might not start. The
-    driver clears this speed, and the robot starts each time.
+    The driver clears this speed.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -169,9 +168,9 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """A robot on the public firmware drives at 30 RPM and is stopped. No RPM 0/0 follows the Stop.
+    """The robot drives at 30 RPM and is stopped. No RPM 0/0 follows the Stop.
 
-    If feed-forward is off, 8 RPM in the same direction then do not start the wheels.
+    Without feed-forward, 8 RPM then do not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

@@ -13,9 +13,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 class DeafBench(Bench):
     """A bench whose board does not receive one copy of the line that sets the date period.
 
-    ``lost``: that line.
-
-    ``nth``: number of the copy, from 1. With 0, the board receives every copy.
+    ``nth``: number of that copy, from 1. 0: none.
     """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
@@ -37,7 +35,7 @@ class DeafBench(Bench):
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """A request for one date replaces the date period, so the driver sends the period again.
 
-    One of these lines is lost, and the board still has the right period at the end.
+    One such line is lost.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -48,9 +46,9 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The driver confirms the settings by a date that it requests. A request ends the date period.
+    """The driver requests a date to confirm the settings. The request ends the date period.
 
-    At the end, the settings are confirmed, and the board has the right date period.
+    The driver restores the period.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

@@ -75,9 +75,9 @@ def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() 
 
 
 def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
-    """A group ends with two equal lines, which might be one line that was received twice.
+    """A group ends with two equal lines, perhaps one line twice.
 
-    The decoder waits for the next line, or for 50 ms of silence, before it returns the group.
+    The decoder waits for the next line or for 50 ms of silence.
     """
     alike = encode_report(Ticks(1000, 5, 5))
     decoder = LoisDecoder()
@@ -101,11 +101,9 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
     ],
 )
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
-    """One line of a group is damaged. The decoder discards this group and returns the next one.
+    """One line of a group is damaged. The decoder drops that group.
 
-    There is one exception: if the last line of a group arrives twice, the group is returned. The
-    exception does not apply to a GPS fix, because the decoder returns a fix only after the next
-    line.
+    If the last line comes twice, the group is returned, but not a GPS fix.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -212,9 +210,9 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The tick counts of one group jump. The decoder takes this for an error and drops the group.
+    """The tick counts of one group jump, so the decoder drops the group.
 
-    If the next group continues from the new counts, the board has restarted.
+    If the next group continues the jump, the board has restarted.
     """
     decoder = LoisDecoder()
     said = [
@@ -280,7 +278,7 @@ def test_a_line_that_lost_its_end_costs_no_other() -> None:
 
 
 def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required() -> None:
-    """A line with a wrong checksum is refused, even where checksums are optional.
+    """A line with a wrong checksum is always refused.
 
     A line without a checksum is refused only where a checksum is required.
     """

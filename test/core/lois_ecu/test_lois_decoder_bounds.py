@@ -2,7 +2,7 @@
 
 """Limits of the LOIS decoder: it accepts any bytes, and lost bytes give no wrong value.
 
-Set ``LOIS_SEEDS`` to measure longer: ``LOIS_SEEDS=100 pytest -s -k byte_loss`` prints the results.
+``LOIS_SEEDS=100 pytest -s -k byte_loss`` measures longer and prints the results.
 """
 
 import os
@@ -32,9 +32,9 @@ codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
 def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
     chunks: list[bytes], terminal: bool
 ) -> None:
-    """Any bytes arrive in any chunks. The decoder raises no error.
+    """Any bytes raise no error, and the reports do not depend on the chunks.
 
-    The reports do not depend on the chunks. Between calls, the decoder holds fewer than 256 bytes.
+    Between calls, the decoder holds fewer than 256 bytes.
     """
     data = b"".join(chunks)
     results = []
@@ -83,9 +83,9 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end of a record. It does not end the record.
+    """A torque sample of 0/0 looks like the end of a record. The record goes on.
 
-    The public firmware and the manual have different command numbers for such a record.
+    The command number differs between firmware and manual.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

@@ -49,9 +49,9 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The odometry names its source. In a forward drive, the source is the ticks.
+    """The odometry names its source: in a forward drive, the ticks.
 
-    The public firmware counts no ticks backward. The source is then the commands and the heading.
+    Backward, where the public firmware counts no ticks: commands and heading.
     """
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
@@ -128,9 +128,9 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 
 
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
-    """The board restarts, which sets its counters to zero and stops the robot.
+    """A restart sets the board's counters to zero and stops the robot.
 
-    The odometry adds at most 5 cm, which the robot needs to stop.
+    The odometry adds at most the 5 cm of the stop.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
@@ -217,9 +217,9 @@ def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """The wheels stop while the board is silent for half a second, but the prediction moves on.
+    """The wheels stop while the board is silent, but the prediction moves on.
 
-    The next ticks show that the wheels have hardly rolled. The odometry then follows the ticks.
+    The next ticks show a short way. The odometry follows.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -287,9 +287,9 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the boot gains a wheel's speed oscillates, and no report shows it between two groups.
+    """With the boot gains, a wheel's speed oscillates between two groups of reports.
 
-    So the variance of a predicted speed grows after an unexpected number of ticks.
+    So unexpected ticks increase the variance of a predicted speed.
     """
 
     def variance() -> float:

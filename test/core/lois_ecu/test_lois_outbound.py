@@ -59,9 +59,9 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
 def test_no_loss_of_up_to_two_characters_makes_another_line(
     name: str, with_sum: bool, lenient: bool
 ) -> None:
-    """Up to two characters of the driver's lines are lost. The firmware rejects the damaged lines.
+    """Up to two characters of the driver's lines are lost.
 
-    It accepts only lines that the driver sent, in the order of sending.
+    The firmware accepts only lines that the driver sent, in the order of sending.
     """
     data = b"".join(encode_command(command, with_sum=with_sum) for command in TALKS[name])
     said = heard(data, with_sum=with_sum, lenient=lenient)
@@ -90,10 +90,9 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """Exactly one line's length is lost across two set-points.
+    """Exactly one line's length is lost across two set-points. The remainder is a valid line.
 
-    The remaining characters are another valid line. The board may be deaf for 13 ms at a time, so
-    the driver sends set-points 18 ms apart.
+    So the driver sends set-points 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -104,11 +103,9 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """Exactly one line's length is lost across a motion line and the LED's line after it.
+    """If one line's length is lost, the remainder may be a wrong motion.
 
-    The remaining characters may be a wrong motion, so the LED's line is sent 15 ms after a motion
-    line. A motion line may follow the LED's line at once, because the remaining characters are then
-    never a wrong motion.
+    So the LED's line waits 15 ms after a motion. A motion need not wait.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

@@ -88,10 +88,9 @@ def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> N
 def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
     *, restarted: bool
 ) -> None:
-    """After a silence of 12 s, the tick counters are at zero instead of 500.
+    """After a silence of 12 s, the tick counters are at zero.
 
-    Either the board has restarted, or the wheels have rolled back. The board's clock shows which.
-    If the board has restarted, the clock does not fit the length of the silence.
+    After a restart, the board's clock does not fit the length of the silence.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

@@ -30,8 +30,7 @@ def test_a_speed_that_a_wheel_fell_to_and_keeps_is_that_of_a_wheel_that_stands()
 def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition() -> None:
     """The reported speed falls from 41 to 20 RPM and stays there.
 
-    Few wheels come to rest from as much as 20 RPM. So only the third repetition of 20 RPM shows
-    that the wheel is at rest.
+    Few wheels stop from 20 RPM, so only the third repetition shows rest.
     """
     assert told(43, 41, 29, 20).chance == 0.0
     assert 0.0 < told(43, 41, 29, 20, 20).chance < 1.0
@@ -40,10 +39,9 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """The user has set the gains.
+    """With the user's gains, wheels overshoot and roll steadily. Few stop by themselves.
 
-    Wheels then overshoot and roll steadily, and few stop by themselves. So even twenty repetitions
-    do not show for certain that the wheel is at rest.
+    So even twenty repetitions do not prove rest.
     """
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 
@@ -54,9 +52,9 @@ def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """A late tick makes the next one seem early, so one report has 27 RPM instead of 18.
+    """A late tick makes the next tick seem early: one report has 27 RPM instead of 18.
 
-    This is not taken for a wheel that stopped.
+    The wheel has not stopped.
     """
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 

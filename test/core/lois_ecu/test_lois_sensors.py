@@ -66,7 +66,7 @@ def test_a_date_is_seconds_of_utc(day: GpsDate, utc_s: int) -> None:
 
 
 def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
-    """After midnight the date is still the old one, so the time would be a day too early.
+    """After midnight the board still has the old date, a day too early.
 
     The time is unknown until a new date arrives.
     """
@@ -110,10 +110,9 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """The robot has turned by 120° to the right when the odometry is reset to yaw 0.
+    """Yaw is reset to 0 while the robot's heading is 120°.
 
-    The firmware may send a wrong heading of 120° when the robot faces north. The driver must not
-    take the true headings of 120° after the reset for such errors.
+    The firmware's false heading near north is also 120°. The true heading is accepted.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

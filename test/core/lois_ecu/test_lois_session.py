@@ -19,9 +19,9 @@ OFF = dict.fromkeys((Stream.HEADING, Stream.GPS_POSITION, Stream.GPS_TIME), 0xFF
 
 @FIRMWARE
 def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
-    """The user holds the e-stop button, but the board obeys set-points even then.
+    """The board obeys set-points even while the user holds the e-stop button.
 
-    So the driver does not release the e-stop before the button is released.
+    So the driver keeps the e-stop until the button is released.
     """
     bench = Bench(firmware)
     bench.drive_on()
@@ -39,9 +39,9 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """The motion monitor trips. Its advice names parameters of the LOIS ECU.
+    """The motion monitor trips and names parameters of the LOIS ECU.
 
-    The board has no ~/start, so the advice names the release of the e-stop instead.
+    The board has no ~/start, so the advice is to release the e-stop.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
@@ -64,10 +64,9 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
-    """The user resets the board after a drive.
+    """The user resets the board after a drive. The tick counters jump to zero.
 
-    The tick counters jump to zero, which proves the reset. Even after a drive of only 1.2 s, the
-    counters are high enough for this proof.
+    Even 1.2 s of driving are enough to prove the reset.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, seconds)
@@ -97,9 +96,9 @@ def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
-    """The reset is lost at first, so the tick counters do not change and nothing is confirmed.
+    """The first reset is lost, so the tick counters do not change.
 
-    The driver repeats it, and the counters then prove the reset.
+    The driver repeats the reset, and the counters prove it.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, 1.2)
@@ -118,10 +117,9 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
 
 @FIRMWARE
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
-    """A first reset sets the tick counters to zero, and a second reset is lost.
+    """The counters are still zero after a first reset. A second reset is lost.
 
-    The counters were zero before the second reset, so they do not prove it. The second reset is
-    unconfirmed.
+    Zero counters do not prove the second reset.
     """
     bench = Bench(firmware)
     bench.drive_on(0.2, 6.0)
@@ -185,10 +183,9 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """The driver writes the settings in five rounds, each in a different order.
+    """The board is deaf for a moment in each group that it sends.
 
-    The board is deaf for a moment in each group that it sends. A round can take as long as the time
-    between two groups. In a fixed order, the same line would then be lost in every round.
+    So the five rounds differ in order: a fixed order could lose one setting every time.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}

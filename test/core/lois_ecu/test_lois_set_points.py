@@ -122,7 +122,7 @@ def test_a_record_that_cannot_complete_is_refused() -> None:
 def test_a_record_is_asked_for_three_times(kind: RecordKind, samples: int, line: bytes) -> None:
     """The driver sends the request for a record three times, because one may be lost.
 
-    The three requests follow quickly, because each of them restarts the record.
+    The requests follow quickly, because each restarts the record.
     """
     ecu = started()
     ecu.record(kind, samples)

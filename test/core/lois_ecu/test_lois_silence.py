@@ -14,9 +14,7 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
-    """Return a bench whose connection was lost for ``seconds``, in both directions, during a drive.
-
-    The robot is at rest at the end.
+    """Return a bench at rest, after a drive with ``seconds`` of lost connection in both directions.
 
     ``reopened``: whether the port was closed and opened again.
     """
@@ -49,9 +47,9 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
-    """The connection is lost, so no Stop reaches the board, and the robot drives on for metres.
+    """The connection is lost, so no Stop arrives, and the robot drives on for metres.
 
-    The error of the odometry afterwards is within 3 sigma.
+    The error stays within 3 sigma.
     """
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m

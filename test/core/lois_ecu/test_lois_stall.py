@@ -30,9 +30,7 @@ def pose(x_m: float) -> BoardOdometry:
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
     """Return the times in s, within six seconds, at which a wheel looked stalled.
 
-    ``ticks``: ticks of both wheels in each 0.2 s.
-
-    ``ways_m``: distance in m by which report 0x20 grows in each 0.2 s.
+    ``ticks``, ``ways_m``: growth of ticks and of report 0x20 in 0.2 s.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -90,10 +88,9 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The left wheel's reported speed never changes, although the other wheel ticks.
+    """The left wheel's reported speed never changes while the other wheel ticks.
 
-    So the left wheel is at rest. The reported pose moves, because the firmware computes it from the
-    last reported speed.
+    The firmware computes the pose from the last reported speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
@@ -109,9 +106,9 @@ def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one()
 
 
 def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> None:
-    """With feed-forward, a wheel gets power even above its set-point. It can roll steadily there.
+    """With feed-forward, a wheel can roll steadily above its set-point.
 
-    So a constant speed shows a wheel at rest only if the other wheel's speed changes.
+    A constant speed then shows rest only if the other wheel's speed changes.
     """
     assert not looks_stalled([(-15, 9)] * 14, settings=HOST_GAINS)
     assert not looks_stalled([(-43, -51)] * 14, targets=(-26, -26), settings=HOST_GAINS)
@@ -128,7 +125,7 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """Both wheels roll backward steadily at 1.3 times their set-points. They do not look stalled.
+    """Both wheels roll backward steadily at 1.3 times their set-points.
 
     A wheel looks stalled if only one of the two is so fast.
     """
@@ -137,9 +134,9 @@ def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel's reported speed is near its set-point, but the odometry finds that the wheel rests.
+    """A wheel's reported speed is near its set-point, but the odometry finds it at rest.
 
-    Such a wheel gets no power, so it looks stalled.
+    The wheel gets no power, so it looks stalled.
     """
     still = [(-21, -20), (-22, -20), (-21, -20), (-21, -20)] * 4
     assert looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -147,9 +144,9 @@ def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
 
 
 def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> None:
-    """A wheel is at rest, and its reported speed is below its set-point. It does not look stalled.
+    """A wheel rests, and its reported speed is below its set-point.
 
-    The controller gives it power, so it starts by itself.
+    The controller gives it power, so the wheel starts by itself.
     """
     still = [(-21, -12), (-22, -12), (-21, -12), (-21, -12)] * 4
     assert not looks_stalled(still, targets=(-19, -19), resting=(False, True))
@@ -162,19 +159,18 @@ def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
 
 
 def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
-    """A stall is not reported for set-points below 2 RPM, at which a wheel need not turn.
+    """Below 2 RPM a wheel need not turn. Duty commands bypass the speed controllers.
 
-    It is not reported for duty commands either, because they bypass the speed controllers.
+    Neither case is reported as a stall.
     """
     assert watched(SetRpm(0, 1), ticks=(0, 0), ways_m=0.0) == []
     assert watched(SetDuty(50, 50), ticks=(0, 0), ways_m=0.0) == []
 
 
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
-    """The controller of a wheel is saturated and keeps it at −68 RPM instead of −31.
+    """A saturated controller keeps a wheel at −68 RPM instead of −31. The driver sends RPM 0/0.
 
-    The driver sends RPM 0/0. The odometry does not take back the distance that the wheel has rolled
-    before this command.
+    The odometry keeps the distance rolled before.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
@@ -201,11 +197,9 @@ def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """The robot drives forward, then its wheels are blocked and commanded backward.
+    """The wheels are blocked after a forward drive and commanded backward. The pose stays.
 
-    The pose does not move back.
-
-    ``reset``: whether the odometry is reset before the backward command.
+    ``reset``: whether the odometry is reset before this command.
     """
     driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
     for step in range(50):

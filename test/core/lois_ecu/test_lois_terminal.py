@@ -18,9 +18,9 @@ COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
 
 @FIRMWARE
 def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
-    """The user sets a terminal mode while the robot drives. The driver stops the robot first.
+    """The user sets a terminal mode during a drive. The driver stops the robot first.
 
-    It then sets the mode and passes the sensor's lines on. Motion is refused meanwhile.
+    Then the sensor's lines are passed on, and motion is refused.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -46,10 +46,9 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode.
+    """The end of a terminal mode is reported once, even if its first lines are lost.
 
-    Its end is reported once, even if the first lines to end it are lost. The driver restores the
-    "short correction" that the mode overwrote.
+    The driver restores the overwritten "short correction".
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -126,8 +125,7 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
 def test_another_drive_mode_stops_first(firmware: str) -> None:
     """The user sets another drive mode while the robot drives.
 
-    The driver stops the robot and refuses motion until the robot is at rest. It then uses the new
-    drive mode.
+    The driver stops the robot, and refuses motion until the robot rests.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, 3.0)
@@ -159,7 +157,7 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
     """In compass mode the public firmware reads only 480 characters a second.
 
-    So a latched e-stop sends only Stop, and the board still obeys later lines.
+    So a latched e-stop sends only Stop. Later lines still arrive.
     """
     bench = Bench("firmware")
     configure(bench, COMPASS)

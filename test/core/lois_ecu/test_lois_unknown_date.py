@@ -29,11 +29,7 @@ WORKS = pytest.mark.parametrize(
 class GpsRig(Rig):
     """A robot whose GPS has no date at first.
 
-    ``dated``: whether the GPS has a date.
-
     ``unknown``: what the GPS sends instead of a date.
-
-    ``sent``: lines to the board, each with its time in s.
 
     ``requests``: times of the requests for a date, in s.
     """
@@ -77,7 +73,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 ) -> None:
     """A position is a fix only if the GPS also reports a date.
 
-    Zeros, and the days on which the GPS calendar begins, are not a date.
+    Zeros and the first days of the GPS calendar are not dates.
     """
     rig = GpsRig(quirks, unknown=unknown)
     rig.run(8.0)

@@ -45,10 +45,9 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No date confirms the settings.
+    """The settings stay unconfirmed. The driver cannot repeat them while the robot drives.
 
-    The driver wants to repeat them, but waits while the robot drives. Meanwhile, the session's next
-    wake-up is always in the future.
+    The session's next wake-up is always in the future.
     """
     monkeypatch.setattr(SettingsWriter, "date_came", lambda _self: None)
     bench = Bench(firmware)
@@ -72,9 +71,9 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """The LED's line is sent at least 14.5 ms after a motion line.
+    """The LED's line follows a motion line after at least 14.5 ms.
 
-    If 13 ms of bytes were lost, the two lines could become a wrong motion.
+    Otherwise, 13 ms of lost bytes could leave a wrong motion.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)
