@@ -32,10 +32,9 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
-    """The program has an input that has ended, and gets a signal.
+    """The program's input has ended. Only a signal ends the program.
 
-    Only the signal ends the program. It removes its links and ends with code 0, without a
-    traceback.
+    The program then removes its links, and its exit code is 0.
     """
     link = tmp_path / "toy"
     with toy("toy_lines", "--link", str(link), stdin=subprocess.DEVNULL) as process:
@@ -84,7 +83,7 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 def test_a_board_on_the_network_prints_its_address() -> None:
     """A board on the network prints its UDP address, and has options for network faults.
 
-    It has no options for serial lines, such as ``--link`` and ``--flip``.
+    Serial options such as ``--link`` are missing.
     """
     with toy("toy_udp", "--lose", "0.1", "--duplicate", "0.1", "--delay", "0.2") as process:
         address = line(process)

@@ -2,12 +2,11 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-``odo``: the reply is ``ok X``, the position in m.
+``odo``: the reply is ``ok X``, in m.
 
-``move X``: drives X m at 0.5 m/s. The reply ``ok X`` comes at the end. A second ``move`` in this
-time fails.
+``move X``: drives X m at 0.5 m/s, then answers ``ok X``.
 
-``stop``: ends the move. The move is then answered as failed, and ``stop`` with ``ok``.
+``stop``: ends the move. The reply to the move is then a failure.
 """
 
 import argparse

@@ -55,9 +55,9 @@ def test_datagrams_come_twice_at_the_given_rate() -> None:
 
 
 def test_a_delay_is_never_longer_than_given_and_lets_others_overtake() -> None:
-    """Datagrams have random delays of up to 50 ms. Some overtake others, but all arrive in time.
+    """Datagrams have random delays of up to 50 ms, and may overtake each other.
 
-    The board is polled every 10 ms, so a datagram is at most 60 ms late.
+    With a poll every 10 ms, all arrive within 60 ms.
     """
     path = NetworkPath(NetworkFaults(delay_s=0.05), "seed")
     for number in range(200):

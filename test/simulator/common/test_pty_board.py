@@ -137,9 +137,9 @@ def test_waiting_for_what_does_not_come_ends_with_false() -> None:
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """The thread of a board fails. Both a wait for the board and its closing raise RuntimeError.
+    """The thread of a board fails. Waiting for the board and closing it raise RuntimeError.
 
-    The exception of the thread is the cause of the RuntimeError.
+    The cause is the thread's exception.
     """
 
     class BrokenBoard(Ticker):

@@ -62,9 +62,9 @@ class LateBoard(RunningBoard[Motor]):
 def test_what_came_while_the_thread_was_late_precedes_the_ticks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A stop arrives while the board's thread does not run. The stop acts before the overdue ticks.
+    """A stop arrives while the board's thread does not run.
 
-    A real board would not drive on while the computer is busy.
+    The stop acts before the overdue ticks.
     """
     board = LateBoard()
     monkeypatch.setattr(time, "monotonic", lambda: board.now_s)

@@ -57,8 +57,7 @@ def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
 def test_one_link_leads_to_several_terminals_by_their_names(tmp_path: Path) -> None:
     """A user gives one link for a board with two terminals.
 
-    Each terminal gets a link with its own name. The name ends in a hyphen and the name of the
-    channel. At the end the links are removed.
+    Each terminal gets its own link, named after its channel, such as ``board-drive``.
     """
     with ServedBoard(ToyLines(), links=[tmp_path / "board"]) as served:
         assert served.names == [str(tmp_path / "board-drive"), str(tmp_path / "board-front")]

@@ -51,9 +51,9 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """Datagrams are delayed by up to 10 s of board time. The test does not wait in real time.
+    """Datagrams are delayed by up to 10 s of board time, but not in real time.
 
-    Each datagram reaches the board once, twice or never.
+    Each datagram arrives once, twice or never.
     """
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()
@@ -71,7 +71,7 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
     """A caller sends at 1000 s of its own clock, with a delay of up to 1 s.
 
-    The datagram reaches the board with a time by the caller's clock.
+    The datagram arrives with a time of that clock.
     """
     at: list[float] = []
 

@@ -13,9 +13,9 @@ BEAT = re.compile(r"(;\d\d)?hbt ")
 class Rig:
     """A simulated board and its host.
 
-    ``lines``: all lines received from the board, without line ends, each with its time and port.
+    ``lines``: all lines from the board, without line ends, each with time and port.
 
-    ``relays``: whether the host relays each angle of the front wheel to the drive half.
+    ``relays``: whether the host relays the front wheel's angles to the drive half.
     """
 
     def __init__(self, *, firmware: Firmware | None = None, **settings: object) -> None:

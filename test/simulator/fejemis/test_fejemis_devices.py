@@ -9,9 +9,9 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """The lift takes 12 s from end to end at 6 V. It stops after the given time, or at 0 V.
+    """The lift takes 12 s from end to end at 6 V.
 
-    The brush is switched on and off.
+    The lift stops after the given time, or at 0 V.
     """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")
@@ -47,7 +47,7 @@ def test_the_band_and_single_leds() -> None:
 def test_distances_to_a_wall() -> None:
     """All sensors measure the distance to a wall at 0.5 m.
 
-    Without a wall, each reports the end of its range, but the sonar reports 0.
+    Without a wall: the end of the range, but 0 from the sonar.
     """
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]
@@ -114,9 +114,9 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """The host calibrates the gyro, and then ``eer`` or ``setid 0`` loads a configuration.
+    """``eer`` or ``setid 0`` loads a configuration after a calibration of the gyro.
 
-    The loaded configuration has no offset for the gyro, so the yaw drifts with the gyro's bias.
+    The configuration has no gyro offset, so the yaw drifts.
     """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")

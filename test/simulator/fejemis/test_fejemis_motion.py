@@ -31,9 +31,9 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """The robot's speed and turn rate are those of the manual's equations, calculated here by hand.
+    """Speed and turn rate follow the manual's equations, calculated here by hand.
 
-    They differ from the v and w of the ``rc`` line.
+    The v and w of the ``rc`` line are different.
     """
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)

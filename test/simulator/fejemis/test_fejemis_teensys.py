@@ -85,7 +85,7 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 ) -> None:
     """A half ignores input until its boot ends, and then may send a start line.
 
-    The time in its lines counts from the beginning of the boot.
+    The time in its lines begins with the boot.
     """
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now
@@ -225,7 +225,7 @@ def test_each_bit_of_the_diagnosis_can_be_wrong(what: str, diagnosis: int) -> No
 def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
     """The angle sensor freezes without an error, so the steering runs to its end stop.
 
-    An absent sensor, or one in error, can be seen in the angle line.
+    The angle line shows an absent or failed sensor.
     """
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0.5 30")

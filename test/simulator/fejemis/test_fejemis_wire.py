@@ -33,9 +33,9 @@ def test_sums_are_those_of_the_public_hosts(line: str) -> None:
 
 
 def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
-    """Each half sends a heartbeat every 400 ms without a request, laid out as in the manual.
+    """Each half sends a heartbeat every 400 ms, laid out as in the manual.
 
-    The drive half has the id 90, and the front half 91.
+    The drive half has the id 90, the front half 91.
     """
     rig = Rig()
     rig.run(2.5)
@@ -149,7 +149,7 @@ KEYS = {
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
     """Each value can be requested once, or subscribed to, by its key in the help text.
 
-    The replies begin with the same key, except that of the infrared sensors.
+    All replies but the infrared's begin with that key.
     """
     rig = Rig().booted()
     rig.say(port, "leave")
@@ -260,10 +260,9 @@ def test_bytes_to_the_boards_can_be_lost() -> None:
 
 
 def test_three_lost_characters_leave_a_valid_command() -> None:
-    """A command loses the characters ``c``, ``2`` and ``1``, and its checksum is still right.
+    """A command loses ``c``, ``2`` and ``1``. Modulo 99, these add 0 to the checksum.
 
-    The checksum is a sum modulo 99, and these characters add 0 to it. So the half obeys the
-    command.
+    So the half obeys the command.
     """
     rig = Rig(firmware=SUMS).booted()
     whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"

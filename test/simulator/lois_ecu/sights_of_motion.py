@@ -2,8 +2,8 @@
 
 """Detectors of quirks in motion: how a board counts ticks, and how it measures and controls speeds.
 
-A quirk is a deviation from the manual. Each function has the name of a quirk, and returns whether a
-board with the given quirks shows that one.
+A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
+the quirk of its name.
 """
 
 import math
@@ -55,8 +55,7 @@ def velocity_may_be_nan(quirks: Quirks) -> bool:
 def sign_of_command(quirks: Quirks) -> bool:
     """Return whether the measured speed of a reversing wheel is negative too early.
 
-    The wheel turns forward, and a command to drive backward comes. The measured speed is already
-    negative while the wheel still turns forward.
+    The wheel still turns forward when the measured speed becomes negative.
     """
     rig = Rig(quirks).booted()
     rig.drive(30, 40, 6.0)

@@ -2,8 +2,8 @@
 
 """Detectors of quirks in communication: what a board receives, sends and records.
 
-A quirk is a deviation from the manual. Each function has the name of a quirk, and returns whether a
-board with the given quirks shows that one.
+A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
+the quirk of its name.
 """
 
 from dataclasses import replace
@@ -158,7 +158,7 @@ def terminal_mixes_sensors(quirks: Quirks) -> bool:
 def terminal_passes_input_on(quirks: Quirks) -> bool:
     """Return whether the board obeys fewer than 20 of 100 lines in compass mode.
 
-    The board forwards each line to the compass at 4800 baud, and reads no input in that time.
+    The board forwards each line at 4800 baud, and is deaf meanwhile.
     """
     rig = Rig(quirks)
     rig.run(2.1)

@@ -2,7 +2,7 @@
 
 """Tests that each quirk of the simulated LOIS ECU can be observed, and can be switched off.
 
-A quirk is a deviation of the public firmware from the manual.
+A quirk is a deviation from the manual.
 """
 
 from collections.abc import Callable

@@ -100,9 +100,9 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
-    """A press of the button stops the robot, and a release does not move it.
+    """The button stops the robot. The board reports press and release.
 
-    The board reports both. A new set-point moves the robot, even while the button is pressed.
+    A new set-point moves the robot even while the button is pressed.
     """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 4.0)
@@ -243,9 +243,9 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
 
 
 def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
-    """The board gives a ball and reboots. The LED is off, and another ball is given at once.
+    """The board gives a ball and reboots. The LED is off, and another ball drops at once.
 
-    Without a reboot, the firmware refuses a second ball for 6 s.
+    Otherwise a second ball is refused for 6 s.
     """
     rig = Rig().booted()
     rig.say(SetLed(True), DistributeBall())

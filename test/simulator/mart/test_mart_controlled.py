@@ -54,7 +54,7 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 def test_sdr_limits_an_unlimited_move_alone() -> None:
     """During an unlimited move, SDR sets the distance from the start at which the move ends.
 
-    SDR has no effect on a move that has a distance.
+    Other moves ignore SDR.
     """
     rig = Rig()
     rig.say("TF 0")

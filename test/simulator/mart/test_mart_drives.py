@@ -29,8 +29,7 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
     """Some servers answer RM with a failure although the robot moves.
 
-    Such a server then knows of no motion. So SRM fails and SL has no effect. Only a write to the
-    motors stops the robot.
+    They cannot stop this motion. Only a write to the motors stops the robot.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "
@@ -155,7 +154,7 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
     """CS and RMCS change the speeds of the right and the left motor, in this order.
 
-    A positive number is more forward, also during B, which drives backward.
+    Positive is more forward, also in B.
     """
     rig = Rig()
     rig.drive(start)
@@ -316,7 +315,7 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
     """B ends if an obstacle behind is nearer than 15 inches.
 
-    The robot moves 2 inches before the server reads the sonar for the first time.
+    The robot moves 2 inches before the first sonar reading.
     """
     rig = Rig(rear_m=rear_in * INCH_M)
     rig.drive("B SLOW", 0.3)

@@ -10,7 +10,7 @@ LOST = "fail MPU6050 connection lost"
 
 @pytest.mark.parametrize("text", ["F", "B", "TF 24", "TB 24", "SB"])
 def test_with_a_dead_imu_it_never_answers_and_does_not_move(text: str) -> None:
-    """The IMU is dead, and a request that needs it comes. The robot does not move.
+    """The IMU is dead, and a request that needs it comes.
 
     The server answers neither this request nor any later one.
     """
@@ -146,7 +146,7 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
     """The server has given up a dead IMU, and the IMU works again.
 
-    The server uses the IMU only after a successful RST IMU or SB.
+    The server uses it only after a successful RST IMU or SB.
     """
     for cure in ("RST IMU", "SB"):
         rig = Rig()

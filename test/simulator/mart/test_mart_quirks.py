@@ -2,8 +2,8 @@
 
 """Tests that each quirk of the simulated MART server can be observed, and can be switched off.
 
-A quirk is a deviation of the public server from its manual. A function with the name of a quirk
-returns whether a server with the given quirks shows that one.
+A quirk is a deviation from the manual. A function named after a quirk returns whether a server
+shows it.
 """
 
 from collections.abc import Callable

@@ -144,7 +144,7 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server is restarted while the robot moves. It then knows of no motion that it could stop.
+    """The server restarts while the robot moves, and knows of no motion to stop.
 
     Only a power cycle of the controller stops the motors.
     """
@@ -206,10 +206,9 @@ def test_sonars_turn_with_the_robot() -> None:
 def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
     changes: dict[str, float], bits: int
 ) -> None:
-    """Each bit of MCSTAT is one fault of the motor board.
+    """Bits of MCSTAT: 4 and 8 are a trip, 16 and 32 a short circuit.
 
-    Bits 4 and 8 are a trip, and 16 and 32 a short circuit. Bit 64 is more than 30 V, and 128 is
-    less than 16 V.
+    64 is more than 30 V, and 128 less than 16 V.
     """
     rig = Rig()
     rig.server.chassis.change(**changes)  # type: ignore[arg-type]

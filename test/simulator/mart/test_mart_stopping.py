@@ -96,7 +96,7 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """A command on the stop port stops F, B or RM, and then SM or SRM comes.
+    """The stop port stops F, B or RM, and then SM or SRM comes.
 
     The command port hangs for ever, and the motors are off.
     """
@@ -184,10 +184,9 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 
 
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
-    """A controlled move begins with a measurement of the gyro's bias, and SL comes in this time.
+    """SL comes while a controlled move still measures the gyro's bias.
 
-    An SL after 0.03 s is ignored. An SL after 0.1 s ends the move late, and the server answers the
-    move with a failure.
+    After 0.03 s, SL is ignored. After 0.1 s, SL ends the move late.
     """
     rig = Rig()
     rig.say("TF 24")
@@ -269,9 +268,9 @@ def test_the_stop_port_is_never_answered() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
-    """A stop of F takes more than 0.75 s, and the server reports a failure.
+    """The server reports a stop of F that takes more than 0.75 s as failed.
 
-    For RM the limit is higher: a stop of 1.5 s to 1.88 s is still ok.
+    For RM, a stop of up to 1.88 s is ok.
     """
     rig = Rig()
     rig.ask("SLMP 1 60")

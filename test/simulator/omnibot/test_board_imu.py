@@ -69,10 +69,9 @@ def test_turning_left_is_negative_on_the_upside_down_gyro() -> None:
 
 
 def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
-    """The robot accelerates forward and to the left.
+    """The robot accelerates forward and to the left. The accelerations add up to the speed.
 
-    The measured accelerations add up to its speed. On y the sign is reversed, because the sensor is
-    mounted upside down.
+    The sensor is mounted upside down, so y is reversed.
     """
     board = SimulatedBoard(BoardSettings(running=True, accel_noise_g=0.0))
     board.receive(velocity(14, 28, 0))
@@ -87,9 +86,9 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """The robot drives a left curve. The IMU measures 0.5 m/s² to the left of the motion.
+    """In a left curve, the IMU measures 0.5 m/s² to the left.
 
-    On y the sign is reversed, because the sensor is mounted upside down.
+    The sensor is mounted upside down, so y is reversed.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(velocity(x, y, 500))

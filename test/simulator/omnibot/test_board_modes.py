@@ -60,9 +60,9 @@ def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
 
 
 def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
-    """On some boards, the three bytes that wake the board may also come during the boot.
+    """On some boards, the three bytes that wake the board may come during the boot.
 
-    Such a board then obeys the first S after the boot.
+    After the boot, the first S is obeyed.
     """
     board = SimulatedBoard(BoardSettings(receiver=ReceiverKind(wakes_while_booting=True)))
     board.receive(bytes(3))
@@ -144,9 +144,9 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """A motion frame comes to a board that is not woken yet, and loses its first three bytes.
+    """The first three bytes of the frame are lost, because they wake the board.
 
-    The board reads the rest of the frame as letters, here as a reset.
+    The board reads the rest as letters, here as a reset.
     """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
@@ -197,9 +197,9 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 
 
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
-    """A pause comes after an incomplete frame. A board that looks for pauses discards the frame.
+    """A board that looks for pauses discards an incomplete frame after a pause.
 
-    The pause is measured by the caller's times or, without them, by the ticks in between.
+    Without times from the caller, the ticks measure the pause.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

@@ -82,7 +82,7 @@ def test_stop_stops() -> None:
 
 @pytest.mark.parametrize("latches", [False, True])
 def test_an_emergency_stop_stops_at_once(latches: bool) -> None:
-    """An emergency stop comes during a drive. The motors are off within the tick.
+    """An emergency stop switches the motors off within the tick.
 
     The robot is at rest within 0.3 s and stays at rest.
     """
@@ -108,10 +108,9 @@ def test_an_emergency_stop_that_does_not_latch_ends_with_the_next_motion() -> No
 
 
 def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
-    """The emergency stop of this board latches.
+    """The emergency stop latches. Only a reset ends it, not a command, pause or start.
 
-    Only a reset ends it, not a command, pause or start. The board does not record motion commands
-    that it refuses.
+    Refused motion commands are not recorded.
     """
     board = SimulatedBoard(BoardSettings(running=True, estop_latches=True))
     board.receive(ESTOP + velocity(35, 0, 0) + b"PS" + velocity(35, 0, 0))
@@ -134,9 +133,9 @@ POSITION = BoardSettings(running=True, control="position")
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],
 ) -> None:
-    """With the switch on "position", a command is a pose in the earth frame, in mm and mrad.
+    """On "position", a command is a pose in the earth frame, in mm and mrad.
 
-    The robot stops at this pose. If the heading exceeds a full turn, the robot makes that turn too.
+    A heading of more than a full turn is driven in full.
     """
     board = SimulatedBoard(POSITION)
     board.receive(velocity(*goal))
@@ -158,7 +157,7 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """The switch is on "position". Zeros in mode 1 do not stop the robot: they command the origin.
+    """With the switch on "position", zeros in mode 1 command the origin.
 
     For this reason the stop frame has mode 2.
     """

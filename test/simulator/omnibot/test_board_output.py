@@ -184,7 +184,7 @@ def test_a_delta_is_in_the_earth_frame_or_in_the_body_frame(
 ) -> None:
     """The robot drives along the y axis of the earth frame, at 0.5 m/s.
 
-    A delta in the earth frame has 20 mm in y. A delta in the body frame has 20 mm in x.
+    Its delta is 20 mm: y in the earth frame, x in the body frame.
     """
     board = SimulatedBoard(
         BoardSettings(

@@ -33,9 +33,9 @@ class Wheel:
 
 @pytest.mark.parametrize("target", [12.2, 41.6, 73.4, -41.6])
 def test_a_step_rises_quickly_with_little_overshoot_and_no_lasting_error(target: float) -> None:
-    """After a step, the wheel reaches 90 % of the commanded speed in 0.2 s.
+    """The wheel reaches 90 % of the speed in 0.2 s, with 5 % overshoot at most.
 
-    The speed overshoots by at most 5 %. After 2 s it is within 0.5 %.
+    After 2 s the error is below 0.5 %.
     """
     speeds = [speed / target for speed in Wheel().hold(target, 300)]
     assert speeds[20] > 0.9
@@ -53,9 +53,9 @@ def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
 
 
 def test_saturation_does_not_wind_up_the_integrator() -> None:
-    """A speed that the motor cannot reach is commanded for 10 s, or for 1 s.
+    """A speed that the motor cannot reach is commanded for 10 s or for 1 s.
 
-    Then a slow one follows. The wheel reaches the slow speed equally soon in both cases.
+    A slow speed is then reached equally soon.
     """
     long, short = Wheel(), Wheel()
     long.hold(300.0, 1000)

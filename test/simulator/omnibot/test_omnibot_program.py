@@ -10,7 +10,7 @@ from simulator_program import PATIENCE_S, line, say, simulator
 
 
 def test_the_first_line_is_the_path_and_nothing_else() -> None:
-    """The first line on stdout is only the path of the port, so that a script can read and open it.
+    """The first line on stdout is only the path of the port, for scripts.
 
     Hints for people are on stderr.
     """

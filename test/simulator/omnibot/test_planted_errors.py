@@ -46,7 +46,7 @@ def test_a_reversed_axis_moves_the_robot_the_other_way_and_the_board_does_not_kn
 ) -> None:
     """One axis of the board is reversed, so the robot moves opposite to the command.
 
-    The board's odometry is reversed too, so its own pose agrees with the command.
+    The board's own pose agrees with the command.
     """
     straight, reversed_ = driven(command), driven(command, axis_signs=signs)
     truth = (reversed_.truth.x_m, reversed_.truth.y_m, reversed_.truth.yaw_rad)
@@ -102,9 +102,9 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """A robot is held at an angle. The accelerometer shows this angle and that of its own mounting.
+    """The accelerometer shows the robot's angle and that of its own mounting.
 
-    By REP-103, pitch is negative if the front is up, and roll is positive if the left side is up.
+    REP-103: pitch is negative if the front is up; roll is positive if the left is up.
     """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)

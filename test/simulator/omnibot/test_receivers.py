@@ -177,9 +177,9 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """A stop has lost a byte. The window receiver completes it with the FF of the next frame.
+    """The window receiver completes a stop that lost a byte with the next frame's FF.
 
-    The receiver also keeps this FF, so it finds the next frame.
+    The same FF begins the next frame.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),

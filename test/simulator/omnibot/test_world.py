@@ -69,10 +69,9 @@ def test_a_wider_base_turns_less_than_the_encoders_say() -> None:
 
 
 def test_slip_loses_about_its_mean_fraction_of_the_way() -> None:
-    """The wheels slip by 10 % on average.
+    """The wheels slip by 10 % on average, depending on the seed.
 
-    The robot turns by 90 % of the angle that the encoders show. The exact angle depends on the
-    seed.
+    The robot turns by 90 % of the encoders' angle.
     """
     plain = drive(BoardSettings(), 3000)
     first = drive(BoardSettings(slip=0.1, seed=1), 3000)
@@ -120,9 +119,9 @@ def test_a_slope_pulls_the_same_way_whatever_the_heading() -> None:
 
 
 def test_a_gripped_robot_moves_as_it_is_moved_and_its_encoders_count_that() -> None:
-    """Someone grips the robot and moves it. The motors have no effect, but the encoders count.
+    """Someone moves the robot by hand. The motors have no effect, but the encoders count.
 
-    Afterwards the motors move the robot from its new place.
+    Afterwards the motors work from the new place.
     """
     world = World(BoardSettings())
     world.gripped = Twist(0.1, -0.2, 0.0)
