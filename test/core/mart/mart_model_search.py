@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 def trouble(world: World) -> str:
     """Return what is wrong in this world, or an empty text if nothing is wrong.
 
-    Without an IMU, only a crash is wrong.
+    With a dead IMU or a driver that gave up, only a crash is wrong.
     """
     server, driver = world.server, world.driver
     if server.crashed:

@@ -21,7 +21,7 @@ def test_a_dead_imu_refuses_motion_until_it_is_back(
 ) -> None:
     """With a dead IMU, the driver starts no motor and says why.
 
-    With RST IMU, the driver notices when the IMU is back.
+    On a server with RST IMU, motion is allowed when the IMU is back.
     """
     bench = MartBench(firmware).ready()
     bench.server.imu.alive = False
@@ -238,7 +238,7 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
     """The server rejects an RM. Five seconds later the robot moves without a command.
 
-    The RM would have started the robot at once.
+    A rejected RM would have started the robot at once.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58

@@ -232,7 +232,7 @@ def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
 def test_only_a_log_that_was_started_ends_the_server() -> None:
     """The log can be downloaded only after it was started.
 
-    The download sends EXIT, which ends the server.
+    The download sends EXIT and ends the server, so the controller must be started again.
     """
     bench = MartBench().ready()
     with pytest.raises(RequestRefused, match="start_log"):

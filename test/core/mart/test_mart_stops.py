@@ -156,7 +156,7 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 ) -> None:
     """The stop of a turn is lost. Its reply would have been an angle.
 
-    A late encoder count looks like that angle.
+    The driver rejects a late encoder count that looks like that angle.
     """
     bench = MartBench().ready()
     bench.command(0.0, 0.5, 3.0)
