@@ -2,9 +2,9 @@
 
 """A simulated toy board with two serial channels: one for its drive, one for a steered wheel.
 
-Input: ``go V W`` in m/s and rad/s, and ``angle DEGREES``.
+Input: ``go V W`` in m/s and rad/s, ``angle DEGREES``.
 
-Output: ``odo X Y YAW`` in m and rad, every 400 ms, and ``fwl DEGREES``, every 20 ms.
+Output: ``odo X Y YAW`` in m and rad every 400 ms, ``fwl DEGREES`` every 20 ms.
 """
 
 import argparse

@@ -2,7 +2,7 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-``odo``: the reply is ``ok X``, in m.
+``odo``: answers ``ok X``, in m.
 
 ``move X``: drives X m at 0.5 m/s, then answers ``ok X``.
 

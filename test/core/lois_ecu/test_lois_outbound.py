@@ -105,7 +105,7 @@ def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_
 ) -> None:
     """If one line's length is lost, the remainder may be a wrong motion.
 
-    So the LED's line waits 15 ms after a motion. A motion after the LED need not wait.
+    So the LED's line waits 15 ms, but only after a motion line.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

@@ -36,8 +36,6 @@ class Driver(NamedTuple):
 
     ``proved``: whether a check has just shown that the IMU works.
 
-    ``pending``: the command that awaits a reply.
-
     ``unanswered``: the number of stops without an answer.
 
     ``moved``: whether the last motion was a controlled move.

@@ -61,15 +61,15 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 class Trial(NamedTuple):
     """One run of the search: wishes with one disturbed datagram, or a driver that starts.
 
-    ``way``: the direction of the disturbed datagram: 0 to the server, 1 from the server.
+    ``way``: 0 to the server, 1 from the server.
 
-    ``number``: the datagram's number in that direction, from 0, without regular queries.
+    ``number``: the disturbed datagram's number in that direction, from 0, without regular queries.
 
     ``met``: what the server is executing when the driver starts.
 
     ``away_s``: the length of a first interruption of the network.
 
-    ``back_s``: the time from its end to a second interruption of 1 s.
+    ``back_s``: the time until a second interruption, of 1 s.
 
     ``ways``: the directions that are interrupted.
     """
