@@ -2,6 +2,6 @@
 
 """The core of the driver: it converts bytes and times into values.
 
-The core does no input or output, and does not use ROS, threads or clocks. The modules here are
-common to all boards. Each board has a package of its own in this folder.
+It does no input or output, and knows neither ROS nor threads nor clocks. Each board has its own
+package here.
 """

@@ -2,10 +2,8 @@
 
 """The interface between the driver and a motor board: what to implement to add a board.
 
-A ``Board`` decodes bytes into readings: measurements in SI units, independent of the encoding. It
-encodes requests as packets, and tracks the mode that the board seems to be in. It also makes the
-actuator, which encodes motion orders. A ``Board`` does not know ROS or ports, and reads no clock:
-every ``now`` is the host's steady time, in s.
+A ``Board`` does not know ROS or ports, and reads no clock: every ``now`` is the host's steady time,
+in s.
 """
 
 import math
@@ -44,15 +42,13 @@ RateName = Literal["IMU", "Odometry", "Pose"]
 class BoardFigures:
     """Counters and states of a board for the diagnostics, counted over all connections.
 
-    * ``rates_hz``: expected rate of each kind of reading that the board sends.
+    * ``rates_hz``: expected rate of each kind of reading.
     * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
     * ``faults``: how often the framing was lost.
     * ``discarded_bytes``: bytes that belong to no valid frame.
     * ``saturated``: commands that exceeded the range of the board's encoding.
-    * ``odom_hz``: rate at which ``odom`` is published, or None if it is published once per
-      odometry reading.
-    * ``own``: figures that only this kind of board has, such as its version; the keys are their
-      labels.
+    * ``odom_hz``: rate of ``odom``; None: published once per odometry reading.
+    * ``own``: figures of this kind of board, by label, e.g. its version.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
@@ -77,25 +73,23 @@ class ReadingClock(Protocol):
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None
     ) -> list[float]:
-        """Return one stamp for each reading, in the order of the readings.
+        """Return one stamp for each reading of one ``Board.receive`` or ``Board.elapse`` call.
 
-        The readings come from one call of ``Board.receive`` or ``Board.elapse``. ``now`` is the
-        time at which they arrived. ``edge`` is ``Board.edge`` after that call.
+        ``now``: time of arrival. ``edge``: ``Board.edge`` after that call.
         """
 
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """Return the stamp of a reading that arrived alone. This is faster than ``stamps``.
 
-        If the stamp is uncertain, return None and change nothing. The caller then calls ``stamps``.
+        If the stamp is uncertain, return None and change nothing: call ``stamps`` then.
         """
 
 
 class Board(Protocol):
     """One kind of board: the translator between its bytes and the rest of the driver.
 
-    Implement every method that has only a docstring here. The other methods are optional: their
-    defaults suit a board that does not need them. Methods for requests, such as ``pause``, raise
-    RequestRefused if the board's present mode forbids the request.
+    Methods with only a docstring must be implemented. Requests such as ``pause`` raise
+    RequestRefused if the present mode forbids them.
     """
 
     traits: Traits
@@ -106,8 +100,10 @@ class Board(Protocol):
     """
 
     clock: ReadingClock | None = None
-    """Clock for readings that carry the board's time. None if the readings do not carry a time: the
-    driver then computes their stamps from the board's ticks, or from the times of arrival."""
+    """Clock for readings that carry the board's time.
+
+    None: the stamps come from the board's ticks or the arrivals.
+    """
 
     @property
     def mode(self) -> Mode:
@@ -117,8 +113,7 @@ class Board(Protocol):
     def edge(self) -> SampleBoundary | None:
         """Position in the stream of IMU samples at which the last read of the port ended.
 
-        ``clock`` needs this position. None while the framing is uncertain, or if the last read
-        shows nothing new about the position.
+        None while the framing is uncertain, or without new information.
         """
         return None
 
@@ -136,14 +131,14 @@ class Board(Protocol):
     def refusal(self) -> str:
         """Reason why motion is refused, with a remedy; empty if motion is allowed.
 
-        While the board runs, a command to stand still is not refused for this reason.
+        A running board still accepts a command to stand still.
         """
         return ""
 
     def gravity_advice(self, gravity_mps2: float) -> str:
         """Return advice on the IMU's settings if the measured gravity is wrong; otherwise empty.
 
-        ``gravity_mps2``: magnitude of the specific force that was measured at rest, in m/s².
+        ``gravity_mps2``: specific force at rest, in m/s².
         """
         return ""
 
@@ -153,8 +148,7 @@ class Board(Protocol):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
 
-        ``now`` is the time at which the bytes arrived. If later bytes are needed to prove that a
-        reading is valid, a later call returns this reading.
+        ``now``: time of arrival. A reading may need later bytes as proof; a later call returns it.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -165,10 +159,9 @@ class Board(Protocol):
         """Forget the mode, because the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """Record that this process stalled, so the guard may have sent the stop commands.
+        """Record that this process stalled, so the guard may have sent ``last_words``.
 
-        The guard is the process that sends ``last_words`` when this process hangs. The stop
-        commands can also switch off motors that do not drive wheels, such as a brush motor.
+        Stop commands can also switch off other motors, e.g. a brush motor.
         """
         return
 
@@ -178,18 +171,16 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the packets that are due, except commands.
+        """Return the subscriptions, polls and relayed values that are due; no commands.
 
-        The packets are subscriptions, polls and relayed values. The driver calls this method at
-        ``wake_at`` and always writes the packets, so the board can regard them as written.
+        Called at ``wake_at``. The driver always writes these packets.
         """
         return NO_PACKETS
 
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        An OdometryReading or a NoticeReading from this method does not show that the board is
-        alive. Any other reading does.
+        OdometryReadings and NoticeReadings from here do not show that the board is alive.
         """
         return []
 
@@ -208,7 +199,7 @@ class Board(Protocol):
     def actuator(self, proof: StopProof) -> Actuator:
         """Return the actuator, which encodes motion orders. The driver calls this method once.
 
-        When the actuator sends a stop or a motion, it also reports this to ``proof``.
+        The actuator reports each stop and motion to ``proof``.
         """
 
     def wake(self) -> Packets:
@@ -220,8 +211,7 @@ class Board(Protocol):
     def start_requested(self) -> None:
         """Record that the user has requested a start. The driver calls ``start`` next.
 
-        If the driver starts the board by itself, for example after a reconnect, it calls only
-        ``start``.
+        Not called for the driver's own starts, e.g. after a reconnect.
         """
         return
 
@@ -256,12 +246,10 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two sets of packets. The guard sends one of them if this process hangs.
+        """Return the packets that the guard sends if this process hangs.
 
-        The first set is Stop. It is sent if the e-stop is not latched. The second set is the
-        emergency stop and then Stop. It is sent if the e-stop is latched. The right packets can
-        depend on the board's state, so this method is called after each input and before each
-        output.
+        First set: Stop. Second set, for a latched e-stop: emergency stop, then Stop. Called after
+        each input and before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -2,9 +2,8 @@
 
 """All exceptions of the driver, in one class hierarchy.
 
-The driver counts invalid bytes from a board, and does not fail because of them. An exception means
-that the driver or its user asked for something impossible. Each message says what is wrong and what
-to do next.
+An exception means that the driver or its user asked for something impossible. Invalid bytes are
+counted instead.
 """
 
 

@@ -26,9 +26,9 @@ class Notice:
 
 @dataclass(frozen=True, slots=True)
 class Extra:
-    """A measurement that only one kind of board makes. The profile of that board publishes it.
+    """A measurement that only one kind of board makes; its profile publishes it.
 
-    ``stamp_s``: time of measurement, in s of the host's steady clock.
+    * ``stamp_s``: time of measurement, in s of the host's steady clock.
     """
 
     value: object

@@ -2,9 +2,8 @@
 
 """The inbound path: from bytes of the board, or elapsed time, to measurements and events.
 
-``hear`` returns the measurements that must be published at once. ``process`` handles the rest:
-displacements, changes of the mode, answers to requests, and notices. This module knows the board,
-the measurements and the safety stops; it does not know what the bytes mean, or what is commanded.
+This module knows the board, the measurements and the safety stops; it does not know what the bytes
+mean, or what is commanded.
 """
 
 from omnibot_driver.core.board import Board
@@ -45,11 +44,8 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes, and return the estimates to publish at once. Call ``process`` afterwards.
 
-        A motion command that arrives between the two calls is handled as if it had arrived before
-        the bytes. This would be wrong if the bytes change the board's mode. In this case ``hear``
-        calls ``process`` itself, puts the estimates among the events, and returns an empty list.
-        The caller's own call of ``process`` then returns True. A request calls ``process`` before
-        it begins, so a request is handled after the bytes.
+        If the mode changes, ``hear`` calls ``process`` itself, so that no command comes between.
+        The estimates are then events.
         """
         self._liveness.came_at = now
         before = self._board.mode

@@ -2,8 +2,8 @@
 
 """Liveness of the board: when it last sent data, and whether its silence is too long.
 
-This module knows two times and two limits. It does not know what the data means, or how the driver
-reacts to a silence. Time is an argument.
+This module knows times and limits. It does not know what the data means, or how the driver reacts.
+Time is an argument.
 """
 
 import math
@@ -16,7 +16,6 @@ class Liveness:
 
     * ``heard_at``: arrival of the last reading, in s.
     * ``came_at``: arrival of the last bytes, valid or not, in s.
-    * ``unheard_s``, ``silence_s``: limits of a silence; see ``Traits``.
     """
 
     def __init__(self, traits: Traits) -> None:

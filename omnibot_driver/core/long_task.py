@@ -2,9 +2,8 @@
 
 """Long tasks of a board, such as a recording: one at a time.
 
-A task ends when the code that began it reports the end. It fails when its time limit has passed. It
-fails at once if the robot is stopped, the e-stop is latched, or the board is lost. This module
-knows times and sentences; it does not know what a task does.
+A task fails at its time limit, at a stop, and when the board is lost. This module knows times and
+sentences; it does not know what a task does.
 """
 
 import math
@@ -17,7 +16,7 @@ class LongTask:
     """The task in progress, if any.
 
     * ``answers``: answers that the session has not taken yet.
-    * ``wake_at``: time at which ``tick`` must be called, in s; infinity without a task.
+    * ``wake_at``: time of the next ``tick``, in s; infinity without a task.
     """
 
     def __init__(self) -> None:
@@ -33,10 +32,9 @@ class LongTask:
         return self.wake_at < math.inf
 
     def begin(self, name: str, token: object, limit_s: float, now: float) -> None:
-        """Begin a task, which fails if it takes longer than ``limit_s``.
+        """Begin a task that fails after ``limit_s``. Raises RequestRefused during another task.
 
-        ``token`` identifies the task in the answer. ``name`` is the noun in messages such as "a
-        recording is under way". Raises RequestRefused if another task is in progress.
+        ``name``: the noun in messages, e.g. "recording". ``token``: identifies the answer.
         """
         if self.active:
             raise RequestRefused(

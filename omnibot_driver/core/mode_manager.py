@@ -2,11 +2,8 @@
 
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
-A single-letter command (S, P, R) may be lost. P toggles between pause and run. A board that boots
-drops the first bytes that it receives. So each request is a short exchange: the driver sends the
-command, waits for data that shows the result, and repeats the command after a while. At a deadline
-the request fails, with the reason as a sentence. Only one request is in progress at a time. This
-module does not know bytes, and reads no clock.
+The single-letter commands (S, P, R) may be lost, and P toggles. So each request is an exchange with
+a deadline. This module does not know bytes, and reads no clock.
 """
 
 import math
@@ -20,17 +17,20 @@ from omnibot_driver.core.requests import OnExit, Request, RequestDone
 
 START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
-"""Time of uninterrupted data, in s, after which a pause or reset is sent again. A paused board
-sends a notice every second, so data without a notice for this time shows that the command was
-lost."""
+"""Time of uninterrupted data, in s, after which a pause or reset is sent again.
+
+A paused board sends a notice every second.
+"""
 FLOWING_S: Final = 0.1
-"""Largest time, in s, that one pause between two receptions adds to the time of uninterrupted data.
-A running board sends every 10 ms, so its pauses are shorter and are added in full."""
+"""Largest time, in s, that one pause between receptions adds to the time of data.
+
+A running board sends every 10 ms.
+"""
 IN_FLIGHT_S: Final = 0.1
-"""Longest time, in s, that a command, or the notice of a paused board, takes to arrive. If a notice
-arrives sooner than this after a command, the board may have sent the notice before it obeyed the
-command. If data follows a notice within this time, the notice does not show that the board is
-paused."""
+"""Longest time, in s, that a command or a notice of a paused board takes to arrive.
+
+A notice proves nothing if it follows a command, or precedes data, by less.
+"""
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
 ANSWER_WITHIN_S: Final = 4.5
@@ -58,16 +58,16 @@ class Wanted(Enum):
 CLOSED: Final = Phase.CLOSED
 SETTLED: Final = Phase.SETTLED
 PAUSED: Final = Wanted.PAUSED
-"""``CLOSED``, ``SETTLED``, ``PAUSED``: copies of Enum members for the checks at every read. Python
-3.11 looks up a member of an Enum by a slow function call."""
+"""``CLOSED``, ``SETTLED``, ``PAUSED``: copies of Enum members for the checks at every read.
+
+Python 3.11 looks up Enum members slowly.
+"""
 
 
 class ModeManager:
     """The mode that was requested from a board, and the exchange with the board to reach it.
 
-    * ``run``: whether to start the board whenever it is connected. If not, the board keeps its
-      mode.
-    * ``phase``: state of the exchange.
+    * ``run``: start the board whenever it is connected; else keep its mode.
     * ``answers``: answers to requests that the session has not taken yet.
     """
 
@@ -106,7 +106,7 @@ class ModeManager:
     def opened(self, now: float) -> None:
         """Wake the board after its port was opened, and start it if it should run.
 
-        Waking also ends a partial command, in case the board still waits for the rest of it.
+        Waking also ends a partial command.
         """
         self.output = NO_PACKETS
         self._begin(now)
@@ -246,9 +246,8 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether the board may already have obeyed a P, or may soon obey one that is on
-        its way. If so, a new P is sent only after data has flowed for ``PAUSE_RETRY_S``, because P
-        resumes a paused board.
+        ``with_p``: whether a P may be obeyed or on its way. P resumes a paused board, so the next P
+        waits ``PAUSE_RETRY_S``.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

@@ -2,8 +2,8 @@
 
 """Packets: bytes, each with the channel that carries them.
 
-A board has one channel or several: serial lines or UDP ports. Channels are numbered from 0, in the
-order of ``Traits.channels``. On a UDP channel, each packet is one datagram.
+A channel is a serial line or UDP port, numbered as in ``Traits.channels``. Each UDP packet is one
+datagram.
 """
 
 from typing import Final

@@ -17,8 +17,7 @@ Vector3 = tuple[float, float, float]
 class ImuReading:
     """Specific force in m/s² and angular velocity in rad/s, in the sensor's own axes.
 
-    ``lost``: number of ImuReadings that seem to be missing before this one, estimated from the
-    readings received.
+    * ``lost``: estimated number of missing ImuReadings before this one.
     """
 
     specific_force: Vector3
@@ -30,14 +29,11 @@ class ImuReading:
 class DisplacementReading:
     """Motion of the robot in a short time, in m and rad.
 
-    * ``frame``: frame of ``dx_m`` and ``dy_m``: the board's earth frame, or the body's own axes.
-    * ``duration_s``: duration of the motion, in s. None if unknown. The first displacement after a
-      pause has no known duration, because it includes all motion during the pause.
-    * ``lost``: number of displacements that are missing before this one.
-    * ``restarted``: whether the board's counters seem to start again with this displacement. If
-      they do, the board's earth frame starts again too.
-    * ``measured``: False if the values are not a measurement of the motion. A board that cannot
-      measure motion reports the commanded values instead.
+    * ``frame``: the board's earth frame, or the body's own axes.
+    * ``duration_s``: in s; None if unknown, e.g. after a pause.
+    * ``lost``: number of missing displacements before this one.
+    * ``restarted``: whether the board's counters and earth frame seem to start again here.
+    * ``measured``: False if the board only reports the commanded values.
     """
 
     dx_m: float
@@ -58,10 +54,8 @@ NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, me
 class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
-      does not count these losses again.
-    * ``restarted``: whether the counter of the poses starts again with this pose. If it does, the
-      counter of the displacements has started again before.
+    * ``lost``: lost displacements included here; the next displacement does not count them again.
+    * ``restarted``: whether the poses' counter starts again; the displacements' counter did before.
     """
 
     x_m: float
@@ -75,8 +69,7 @@ class PoseReading:
 class PausedReading:
     """The board reports that it is paused (or still initialising).
 
-    ``continues``: whether the board was paused at the previous report too, and has not restarted
-    since.
+    * ``continues``: whether the previous report was the same, without a restart since.
     """
 
     continues: bool = False
@@ -86,9 +79,8 @@ class PausedReading:
 class OdometryReading:
     """The board's own odometry, in a frame that begins where ``Board.reset_odometry`` was called.
 
-    * ``pose``, ``covariance``: in that frame, at ``stamp_s``.
     * ``twist``: in the board's body axes.
-    * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s².
+    * ``twist_variances``: of linear and angular speed, in m²/s² and rad²/s².
     * ``rolled``: sum of all wheel motion, in body axes, since the board object was made.
     * ``rolling``: rate of ``rolled``; None while the board does not report it.
     """
@@ -123,7 +115,7 @@ class ResetReading:
 class NoticeReading:
     """A notice for the user.
 
-    * ``text``: the notice as a sentence; empty if the user already has it.
+    * ``text``: a sentence; empty if the user already has it.
     * ``halt``: whether the robot must be stopped.
     """
 
@@ -155,15 +147,10 @@ Reading = (
 class SampleBoundary:
     """Where a read of the port ended in the stream of IMU samples.
 
-    The clock that stamps the samples needs this position. The last byte of a sample can come late,
-    so the first bytes of a sample show its time better.
-
-    * ``ahead``: number of samples (0 or 1) of which at least a part came after the last ImuReading.
+    * ``ahead``: samples (0 or 1) after the last ImuReading, of which at least a part came.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
-    * ``latest_s``: longest time, in s, from the read until the last sample is complete; 0 if it is
-      complete already.
-    * ``earliest_s``: shortest time, in s, from the read until the next sample can be complete. A
-      sample that is incomplete is this next sample.
+    * ``latest_s``: longest time, in s, until the last sample is complete; 0: already complete.
+    * ``earliest_s``: shortest time, in s, until the next (or incomplete) sample is complete.
     """
 
     ahead: int

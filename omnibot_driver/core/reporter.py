@@ -2,8 +2,7 @@
 
 """The reports of a session: events in order, notices when they are due, state and figures.
 
-The reporter reads every part of a session and changes none of them. It must not know who receives
-the reports.
+The reporter changes no part of a session. It must not know who receives the reports.
 """
 
 import math
@@ -37,9 +36,8 @@ class Reporter:
     * ``events``: events since the last ``take``.
     * ``news_at``: time of the next ``look_for_news``, in s.
     * ``missing``: which lines are missing, as a sentence; empty if none.
-    * ``overruns``: how often a port has lost bytes, counted over all connections.
-    * ``shown``: public state, and whether the e-stop was latched, both at the last ``take``. A
-      state that begins and ends between two calls of ``take`` is never shown.
+    * ``overruns``: how often a port has lost bytes, over all connections.
+    * ``shown``: public state and e-stop latch at the last ``take``.
     """
 
     def __init__(
@@ -125,8 +123,7 @@ class Reporter:
     def set_to_zero(self, *, sideways: bool, planar: bool) -> None:
         """Report which parts of a body velocity were set to zero, each part only once.
 
-        * ``sideways``: whether the velocity had a sideways part that the wheels cannot produce.
-        * ``planar``: False if the velocity also had motion out of the plane.
+        ``planar``: False if there was motion out of the plane.
         """
         if sideways:
             self.notify(self._notices.once(SIDEWAYS))

@@ -2,16 +2,12 @@
 
 """Safety stops: what stops the robot at once, whatever the source of its commands.
 
-The robot is stopped in these cases:
-
 * The e-stop is latched.
 * The board restarts, is paused, falls silent, or reports that the robot must be stopped.
 * This process was stalled.
 
-This module also passes what the board reports to the parts that handle commands and requests. It
-does not know bytes, or who commands the robot. Two other stops are elsewhere: the command policy
-stops the robot when a command expires, and the motion monitor stops a robot that does not move as
-commanded.
+The command policy and the motion monitor have their own stops. This module does not know bytes, or
+who commands the robot.
 """
 
 from typing import Final
@@ -99,8 +95,8 @@ class SafetyStops:
     def estop(self, active: bool, now: float, *, by: str) -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a
-        release while the e-stop button on the robot is held.
+        ``by``: named in the notice. Raises RequestRefused for a release while the robot's button is
+        held.
         """
         latched = self._policy.latched
         if active:

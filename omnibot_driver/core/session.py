@@ -2,18 +2,10 @@
 
 """A session with one board: it takes bytes and commands, and gives measurements and packets.
 
-The caller calls an input method. Then it passes the result of ``take_output`` to the port, and the
-result of ``take_events`` to its own caller. It calls ``tick`` at ``wake_at``. A session is not
-thread-safe, reads no clock and does not log: everything that a user should know is an event.
+After each input, write ``take_output`` to the port and handle ``take_events``. Call ``tick`` at
+``wake_at``. A session is not thread-safe, reads no clock and does not log.
 
-This module connects the parts of a session, and holds no state of its own. It does not know bytes
-or threads. The parts are:
-
-* ``inbound`` handles what the board sends.
-* ``safety`` stops the robot.
-* ``interlocks`` refuses commands.
-* ``reporter`` collects the events.
-* ``shutdown`` ends the connection.
+This module connects the parts of a session. It does not know bytes or threads.
 """
 
 import math
@@ -47,11 +39,9 @@ class Session:
     """The driver's core for one board, across all its connections.
 
     * ``run``: whether to start the board whenever it is connected.
-    * ``axis_signs``: factors for x, y and yaw of commands and odometry: -1 if the board's body axis
-      is opposite to REP-103's, else 1.
-    * ``control``: position of the board's control switch, which the board does not report. None for
-      a board without this switch.
-    * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
+    * ``axis_signs``: for x, y, yaw: -1 if the board's axis is opposite to REP-103's.
+    * ``control``: position of the board's control switch; None without this switch.
+    * ``obeys``: False for a recording, which cannot follow commands.
     """
 
     def __init__(
@@ -135,10 +125,9 @@ class Session:
     # Inputs from the link and from the clock
 
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
-        """Apply new settings to later commands and frames.
+        """Apply new settings to later commands and frames. A stricter limit stops the robot.
 
-        If a limit becomes stricter, the robot is stopped. ``board``: new settings of the board
-        itself. The current command is encoded again with them.
+        ``board``: new settings of the board itself; the current command is encoded again.
         """
         self._reporter.notify(self._commanding.configure(settings, now))
         if board is not None:
@@ -149,9 +138,8 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin a connection, because the port is open now.
 
-        ``missing``: which lines of the board are not open, as a sentence; empty if all are open.
-        While a line is missing, the robot is stopped and not driven, because the board would
-        receive only a part of its commands.
+        ``missing``: which lines are not open, as a sentence; empty if none. While a line is
+        missing, the robot is not driven.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -196,12 +184,9 @@ class Session:
     def command_twist(
         self, twist: BodyTwist, now: float, *, age_s: float = 0.0, planar: bool = True
     ) -> None:
-        """Command a body velocity.
+        """Command a body velocity. After CommandRefused, the earlier command stays in effect.
 
-        If this method raises CommandRefused, the earlier command stays in effect.
-
-        * ``age_s``: age of the command in s, from its sender's stamp; negative for a stamp in the
-          future.
+        * ``age_s``: age of the sender's stamp in s; negative: in the future.
         * ``planar``: False if the sender also asked for motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
@@ -249,8 +234,7 @@ class Session:
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
         """Begin a task that takes the board a long time. A RequestDone answers within ``limit_s``.
 
-        ``name`` is the noun in messages such as "a recording is under way". Raises RequestRefused
-        at once if the task cannot begin.
+        ``name``: noun in messages, e.g. "recording". Raises RequestRefused.
         """
         if reason := self.interlocks.why_not_task():
             raise RequestRefused(reason)
@@ -267,8 +251,8 @@ class Session:
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: who asked for the change, as named in the notice. Raises RequestRefused for a
-        release while the e-stop button on the robot is held.
+        ``by``: named in the notice. Raises RequestRefused for a release while the robot's button is
+        held.
         """
         return self._safety.estop(active, now, by=by)
 

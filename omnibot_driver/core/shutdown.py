@@ -16,8 +16,8 @@ from omnibot_driver.core.requests import OnExit
 class Shutdown:
     """The steps of a shutdown, in the order of their calls.
 
-    * Call ``begin``, then wait until ``stands`` is True.
-    * Call ``fall_silent``. If it returns True, wait until ``stands`` is True once more.
+    * Call ``begin``; wait until ``stands``.
+    * Call ``fall_silent``; if True, wait until ``stands`` again.
     * Write the packets of ``sequence``.
     """
 
@@ -51,8 +51,7 @@ class Shutdown:
     def fall_silent(self, now: float) -> bool:
         """End the repetition of Stop, and demand a new proof that the robot stands still.
 
-        The line may have damaged the last Stop, and the board may obey it as another command. The
-        new proof shows that this did not happen. If such a proof is not possible now, return False
+        The last Stop may arrive damaged, as another command. Without a possible proof, return False
         and change nothing.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:

@@ -15,29 +15,22 @@ class Traits:
     """The capabilities of a board, constant while the driver runs.
 
     * ``channels``: names of the lines to the board; a single line needs no name.
-    * ``imu_period_s``: time between two ImuReadings, in s. The board sends one in each tick of its
-      clock. None for a board without an IMU, whose readings are stamped on arrival.
+    * ``imu_period_s``: time between two ImuReadings, one per tick, in s; None without an IMU.
     * ``authorities``: the topics that may command motion.
-    * ``requests``: the requests that the board supports.
-    * ``wheels``: names of the wheels that ``wheel_cmd`` turns, in the order of its values.
+    * ``wheels``: names of the wheels, in the order of ``wheel_cmd``.
     * ``unheard_s``: time without data, in s, after which the robot is stopped.
-    * ``silence_s``: time without data, in s, after which the mode of the board is unknown.
-    * ``own_odometry``: whether OdometryReadings give the robot's pose. If they do, displacements
-      only show whether the robot obeys. If not, the driver integrates the displacements.
-    * ``stands_after_s``: time without motion in the displacements, in s, that proves a
-      standstill.
-    * ``unproved_s``: longest time, in s, for which Stop is repeated while the standstill is not
-      shown.
+    * ``silence_s``: time without data, in s, after which the mode is unknown.
+    * ``own_odometry``: whether OdometryReadings give the pose; else the driver integrates
+      displacements.
+    * ``stands_after_s``: time without motion, in s, that proves a standstill.
+    * ``unproved_s``: longest repetition of Stop without such a proof, in s.
     * ``baudrate``: whether the line has a baud rate to set.
-    * ``calibrates_gyro``: whether the board subtracts the gyro's bias itself. If it does, the
-      board's profile offers ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest time, in s, until a board that acknowledges stops obeys one. 0 for
-      a board that does not acknowledge stops.
-    * ``slack_mps``, ``slack_radps``: additional tolerance of the motion monitor for the difference
-      between measured and commanded velocity, in m/s and rad/s. A board needs it if its
-      displacements are coarse, or if its wheels lag while they speed up.
-    * ``advice``: for each fault of the robot's motion, what to check. This text names the
-      parameters of this board, and replaces the general advice.
+    * ``calibrates_gyro``: the board subtracts the gyro's bias; its profile offers
+      ``~/calibrate_gyro``.
+    * ``stops_within_s``: longest delay of an acknowledged stop, in s; 0: never acknowledged.
+    * ``slack_mps``, ``slack_radps``: extra tolerance of the motion monitor, in m/s and rad/s, for
+      coarse displacements or lagging wheels.
+    * ``advice``: what to check at each motion fault; replaces the general advice.
     """
 
     channels: tuple[str, ...] = ("",)

@@ -2,10 +2,9 @@
 
 """The interface between the command policy and a board's encoding of motion.
 
-The policy decides what the robot should do, and for how long. An actuator makes the packets that
-carry out this decision. Some actuators repeat set-points (`set_point_stream.py`). Other actuators
-run an exchange that only their board has. When an actuator sends a stop or a motion, it also
-reports this to the stop proof. An actuator reads no clock, and never refuses the policy's orders.
+The policy decides what the robot should do; an actuator makes the packets. Some actuators repeat
+set-points (`set_point_stream.py`). An actuator reads no clock, and never refuses the policy's
+orders.
 """
 
 from typing import Protocol

@@ -2,8 +2,8 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method returns the reason why the action is not possible, as a sentence with a remedy, or an
-empty string if it is possible. This module knows modes and phases.
+Each method returns why not, as a sentence with a remedy; empty if possible. This module knows modes
+and phases.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -18,8 +18,8 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    * ``leaving``: whether the driver is shutting down. If it is, everything is refused.
-    * ``missing``: which of the board's lines are not open, as a sentence; empty if all are open.
+    * ``leaving``: the driver is shutting down, so everything is refused.
+    * ``missing``: which lines are not open, as a sentence; empty if none.
     """
 
     def __init__(
@@ -41,16 +41,16 @@ class Interlocks:
         return "the driver is shutting down" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, which shows that its sender is still active.
+        """Record that a motion command was refused: its sender is still active.
 
-        Call this for every refusal, by this module or by an earlier check.
+        Call this for every refusal, also by an earlier check.
         """
         self._interlock.be_active(now)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.
 
-        Call it once per command, because the motion interlock records each call as a command.
+        Call once per command: the motion interlock counts the calls.
         """
         if self.leaving or self.missing:
             return self.why_not_request()

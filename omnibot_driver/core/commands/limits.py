@@ -18,10 +18,8 @@ class SpeedLimits:
     """The largest speeds and accelerations that are commanded.
 
     * ``linear_mps``: length of the linear velocity, in m/s.
-    * ``angular_radps``: yaw rate, in rad/s.
     * ``wheel_radps``: rate of the fastest wheel, in rad/s.
-    * ``linear_mps2``, ``angular_radps2``: rate of change of a body velocity, in m/s² and rad/s²; 0:
-      unlimited.
+    * ``linear_mps2``, ``angular_radps2``: in m/s² and rad/s²; 0: unlimited.
     """
 
     linear_mps: float = 0.5
@@ -53,10 +51,9 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
-        """Return the twist that is reached in ``duration_s`` with limited acceleration.
+        """Return the twist reached from ``now`` in ``duration_s`` with limited acceleration.
 
-        ``now`` is the twist at the beginning. The linear velocity changes along a straight line
-        towards that of ``wanted``. The yaw rate changes independently.
+        The linear velocity changes along a straight line; the yaw rate independently.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),
@@ -88,7 +85,7 @@ def require_finite(what: str, values: Sequence[float]) -> None:
 def require_timely(what: str, age_s: float, longest_s: float) -> None:
     """Raise CommandRefused if ``age_s``, the age of the sender's stamp, exceeds ``longest_s``.
 
-    For a stamp in the future ``age_s`` is negative. Its absolute value has the same limit.
+    A negative age (a stamp in the future) has the same limit.
     """
     if abs(age_s) <= longest_s:
         return

@@ -2,8 +2,8 @@
 
 """The motion interlock: refuses motion after the motion monitor has stopped the robot.
 
-This module knows when commands arrive and when the monitor stopped the robot. It does not know the
-reason for a stop, nor what is commanded. Time is an argument.
+This module knows when commands and stops happened. It does not know the reason for a stop, nor what
+is commanded. Time is an argument.
 """
 
 import math
@@ -30,7 +30,6 @@ class MotionInterlock:
     """Whether motion is refused after a stop by the motion monitor, and until when.
 
     * ``until``: what ends the refusal.
-    * ``trips``: how often ``trip`` was called.
     * ``starts``: whether the board supports ~/start.
     """
 
@@ -57,19 +56,17 @@ class MotionInterlock:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Record that a sender of commands is active.
+        """Record that a sender of commands is active: only a pause ends a refusal.
 
-        A refusal ends after a pause without commands. The pause is measured from now on. Call this
-        when a command is refused for any reason. Call it also after a stall of this process,
-        because a sender may have been active during the stall.
+        Call this when a command is refused, and after a stall of this process.
         """
         self._commanded_at = now
 
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        ``stands``: whether the command is to stand still, which is always allowed. A pause of
-        ``timeout_s`` since the last motion command or call of ``be_active`` ends the refusal.
+        ``stands``: a command to stand still, always allowed. A pause of ``timeout_s`` ends the
+        refusal.
         """
         silent = now - self._commanded_at >= timeout_s
         if not stands:

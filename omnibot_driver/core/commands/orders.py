@@ -2,7 +2,7 @@
 
 """Motion orders to a board, in SI units and the board's own axes: values without behaviour.
 
-An order has passed every check and limit. The actuator of a board encodes it.
+An order has passed every check and limit.
 """
 
 from typing import Final

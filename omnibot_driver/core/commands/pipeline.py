@@ -2,8 +2,8 @@
 
 """The command pipeline: from a motion command to its set-point, expiry and supervision.
 
-This module connects shaping, policy, the actuator and the motion monitor with its interlock. It
-does not know modes or requests: ``interlocks.py`` decides whether a robot may be driven now.
+This module connects the parts. It does not know modes or requests: ``interlocks.py`` decides
+whether a robot may be driven now.
 """
 
 import math
@@ -40,10 +40,9 @@ class CommandPipeline:
     """The path of motion commands in one session.
 
     * ``policy``: the command in effect, its expiry and the e-stop latch.
-    * ``shaper``: checks and limits commands.
     * ``interlock``: refuses motion after the motion monitor has stopped the robot.
     * ``monitored``: whether the motion monitor is enabled.
-    * ``obeys``: whether the robot can be expected to follow commands; False for a recording.
+    * ``obeys``: False for a recording, which cannot follow commands.
     """
 
     def __init__(
@@ -81,7 +80,7 @@ class CommandPipeline:
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
         """Apply new settings to later commands and frames; return notices for the user.
 
-        A motion in progress ends if a limit or the timeout has become stricter.
+        A stricter limit or timeout ends a motion in progress.
         """
         if settings.motion_monitor is not self.monitored:
             self.monitored = settings.motion_monitor
@@ -102,7 +101,7 @@ class CommandPipeline:
     def check_anew(self, now: float) -> list[str]:
         """Encode the current command with the board's new settings; return notices for the user.
 
-        The robot is stopped if the command cannot be encoded with these settings.
+        If that is impossible, the robot is stopped.
         """
         if self.policy.current is None:
             return []
@@ -140,7 +139,7 @@ class CommandPipeline:
     def twist(self, twist: BodyTwist, now: float, *, age_s: float) -> Command:
         """Return the command for a body velocity. Raises CommandRefused if it is not allowed.
 
-        ``age_s``: age of the command in s, from its sender's stamp. It shortens the time to expiry.
+        ``age_s``: age of the sender's stamp in s; shortens the time to expiry.
         """
         timeout_s = self.policy.settings.timeout_s
         expires_at = now + timeout_s
@@ -187,8 +186,7 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion is ``rolling`` of the newest odometry estimate, or ``reading`` if that is
-        unknown.
+        The motion is the newest estimate's ``rolling``; if unknown, ``reading``.
         """
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
@@ -238,8 +236,7 @@ class CommandPipeline:
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 
-        A goal becomes invalid when the origin of the odometry frame moves, because of a reset of
-        the odometry or a restart of the board. The notices are for the user.
+        A goal becomes invalid when the origin of the odometry frame moves.
         """
         goal = self.policy.current
         if not isinstance(goal, GoalSetpoint):

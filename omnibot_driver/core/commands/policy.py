@@ -2,10 +2,9 @@
 
 """The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-One topic commands the robot at a time. A board does not stop without a command. So when a motion
-command expires, the policy repeats Stop until displacements show that the robot stands still. The
-policy also holds the latch of the e-stop. This module knows commands and times; it does not know
-how Stop is encoded, and reads no clock.
+A board does not stop by itself: after the expiry, Stop is repeated until displacements show a
+standstill. This module knows commands and times; it does not know how Stop is encoded, and reads no
+clock.
 """
 
 import math
@@ -41,8 +40,7 @@ class CommandSettings:
 class CommandPolicy:
     """The command in effect: what the robot should do now.
 
-    ``proof``: the proof that the robot stands still. It follows from displacements, and from what
-    the actuator has sent.
+    * ``proof``: the proof that the robot stands still.
     """
 
     def __init__(
@@ -101,7 +99,7 @@ class CommandPolicy:
     def halt(self, now: float) -> None:
         """Drop the current command, and repeat Stop until the robot is shown to stand still.
 
-        While the e-stop is latched, the emergency stop is repeated instead.
+        With a latched e-stop, the emergency stop is repeated.
         """
         self.current = None
         self.quiet = False

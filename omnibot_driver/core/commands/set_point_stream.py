@@ -2,8 +2,8 @@
 
 """An actuator for boards that follow set-points: it decides which frame is sent when.
 
-These boards do not acknowledge frames, so each frame is repeated. This module knows orders and
-times; it does not know what is in a frame, and reads no clock.
+These boards do not acknowledge frames, so frames are repeated. This module knows orders and times;
+it does not know what is in a frame, and reads no clock.
 """
 
 import math
@@ -22,8 +22,7 @@ PACE_S: Final = 0.01
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
 
-With a shorter pause, set-points damaged by lost bytes would be in force for a larger share of the
-time (docs/internals/integrity.md).
+Shorter: set-points damaged by lost bytes act longer (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
@@ -48,9 +47,8 @@ class Encoder(Protocol):
 class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
-    * ``proof``: receives a report of each stop and each motion that the stream sends.
-    * ``heard``: function to call after each write, with the packets and the time. It is also called
-      for the packets of requests. None if no function needs them.
+    * ``proof``: receives a report of each stop and motion sent.
+    * ``heard``: called with each written packets and the time, also for requests.
     """
 
     def __init__(
@@ -98,9 +96,8 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        Packets that begin with Stop on every channel count as a Stop. Other packets can do harm: if
-        the last motion frame lost bytes, the board can complete the frame with the first bytes of
-        these packets. So after other packets, the stream repeats the set-point at once.
+        Their first bytes can complete a damaged motion frame. So the set-point is repeated at once,
+        except after a Stop on every channel.
         """
         if self._heard is not None:
             self._heard(packets, now)

@@ -2,9 +2,8 @@
 
 """Set-points: motion commands that return the order to send at each time.
 
-The actuator asks a ``Setpoint`` for its order whenever a frame is sent, so a set-point under an
-acceleration limit needs no timer of its own. Other modules decide whether a set-point may be
-commanded, and when a frame is sent.
+The order is computed when a frame is sent, so acceleration limits need no timer. Other modules
+decide when that is, and whether a set-point is allowed.
 """
 
 import math
@@ -23,9 +22,10 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: distances in m and rad that show that the robot leaves its goal.
-If the robot is this much farther from the goal than before, it drives away from the goal. No
-controller overshoots that far."""
+"""``LEAVING_M``, ``LEAVING_RAD``: added distance to the goal, in m and rad, of a leaving robot.
+
+No controller overshoots that far.
+"""
 
 
 class Authority(Enum):
@@ -65,10 +65,8 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * ``is_zero``: the argument is the method ``Actuator.is_zero``, which may raise CommandRefused.
-      The attribute is the result of this method for the commanded velocity.
-    * ``before``: the previous set-point. If it is a BaseSetpoint, a ramp starts at its velocity,
-      otherwise at rest.
+    * ``is_zero``: argument: ``Actuator.is_zero``, may raise CommandRefused; attribute: its result.
+    * ``before``: the previous set-point; a ramp starts at its velocity, else at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 
@@ -117,8 +115,7 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    ``is_zero``: the argument is the method ``Actuator.is_zero``, which may raise CommandRefused.
-    The attribute is the result of this method for the order.
+    * ``is_zero``: argument: ``Actuator.is_zero``, may raise CommandRefused; attribute: its result.
     """
 
     settled: Final = True
@@ -145,9 +142,8 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: value of ``Odometry.alignments`` at the time of the command. It identifies the
-      relation between the two frames.
-    * ``check``: an actuator's method that raises CommandRefused if the order cannot be encoded.
+    * ``alignment``: ``Odometry.alignments`` at the command; identifies the relation of both frames.
+    * ``check``: raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """
 

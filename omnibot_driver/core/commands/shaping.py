@@ -2,8 +2,8 @@
 
 """Command shaping: turns a caller's command into a set-point in the board's axes and frame.
 
-Commands are checked and limited here. This module knows the limits and the position of the board's
-control switch; it does not know when anything is sent.
+Commands are checked and limited here. This module knows the limits and the control switch; it does
+not know when anything is sent.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ class CommandShaper:
     """The checks and limits of motion commands. Every method may raise CommandRefused.
 
     * ``limits``, ``kinematics``: may be replaced at any time.
-    * ``control``: position of the board's control switch. None for a board without this switch.
+    * ``control``: position of the board's control switch; None without this switch.
     """
 
     def __init__(

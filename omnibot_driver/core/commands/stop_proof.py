@@ -2,9 +2,8 @@
 
 """The stop proof: whether displacements show that the robot stands still after the last Stop.
 
-Displacements are the evidence, because boards do not acknowledge a stop. This module knows
-displacements, and when Stop and motion were sent. It does not know what happens while the proof is
-missing. Time is an argument.
+Boards do not acknowledge a stop. This module knows displacements and sent orders. It does not know
+what happens without proof. Time is an argument.
 """
 
 import math
@@ -14,16 +13,19 @@ from omnibot_driver.core.readings import DisplacementReading
 
 STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
-"""``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill. Two
-encoder counts of a wheel in 40 ms are below these speeds. The slowest linear command (0.014 m/s) is
-above them."""
+"""``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill.
+
+Above two encoder counts in 40 ms; below the slowest command (0.014 m/s).
+"""
 STILL_S: Final = 0.1
 """Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
 SLACK_S: Final = 1e-6
 """Tolerance for rounding, in s: in floating point, a sum of ten times 0.1 s is less than 1 s."""
 AT_LEAST: Final = 2
-"""Smallest number of displacements in a proof, even if one lasts long enough: a single displacement
-may be damaged, or may describe the time before the wheels began to turn."""
+"""Smallest number of displacements in a proof.
+
+One could be damaged, or describe the time before the wheels turned.
+"""
 PROOFS: Final = 2.0
 """Shortest wait for a proof, as a multiple of the standstill that the proof needs."""
 RAREST_S: Final = 1.0
@@ -39,10 +41,9 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether Stop was sent, no motion was sent since, and the robot has stood still for
-      ``still_s``.
-    * ``owed``: whether motion was sent, and nothing has proved a standstill since then.
-    * ``measured``: whether a measured displacement has arrived since Stop was sent.
+    * ``proved``: since Stop, no motion was sent and the robot stood for ``still_s``.
+    * ``owed``: motion was sent, and no standstill is proved since.
+    * ``measured``: a measured displacement has arrived since Stop.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

@@ -2,8 +2,7 @@
 
 """Kinematics of a body with two driven wheels on one axle.
 
-The body turns about a point on the line of the axle, its instantaneous centre of rotation. The
-origin of the body's frame is the middle of the axle.
+The origin of the body's frame is the middle of the axle.
 """
 
 from collections.abc import Sequence

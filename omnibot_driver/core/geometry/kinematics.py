@@ -2,9 +2,8 @@
 
 """The interface that every arrangement of wheels offers to the driver.
 
-Axes are REP-103's: x forward, y left, yaw counter-clockwise. Rates are those of the driven wheels,
-in rad/s, in the order of ``joints``. The equations also convert small displacements into wheel
-angles and back. Time, noise and bytes do not appear here.
+Axes are REP-103's: x forward, y left, yaw counter-clockwise. Rates are in rad/s, in the order of
+``joints``. Small displacements convert in the same way.
 """
 
 from collections.abc import Sequence

@@ -2,8 +2,8 @@
 
 """Kinematics of a body on three omni wheels.
 
-Source: the velocity equations and the odometry matrix of the manual's "Control equation" and
-"Odometry equation", without the gains by which the firmware multiplies commands.
+Source: the manual's "Control equation" and "Odometry equation", without the firmware's command
+gains.
 """
 
 import math

@@ -2,9 +2,7 @@
 
 """Kinematics of a body with two driven wheels on one axle and a steered wheel ahead of it.
 
-All three wheels roll about one instantaneous centre of rotation. It is the point where the line of
-the driven axle meets the line of the steered wheel's axle. The frame of the body has its origin in
-the middle of the driven axle.
+The origin of the body's frame is the middle of the driven axle.
 """
 
 import math
@@ -47,7 +45,7 @@ class SteeredKinematics:
     def steering_rad(self, twist: BodyTwist) -> float:
         """Return the steered wheel's angle in rad, from -pi/2 to pi/2; 0 at rest.
 
-        Positive is to the left. For a turn on the spot to the left the angle is pi/2.
+        Positive: to the left, e.g. pi/2 on the spot.
         """
         speed, sideways = twist.vx_mps, self.wheelbase_m * twist.yaw_rate_radps
         if speed < 0.0:

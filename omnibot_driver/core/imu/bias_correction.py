@@ -15,8 +15,8 @@ from omnibot_driver.core.values import value
 class ImuCorrection:
     """Biases of the IMU's readings, which the driver subtracts.
 
-    * ``gyro_bias``: bias of the gyro, in rad/s.
-    * ``accel_bias``: bias of the accelerometer, in m/s².
+    * ``gyro_bias``: in rad/s.
+    * ``accel_bias``: in m/s².
     * ``auto_gyro_bias``: whether to refine the gyro's bias while the robot is at rest.
     """
 

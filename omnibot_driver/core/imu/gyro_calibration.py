@@ -2,16 +2,8 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-A gyro at rest measures only its bias and noise. The robot is taken to be at rest if three
-conditions hold:
-
-* The displacements of the wheels add up to almost zero.
-* The readings of the gyro hardly vary.
-* The readings of the accelerometer hardly vary.
-
-If the wheels do not report displacements, a steady turn meets these conditions. So the gyro's mean
-reading must also not exceed the largest bias that the sensor's specification allows. The
-measurement yields the magnitude of gravity as well.
+At rest, displacements are almost zero and readings hardly vary. Without displacements, a steady
+turn looks the same, so the bias is limited.
 
 This module knows readings and times; it does not read a clock, and does not know when to measure.
 """
@@ -35,10 +27,10 @@ A service call may take five seconds. The remaining second is for writing a file
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
-"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations of the gyro and the accelerometer
-that are accepted as rest: ten times their noise.
+"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations accepted as rest.
 
-If the robot is touched, the deviations are larger."""
+They are ten times the noise; a touched robot exceeds them.
+"""
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
 """``STILL_M``, ``STILL_RAD``: largest displacement, in m and rad, that is accepted as rest: resting
@@ -54,7 +46,7 @@ corrected in 14 s."""
 class Look:
     """One observation of the robot: readings of the IMU, and displacements of the same time.
 
-    ``began_s``, ``last_s``: stamps of the first and the last reading, in s; NaN before the first.
+    * ``began_s``, ``last_s``: first and last stamp, in s; NaN before the first.
     """
 
     def __init__(self) -> None:
@@ -112,9 +104,8 @@ class GyroCalibration:
     """Measures and refines the gyro's bias.
 
     * ``bias``: mean reading of the gyro at rest, in rad/s.
-    * ``refine``: whether each ``BLOCK_S`` at rest corrects the bias a little. Only blocks in which
-      the wheels have reported displacements are used.
-    * ``answers``: one RequestDone for each measurement that has succeeded or failed.
+    * ``refine``: correct the bias after each ``BLOCK_S`` at rest, if displacements came.
+    * ``answers``: one RequestDone per finished measurement.
     """
 
     def __init__(self, bias: Vector3, *, refine: bool) -> None:

@@ -2,7 +2,7 @@
 
 """Conversion of an MPU6050's counts into SI units, in the sensor's axes, and a check with gravity.
 
-Source: MPU-6050 product specification, sections 6.1 and 6.2 (sensitivity scale factors).
+Source: MPU-6050 product specification, 6.1 and 6.2.
 """
 
 import math

@@ -2,19 +2,10 @@
 
 """The outlier filter: it rejects physically impossible readings that arrive in valid frames.
 
-Two kinds of readings are impossible: a displacement faster than the robot can move, and a spike. A
-spike is a single reading that leaps away from all earlier readings, while the next reading leaps
-back. A leap that lasts, or that is followed by more leaps, is a real shock. So a reading that leaps
-waits for the next reading of its kind, which shows whether to release or to reject it. Poses that
-arrive after a waiting displacement wait as well.
+Impossible are a too fast displacement and a spike: one reading leaps, the next leaps back. So a
+leaping reading waits for the next one. docs/internals/architecture.md gives all rules.
 
-A knock on the robot can cause a spike in one axis of the accelerometer. Such a reading is real. A
-flipped bit causes a spike too. Its size is the full scale, a half of it, a quarter, and so on. So a
-spike in one axis of the accelerometer is rejected only if it has one of these sizes.
-
-A reading of a board's own odometry is rejected only if it contains NaN or infinity. A rejected
-displacement is treated like a displacement that was lost on the line. This module knows readings
-and the robot's limits; it does not know bytes or a clock.
+This module knows readings and the robot's limits; it does not know bytes or a clock.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,11 +33,9 @@ CALMING: Final = 0.95
 """Factor by which the stored largest recent step shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Fraction of a leap of the IMU's values. The leap is a spike only if two conditions hold:
+"""Largest fraction of an IMU leap that remains in the reading after a spike.
 
-* If only accelerations leap, a single one leaps, and all other values change by at most this
-  fraction of the leap.
-* In the next reading, at most this fraction of the leap remains.
+If one acceleration leaps alone, the other values also change by at most this fraction.
 """
 END_OF_SCALE: Final = 0.99996
 """Smallest fraction of the full scale that is regarded as the end of the scale. The largest
@@ -62,10 +51,8 @@ this fraction of the leap remains."""
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    * ``force_step_mps2``: change of the specific force between two readings. Changes up to this
-      size are never regarded as spikes.
-    * ``full_scale_mps2``: full scale of the accelerometer; infinite if its readings are not
-      integers.
+    * ``force_step_mps2``: largest change between two readings that is never a spike.
+    * ``full_scale_mps2``: of the accelerometer; infinite if its readings are not integers.
     """
 
     fastest_mps: float = 2.0
@@ -90,8 +77,7 @@ class OutlierFilter:
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: whether displacements are steps of the board's own estimate, which leaps when
-      the board corrects it. If so, an impossible step is not rejected, but passed on with
+    * ``corrected``: the board corrects its own estimate, so impossible steps are passed on with
       ``measured`` False.
     """
 
@@ -204,7 +190,7 @@ class OutlierFilter:
     def _told_of_losses(self, reading: Reading) -> Reading:
         """Return the reading. If it is a pose, its ``lost`` includes the rejected displacements.
 
-        Only their number is added, because the pose already includes their motion.
+        The pose already includes their motion.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -227,11 +213,10 @@ class OutlierFilter:
 class _Spikes:
     """Finds spikes in a series of readings, each of which is a list of values.
 
-    The caller has divided each value by the change that is always allowed.
+    The caller divides each value by the change that is always allowed.
 
-    * ``left``: a leap was a spike only if at most this fraction of it remains in the next reading.
-    * ``knocked``: number of values, at the start of the list, that a knock on the robot may change
-      for a single reading.
+    * ``left``: largest fraction of a spike that remains in the next reading.
+    * ``knocked``: number of first values that a knock may change in a single reading.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -250,8 +235,8 @@ class _Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the previous values were a spike, and whether these values leap.
 
-        * ``periods``: number of periods since the previous values.
-        * ``topmost_bit``: size of the highest bit, for the values that a knock may change.
+        ``periods``: since the previous values. ``topmost_bit``: size of the highest bit of the
+        knocked values.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False
@@ -283,8 +268,8 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether a flipped bit can explain the step, within the recent variation.
 
-        ``value``: magnitude after the step. At the end of the scale the result is False, because a
-        knock on the robot can also cause such a value.
+        ``value``: magnitude after the step. At the end of the scale, a knock explains the step too:
+        False.
         """
         if topmost == inf:  # the readings are not integers
             return False

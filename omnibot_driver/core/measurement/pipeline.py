@@ -2,9 +2,8 @@
 
 """The measurement pipeline: readings are stamped, checked, integrated, corrected and counted.
 
-``hear`` processes IMU readings at once. Other readings wait for ``flush``, so that they do not
-delay the IMU readings. This module knows the board's clock, the outlier filter, the odometry and
-the IMU; it does not know commands or modes.
+Only IMU readings are processed at once, by ``hear``; ``flush`` processes the rest. This module does
+not know commands or modes.
 """
 
 from collections.abc import Sequence
@@ -87,11 +86,10 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that these readings complete. ``now`` is their time of arrival.
+        """Return the IMU estimates that these readings complete. ``now``: their time of arrival.
 
-        Other readings wait for ``flush``. IMU readings that come after them wait too, to keep the
-        order. Most reads of a board with an IMU bring one IMU reading and nothing else. Such a
-        reading is processed without lists, which is faster.
+        Other readings, and IMU readings after them, wait for ``flush``. One IMU reading alone takes
+        a fast path.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

@@ -21,11 +21,10 @@ from omnibot_driver.core.readings import (
 class StreamStatistics:
     """Counts and sums since the driver began.
 
-    All values except ``last_gap``, ``same_force`` and ``same_rate`` only grow.
+    Only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
 
-    ``imu_period_s``: period of the IMU readings, in s, if one clock of the board paces IMU readings
-    and displacements. Otherwise None. With this period, the displacements show how many IMU
-    readings were lost.
+    * ``imu_period_s``: in s, if displacements share the IMU's clock and show lost IMU readings;
+      else None.
     """
 
     imu_period_s: float | None = None

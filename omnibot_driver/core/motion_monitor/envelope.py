@@ -2,9 +2,8 @@
 
 """The envelope: the velocities that a robot may have under its recent set-points.
 
-A robot follows its set-points late and smoothly. So its velocity is inside the convex hull of its
-recent set-points and rest. Rest is included because motion that is slower than commanded is not a
-fault. A margin around the hull allows for inexact scales, unequal wheels and noise.
+It is the convex hull of recent set-points and rest, with a margin. docs/internals/motion_monitor.md
+gives the reasons.
 
 This module knows velocities in the board's own axes; it does not know times.
 """
@@ -17,39 +16,37 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 
 STRETCH: Final = 1.2
-"""Largest allowed ratio of speed to set-point. It is above 1 because the scales of commands, which
-users measure by hand, are not exact, and because controllers overshoot."""
+"""Largest allowed ratio of speed to set-point.
+
+Users measure the scales by hand, and controllers overshoot.
+"""
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
-"""``NOISE_MPS``, ``NOISE_RADPS``: speed in m/s and yaw rate in rad/s outside the hull that are
-always allowed.
+"""``NOISE_MPS``, ``NOISE_RADPS``: speeds outside the hull that are always allowed.
 
-Their causes are the resolution of the encoders, rounding, and slopes on which a slow controller
-lets the robot roll.
+Causes: encoder resolution, rounding, and slopes with a slow controller.
 """
 SIDEWAYS: Final = 0.1
-"""Deviation that is allowed in any direction, as a fraction of the commanded speed or yaw rate.
+"""Deviation allowed in any direction, as a fraction of the commanded speed or yaw rate.
 
-Its causes are an uncertain heading and unequal wheels. This deviation and the noise are
-independent, so their squares are added.
+It is independent of the noise, so the squares are added.
 """
 OVERSHOOT: Final = 0.15
-"""Overshoot that is allowed in any direction, as a fraction of the change of the set-point.
+"""Overshoot allowed in any direction, as a fraction of the change of the set-point.
 
-Overshoot is allowed only if the earlier set-point was not rest.
+Not allowed after rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""``SKEW_RADPS_PER_MPS``: yaw rate in rad/s that is allowed for each m/s of commanded speed.
+"""``SKEW_RADPS_PER_MPS``, ``SKEW_MPS_PER_RADPS``: allowed turn per speed, speed per turn.
 
-``SKEW_MPS_PER_RADPS``: speed in m/s that is allowed for each rad/s of commanded yaw rate.
-
-Wheels differ by some per cent. So a robot that drives also turns a little, and a robot that turns
-also drives a little.
+Wheels differ by some per cent.
 """
 CHANGING_RADPS_PER_MPS: Final = 0.4
-"""Yaw rate in rad/s that is allowed for each m/s by which the set-point changes. The wheels
-accelerate differently, so the robot turns a little during the change."""
+"""Yaw rate in rad/s that is allowed for each m/s by which the set-point changes.
+
+The wheels accelerate differently.
+"""
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 """Factor that converts a yaw rate in rad/s to a speed in m/s. It converts ``NOISE_RADPS`` to
@@ -57,18 +54,16 @@ YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Sixteen directions in which the distance of a velocity to the hull is computed. The largest of
-these distances is at most 2 % smaller than the true distance."""
+"""Directions in which the distance to the hull is computed: at most 2 % too small."""
 
 
 def outside(
     motion: BodyTwist, explained: Sequence[Velocity], *, heading_known: bool
 ) -> tuple[float, float]:
-    """Return how far the motion is outside the envelope, in m/s and in rad/s.
+    """Return how far the motion is outside the envelope, in m/s and in rad/s; <= 0: inside.
 
-    A result of 0 or less means that the motion is inside. ``explained``: velocities that recent
-    set-points can cause; the velocity of the current set-point comes first. If the heading is
-    unknown, the direction of the linear velocity is not checked.
+    ``explained``: velocities that set-points allow, the current first. Without a known heading,
+    directions are not checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0
@@ -95,8 +90,7 @@ def outside(
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
     """Return whether the motion is near a set-point or between two successive set-points.
 
-    Such motion is inside the envelope. This check is quick, and its result is True for nearly all
-    motion. So the caller makes it before the exact check by ``outside``.
+    Such motion is inside the envelope. This quick check precedes ``outside``.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]
@@ -128,7 +122,7 @@ def dot(one: BodyTwist, other: BodyTwist) -> float:
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
     """Return how far a velocity is outside the hull, in m/s; 0 or less if it is inside.
 
-    The hull contains rest and all set-points, each multiplied by ``STRETCH``.
+    The hull contains rest and all set-points times ``STRETCH``.
     """
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:

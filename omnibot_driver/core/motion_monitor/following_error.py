@@ -2,12 +2,8 @@
 
 """The following error: how far a robot has moved outside its envelope without interruption.
 
-The envelope is the set of velocities that recent set-points allow. The motion monitor reports a
-fault when the error exceeds a limit. One displacement alone cannot exceed the limit, because its
-data may be damaged. A short jerk does not exceed it either, because the jerk ends too soon.
-
-This module knows velocities in the board's own axes, and times; it does not know which fault an
-error shows.
+One damaged displacement or a short jerk cannot reach the limit. This module knows velocities in the
+board's own axes, and times; it does not know which fault an error shows.
 """
 
 from typing import Final
@@ -18,26 +14,24 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s before a displacement. The motion is compared with the set-points in this time and
-during the displacement. A robot that is clearly slower than all these set-points is assumed to be
-held."""
+"""Time in s before a displacement whose set-points also count.
+
+A robot clearly slower than all of them is assumed to be held.
+"""
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""``LARGEST_PART``, ``LARGEST_PART_OF_A_LONG_ONE``: largest fraction of a limit that one short
-displacement, or one long displacement, adds to the error.
+"""Largest fraction of a limit that one short, or one long, displacement adds to the error.
 
-The limits are ``UNEXPLAINED_M`` and ``UNEXPLAINED_RAD``. So the error exceeds a limit only after
-three displacements in a row, or two long ones.
+So only three displacements in a row, or two long ones, exceed the limit.
 """
 
 
 class FollowingError:
     """The following error of one robot: the sum of its motion outside the envelope.
 
-    ``slack_mps``, ``slack_radps``: speed and yaw rate outside the envelope that are tolerated.
-
-    ``outside``: whether the last displacement was outside the envelope by more than is tolerated.
+    * ``slack_mps``, ``slack_radps``: tolerated speeds outside the envelope.
+    * ``outside``: whether the last displacement exceeded the envelope and the slack.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -72,8 +66,8 @@ class FollowingError:
     ) -> None:
         """Add one displacement to the error, or reset the error if the displacement is inside.
 
-        ``motion``: mean twist of the displacement. ``seconds``: its duration. ``begun_s``: when it
-        began. If the heading is unknown, the direction of the linear velocity is not checked.
+        ``motion``: mean twist in ``seconds`` from ``begun_s`` on. Without a known heading,
+        directions are not checked.
         """
         newest = history.since(begun_s - RISING_S)
         way_mps = turn_radps = 0.0

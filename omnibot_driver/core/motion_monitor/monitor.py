@@ -2,9 +2,8 @@
 
 """The motion monitor: compares the robot's displacements with its set-points.
 
-All velocities are in the board's own axes. All times are on the clock that stamps the
-displacements. This module knows neither bytes nor how a robot is stopped.
-docs/internals/motion_monitor.md explains the thresholds.
+Velocities are in the board's own axes, times on the clock of the stamps. This module knows neither
+bytes nor how a robot is stopped. docs/internals/motion_monitor.md explains the thresholds.
 """
 
 import math
@@ -27,16 +26,19 @@ LAG_S: Final = 0.4
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speed in m/s and yaw rate in rad/s above which the
-robot must move. If displacements show no motion for ``BLOCKED_S``, the robot is regarded as
-blocked."""
+"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds above which the robot must move.
+
+Without motion for ``BLOCKED_S``, it is regarded as blocked.
+"""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""A robot that has been at rest for this time, in s, has certainly obeyed Stop. If it moves later,
-its last command is not the cause."""
+"""Time at rest, in s, after which a robot has certainly obeyed Stop.
+
+Later motion has another cause.
+"""
 STOPS_S: Final = 5.0
 """Time in s for which the command policy repeats Stop if the robot keeps moving."""
 
@@ -89,8 +91,7 @@ ADVICE: Final[Mapping[Fault, str]] = {
 class MotionMonitor:
     """Compares the motion of one robot with its commands.
 
-    ``commanded``, ``measured``: the commanded and the measured twist when the driven robot last
-    moved too fast or in a wrong direction.
+    * ``commanded``, ``measured``: twists when the robot last moved too fast or the wrong way.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:
@@ -125,8 +126,7 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board itself may still hold an e-stop. So if the robot stands still although it is
-        commanded to move, HELD_BY_ESTOP is reported, not BLOCKED.
+        The board may still hold its own: a robot at rest is then HELD_BY_ESTOP, not BLOCKED.
         """
         self._released = True
 
@@ -139,11 +139,9 @@ class MotionMonitor:
         return fault not in told
 
     def count_refused(self, count: int, now: float) -> Fault | None:
-        """Return the fault that rejected displacements show, or None.
+        """Return the fault that ``REFUSED_IN_A_ROW`` rejected displacements show, or None.
 
-        The outlier filter rejects a displacement that no robot can make. ``REFUSED_IN_A_ROW``
-        rejected displacements, without an accepted one between them, show a fault. ``count``:
-        number of displacements that were rejected since the driver began.
+        ``count``: displacements that the outlier filter has rejected since the driver began.
         """
         self._refused = count
         if count < self._refused_before + REFUSED_IN_A_ROW:
@@ -164,8 +162,8 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: mean twist of the displacement. ``seconds``: its duration. ``stamp_s``: when it
-        ended. If the heading is unknown, the direction of the linear velocity is not checked.
+        ``motion``: mean twist in the ``seconds`` before ``stamp_s``. Without a known heading,
+        directions are not checked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -194,9 +192,7 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot that moves outside its envelope.
 
-        A robot that moves in the direction of a set-point is too fast. In any other direction, it
-        moves the wrong way. Linear directions that differ by less than 60° count as the same
-        direction. ``explained``: velocities that recent set-points can cause.
+        Along a set-point (within 60°) it is too fast; otherwise it moves the wrong way.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -211,8 +207,7 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        If the robot was at rest after its last command, a person may be pushing it. In that case
-        Stop is sent at longer and longer intervals.
+        After rest, a person may be pushing it: Stop is sent ever less often.
         """
         if not self._error.outside:
             self._stood_s += seconds

@@ -2,12 +2,8 @@
 
 """The history of set-points, and the velocities of the robot that they explain.
 
-A robot follows a new set-point late and smoothly. For ``HELD_S`` after the change, the robot may
-still have the full velocity of the old set-point. After that, the robot may have an ever smaller
-part of this velocity. The old set-point explains these velocities.
-
-This module knows velocities in the board's own axes, and times; it does not know how the robot
-moves.
+A replaced set-point explains its full velocity for ``HELD_S``, then an ever smaller part. This
+module knows velocities and times; it does not know how the robot moves.
 """
 
 import math
@@ -27,12 +23,12 @@ tuples more quickly."""
 HELD_S: Final = 0.3
 """Time in s for which a robot may keep the full velocity of a replaced set-point.
 
-This time covers the delay of the line, a lost repetition, and a controller's dead time.
+Covers the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant in s with which the velocity of a replaced set-point decays after ``HELD_S``.
+"""Time constant in s of the decay of a replaced set-point after ``HELD_S``.
 
-A robot that follows its set-points with a time constant of up to 0.35 s stays inside the envelope.
+Covers robots with a time constant up to 0.35 s.
 """
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored. By then, it explains less than 2 % of its

@@ -2,12 +2,8 @@
 
 """Wind-up: the distance that wheel controllers make up for after the robot was held or pushed.
 
-The wheel controllers integrate their errors. A robot that is held falls behind its set-point. A
-robot that should be at rest may be pushed away. When the robot is released, the controllers make up
-for this distance. Then the robot moves faster than commanded, or backwards. This happens even if
-the command has changed meanwhile, or is a stop.
-
-This module knows velocities; it does not know the envelope.
+The controllers integrate their errors. So a released robot moves too fast or backwards, even after
+another command or Stop. This module knows velocities; it does not know the envelope.
 """
 
 import math
@@ -19,29 +15,28 @@ from omnibot_driver.core.motion_monitor.envelope import STRETCH, dot, speed_of
 from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 
 MOST_M: Final = 0.6
-"""Largest distance in m that a robot is assumed to make up for. At this distance, the integrators
-of the wheel controllers are assumed to reach their limits."""
+"""Largest distance in m that a robot is assumed to make up for.
+
+There the controllers' integrators reach their limits.
+"""
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
-One long displacement does not prove that the robot is held: the robot may have changed its
-direction during this displacement.
+A single one does not prove a hold: the robot may have turned round.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
-"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants in s with which the wind-up decays while
-the set-point is motion, and while the set-point is rest.
+"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: decay of the wind-up, in motion and at rest, in s.
 
-At rest it decays more slowly, because a robot that is still held keeps its wind-up.
+A robot that is still held at rest keeps its wind-up.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""``BACK_MPS``, ``BACK_RADPS``: largest speed in m/s and yaw rate in rad/s of a held robot in the
-direction opposite to its set-point.
+"""``BACK_MPS``, ``BACK_RADPS``: largest backward speeds of a held robot.
 
-A robot that moves back faster is not held. Such motion does not add to the wind-up.
+Faster backward motion does not add to the wind-up.
 """
 LEVER_M: Final = 0.15
 """Approximate distance in m of the wheels from the robot's centre. It converts a yaw rate to the
@@ -57,19 +52,15 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m by which the robot fell behind in one long displacement. It is added to
-        ``way_m`` only if the robot is held in the next displacement too.
+        """Distance in m lost in one long displacement; added if the next one is held too.
 
-        0: the robot is held, and the distance has been added. None: the robot was not held in the
-        last displacement.
+        0: held, and already added. None: not held.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Return whether the wind-up explains motion outside the envelope.
+        """Return whether the wind-up explains motion outside the envelope: shorter than ``way_m``.
 
-        Motion in any direction is explained if it is shorter than ``way_m``. In any case, the
-        motion is subtracted from ``way_m``. ``way_mps``, ``turn_radps``: speed and yaw rate outside
-        the envelope. ``seconds``: how long the motion lasted.
+        The motion is always subtracted. ``way_mps``, ``turn_radps``: excess over the envelope.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -90,11 +81,10 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance by which a held robot falls behind in one displacement.
+        """Add the distance by which a held robot falls behind; decay the wind-up of any other.
 
-        If the robot is not held, the wind-up decays a little. ``motion``: mean twist of the
-        displacement, which is inside the envelope. ``seconds``: its duration. ``newest``: the
-        set-points that the robot may not have reached yet, the current one first.
+        ``motion``: mean twist, inside the envelope. ``newest``: set-points not yet reached, the
+        current first.
         """
         current, lost_mps = newest[0], 0.0
         if current is AT_REST and not self.way_m:

@@ -2,7 +2,7 @@
 
 """The published pose, which approaches the corrected pose no faster than the robot could move.
 
-This module knows poses and speeds; it does not know how the corrections are found.
+This module does not know how the corrections are found.
 """
 
 from typing import Final
@@ -19,8 +19,7 @@ class CorrectionSmoother:
     * ``pose``: the published pose.
     * ``target``: the best known pose.
 
-    Each step leaves room for a correction of ``pose``: the largest motion that was possible in the
-    time of the step, minus the robot's own motion. No correction is larger than this room.
+    A step corrects ``pose`` by at most the largest possible motion minus the robot's own.
     """
 
     def __init__(self) -> None:

@@ -2,14 +2,12 @@
 
 """The uncertainty of the odometry, from three sources of error that are kept separately.
 
-* Errors of the wheels. Slip that varies is a random walk. A wrong wheel size, or constant slip, is
-  the same error in every turn of a wheel. Its effect grows with the distance driven forward, and
-  shrinks again on the way back.
-* Unreported motion in gaps (``gap``). A later pose of the board reveals this motion.
-* Known errors of the published pose that are still being corrected. They are added at their full
-  size.
+* Errors of the wheels: random slip, wrong sizes and constant slip. The last two shrink on the way
+  back.
+* Unreported motion in gaps (``gap``), until a pose of the board reveals it.
+* Corrections of the published pose that are still due.
 
-This module knows covariances and the wheels' geometry; it does not know frames or boards.
+This module does not know frames or boards.
 """
 
 import math
@@ -31,12 +29,11 @@ INITIAL_VARIANCE: Final = 1e-6
 class OdometryNoise:
     """How fast the uncertainty grows. Each wheel has its own errors, which add to the body's error.
 
-    * ``wheel_drift``: standard deviation, in m, of a wheel's random error after 1 m of rim motion.
-    * ``wheel_scale``: standard deviation of the relative size error of one wheel.
-    * ``wheel_slip``: mean slip, equal for all wheels, as a fraction of the distance driven.
-    * ``wheels``: geometry of the wheels, at a wheel radius of 1 m.
-    * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations of a robot during a gap, in m/s²
-      and rad/s².
+    * ``wheel_drift``: standard deviation of a wheel after 1 m of rim motion, in m.
+    * ``wheel_scale``: standard deviation of a wheel's relative size error.
+    * ``wheel_slip``: mean slip of all wheels, as a fraction of the distance.
+    * ``wheels``: geometry, at a wheel radius of 1 m.
+    * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations during a gap.
     """
 
     wheel_drift: float = 0.0035
@@ -77,7 +74,7 @@ class Covariance:
     def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
         """Return the covariance after adding independent errors, each as (variance, x, y, yaw).
 
-        Each error is the vector (x, y, yaw), multiplied by a random number with this variance.
+        Each is the vector (x, y, yaw) times a random number.
         """
         xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
         for variance, x, y, yaw in errors:
@@ -129,8 +126,7 @@ class Uncertainty:
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        ``heading_rad``: heading before the move. The code uses plain numbers, because with Pose
-        objects it would take a third of the time that an odometry message takes.
+        ``heading_rad``: before the move. Pose objects would be slow here.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return
@@ -161,11 +157,9 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """Add a gap in the reports. ``fastest_mps`` and ``fastest_radps`` limit the motion in it.
+        """Add a gap in the reports. The fastest speeds limit the motion in it.
 
-        The speeds before and after the gap are known. A robot that accelerates and brakes in the
-        gap deviates by at most a·t²/4 from motion at constant speed, and never by more than its
-        largest speed allows.
+        Accelerating and braking in the gap deviates by at most a·t²/4 from constant speed.
         """
         square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(

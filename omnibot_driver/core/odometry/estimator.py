@@ -2,15 +2,9 @@
 
 """The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
-The estimator keeps the robot's pose in two frames:
-
-* ``_board`` is the pose in the board's frame. Displacements update it at once, and the board's
-  poses correct it.
-* The target of the ``CorrectionSmoother`` is the pose in the odometry frame.
-
-Both poses always move by the same tangent in the body's axes. So motion that was lost on the line
-is recovered with the next pose of the board. This module knows SE(2); it does not know bytes,
-clocks or ROS.
+``_board`` is the pose in the board's frame; the CorrectionSmoother has the odometry frame. Both
+move by the same tangents, so the board's next pose recovers lost motion. This module knows SE(2);
+it does not know bytes, clocks or ROS.
 """
 
 import math
@@ -28,8 +22,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 from omnibot_driver.core.values import value
 
 LONGEST_WAIT_S: Final = 1.0
-"""Longest time, in s of the board's clock, to wait for a pose that gives the heading. After this
-time, the driver assumes the heading of an unconfirmed pose, or 0 without such a pose."""
+"""Longest time, in s of the board's clock, to wait for a pose that gives the heading.
+
+Then an unconfirmed pose's heading, or 0, is assumed.
+"""
 LONG_GAP_S: Final = 1.0
 """Duration of lost displacements, in s, above which the next displacements wait for a pose that
 shows the lost motion."""
@@ -48,11 +44,9 @@ in this time."""
 class OdometrySettings:
     """The settings of the odometry.
 
-    * ``use_board_pose``: whether the board's poses correct the odometry. If not, the poses only
-      give the initial heading, which displacements in the earth frame need.
-    * ``fastest_mps``, ``fastest_radps``: speeds that the robot can never exceed, even if pushed.
-    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the distance and turn
-      that the board computes from the nominal sizes of its wheels.
+    * ``use_board_pose``: whether the board's poses correct more than the initial heading.
+    * ``fastest_mps``, ``fastest_radps``: never exceeded, even by a pushed robot.
+    * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the board's.
     """
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
@@ -67,12 +61,10 @@ class OdometrySettings:
 class OdometryEstimate:
     """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in body axes.
 
-    * ``twist``: None if the duration of the displacement is unknown.
-    * ``rolled``: all motion by the wheels since the driver began, as one tangent (sum of twist x
-      time) in the board's axes.
+    * ``twist``: None if the duration is unknown.
+    * ``rolled``: all wheel motion so far, as one tangent in the board's axes.
     * ``rolling``: rate of ``rolled``; None if unknown.
-    * ``twist_variances``: variances of linear and angular speed, in m²/s² and rad²/s²; None to use
-      the variances from the parameters.
+    * ``twist_variances``: linear in m²/s², angular in rad²/s²; None: the parameters' values.
     """
 
     stamp_s: float
@@ -87,8 +79,7 @@ class OdometryEstimate:
 class Odometry:
     """The odometry of one robot.
 
-    ``axis_signs`` convert x, y and yaw of the board's body axes to REP-103. They do not apply to
-    the board's earth frame and heading.
+    * ``axis_signs``: convert the board's body axes, not its earth frame, to REP-103.
     """
 
     def __init__(self, settings: OdometrySettings, axis_signs: Signs = (1, 1, 1)) -> None:
@@ -180,10 +171,9 @@ class Odometry:
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
-        """Convert ``place``, a pose in the odometry frame, into a pose in the board's frame.
+        """Convert ``place`` from the odometry frame into the board's frame, by the shorter turn.
 
-        There are two ways to turn to the heading of ``place``. The shorter one is used. Return None
-        if no pose of the board has shown yet where the odometry frame lies in the board's frame.
+        Return None before a pose of the board has related the frames.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -206,8 +196,7 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether a pose is the first one, or shows that the board's frame has changed.
 
-        After a suspected restart of the board, a single pose may be enough. It must fit the motion
-        since the restart, or the motion since the last pose before the restart.
+        After a suspected restart, a single pose that fits the motion is enough.
         """
         if self._board is None:
             return confirmed
@@ -260,9 +249,8 @@ class Odometry:
     def _judge(self, told: Pose, confirmed: bool) -> None:
         """Accept a pose that is reachable and expected, or that confirms the last unexpected pose.
 
-        If a confirmed pose is out of reach, only the place of the odometry frame in the board's
-        frame changes. The odometry itself does not change. Any other pose must be confirmed by the
-        next pose.
+        A confirmed pose out of reach changes only the relation of the frames. Other poses await
+        confirmation.
         """
         assert self._board is not None
         way = self._board.way_to(told)

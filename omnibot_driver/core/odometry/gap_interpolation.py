@@ -2,8 +2,7 @@
 
 """Interpolation of the motion in a gap, from the motion before and after the gap.
 
-This module knows displacements and headings; it does not know where the robot is, nor how the
-result is used.
+This module does not know where the robot is, nor how the result is used.
 """
 
 import math
@@ -14,16 +13,17 @@ from omnibot_driver.core.odometry.pending_displacements import chord
 from omnibot_driver.core.readings import DisplacementReading
 
 LONGEST_BRIDGE_S: Final = 2.0
-"""Longest time, in s of the board's clock, over which motion is interpolated. If the board sends no
-data at all, the driver stops the robot sooner."""
+"""Longest time, in s of the board's clock, over which motion is interpolated.
+
+Without any data, the robot is stopped sooner.
+"""
 NO_WAY: Final = Pose()
 
 
 class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after them.
 
-    ``last``: newest tangent (twist x time) in the board's body axes, and its duration in s. None if
-    unknown.
+    * ``last``: newest tangent in body axes, and its duration in s; None if unknown.
     """
 
     def __init__(self) -> None:
@@ -32,11 +32,10 @@ class GapInterpolation:
     def tangents(
         self, reading: DisplacementReading, heading_rad: float | None
     ) -> tuple[Pose, Pose]:
-        """Return the tangents of the lost displacements and of ``reading``, in the body's axes.
+        """Return the tangents of the lost displacements and of ``reading``, in body axes.
 
-        A tangent is twist x time. ``heading_rad`` is the heading of the board before the lost
-        displacements. It is None if the board has never reported a pose. In this case, all
-        displacements are taken to be in body axes.
+        A tangent is twist x time. ``heading_rad``: before the losses; None before any pose:
+        readings count as body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

@@ -2,8 +2,7 @@
 
 """Displacements that wait for a pose of the board, and their sum in the board's frame.
 
-This module knows how a displacement moves a pose; it does not know why a displacement waits, nor
-how the result is used.
+This module does not know why a displacement waits, or how the result is used.
 """
 
 import math
@@ -55,8 +54,7 @@ class PendingDisplacements:
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Return the time in s without a report before the first waiting displacement.
 
-        ``last_stamp_s``: stamp of the last displacement before the gap. The time is measured from
-        this stamp if the first waiting displacement does not give its duration.
+        ``last_stamp_s``: stamp before the gap, for a displacement without duration.
         """
         if not self._waiting:
             return 0.0
@@ -68,8 +66,7 @@ class PendingDisplacements:
     def unstamped_s(self, last_stamp_s: float | None) -> float:
         """Return the duration of the gap in s according to the stamps, but at most ``unheard_s``.
 
-        According to the stamps, the gap begins at ``last_stamp_s``. It ends when the first waiting
-        displacement begins: at the displacement's stamp minus its duration.
+        The gap lasts from ``last_stamp_s`` to the begin of the first waiting displacement.
         """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:

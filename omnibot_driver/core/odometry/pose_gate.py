@@ -2,8 +2,8 @@
 
 """The gate for the board's poses: accepts a pose that is finite, reachable and as expected.
 
-An unexpected pose must be confirmed by the next one. This module knows poses, speeds and the
-uncertainty of open gaps; it does not know what an accepted pose changes.
+The next pose must confirm an unexpected one. This module knows poses and gaps; it does not know
+what an accepted pose changes.
 """
 
 import math
@@ -16,10 +16,9 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations in m and rad above which a pose must be
-confirmed by the next one.
+"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations above which a pose must be confirmed.
 
-The limits are extended by the possible motion of the robot in open gaps.
+Possible motion in open gaps is added.
 """
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
@@ -31,10 +30,8 @@ or 16,000 turns comes from misread bytes."""
 class PoseGate:
     """Decides which poses of the board are accepted.
 
-    * ``proved``: the last accepted pose. None while no pose has been accepted, and after the last
-      accepted pose has become invalid.
-    * ``doubted``: the last unexpected pose, which the next pose must confirm. It is moved along
-      with the robot. None if no pose is to be confirmed.
+    * ``proved``: the last accepted pose; None if there is no valid one.
+    * ``doubted``: the unexpected pose to confirm, moved along with the robot; or None.
     """
 
     def __init__(self) -> None:
@@ -81,8 +78,7 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached a pose since the last accepted one.
 
-        * ``seconds``: time in s, in addition to the time recorded by ``passed``.
-        * ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.
+        ``seconds``: added to the time recorded by ``passed``. ``mps``, ``radps``: largest speeds.
         """
         if self.proved is None:
             return False

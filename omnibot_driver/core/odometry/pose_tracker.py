@@ -2,10 +2,8 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-``PoseTracker`` combines a CorrectionSmoother and an Uncertainty. Its inputs are tangents (twist x
-time) in the board's body axes, computed with the wheel sizes that the board assumes. Its outputs
-are in REP-103's axes, and of true size. This module knows times; it does not know which of the
-board's reports to believe.
+Inputs: tangents (twist x time) in the board's axes and wheel sizes. Outputs: REP-103's axes, true
+size. This module does not know which of the board's reports to believe.
 """
 
 from typing import Final
@@ -37,8 +35,7 @@ class PoseTracker:
     ) -> None:
         """Use new settings from the next motion on.
 
-        * ``scale``: true distance and turn, divided by the reported ones.
-        * ``fastest``: speeds that the robot cannot exceed, in m/s and rad/s.
+        ``scale``: true distance and turn, divided by the reported. ``fastest``: in m/s and rad/s.
         """
         x, y, yaw = self._axis_signs
         linear, angular = scale
@@ -61,8 +58,7 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent from the robot's pose to ``place``, by the shorter turn.
 
-        ``place`` is in the odometry frame. The tangent is in the board's body axes, computed with
-        the wheel sizes that the board assumes.
+        The tangent is in the board's body axes and wheel sizes.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
@@ -70,8 +66,8 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time between the stamps before and after this motion, in s. If it is shorter
-        than ``seconds``, the published pose moves only as far as the robot can move in this time.
+        ``stamped_s``: time between the stamps before and after, in s; limits the published pose's
+        step.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail

@@ -2,8 +2,8 @@
 
 """The OmniBot as a ``core.board.Board``: decodes its bytes, and encodes requests to it.
 
-Source: the board's manual ver. 0.3. The module ``translation`` describes the data from the board.
-The module ``command_encoder`` describes the commands to the board.
+Source: the board's manual ver. 0.3. See ``translation`` for its data, ``command_encoder`` for
+commands.
 """
 
 import math
@@ -126,8 +126,7 @@ class OmniBot:
     def edge(self) -> SampleBoundary | None:
         """Where the last read ended in the stream of IMU samples; None if this is unknown.
 
-        The bytes that were received after the last decoded frame show this place. These bytes may
-        begin with an IMU frame, complete or not. Other bytes may follow the IMU frame.
+        The undecoded bytes show it: they may begin with an IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -160,7 +159,7 @@ class OmniBot:
     def gravity_advice(self, gravity_mps2: float) -> str:
         """Return advice on the accelerometer's range; empty if the range seems to be right.
 
-        ``gravity_mps2``: measured specific force at rest, in m/s², which should be near gravity.
+        ``gravity_mps2``: specific force at rest, in m/s².
         """
         return gravity_advice(gravity_mps2, self._settings.imu.accel_range_g)
 

@@ -2,9 +2,8 @@
 
 """The encoder that turns orders into the board's frames.
 
-Velocity and wheel commands are in a unit of the firmware. ``linear_scale`` and ``angular_scale``
-convert to this unit. The vendor has found their values, 70 and 500, by trial. Commanded poses are
-assumed to be in mm and mrad, like the poses that the board sends. This is not verified.
+The vendor found the velocity scales, 70 and 500, by trial. Commanded poses are assumed to be in mm
+and mrad.
 
 This module knows orders and frames; it knows neither modes nor send times.
 """
@@ -40,9 +39,8 @@ EMERGENCY_STOP_PACKETS: Final = packed(EMERGENCY_STOP)
 class CommandEncoder:
     """Encodes orders as packets, with the scales of ``settings``.
 
-    ``settings``: the board's settings, which may be replaced at any time.
-
-    ``saturated``: number of commands that were slowed down because a value exceeded 16 bits.
+    * ``settings``: may be replaced at any time.
+    * ``saturated``: number of commands slowed down because a value exceeded 16 bits.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -96,7 +94,7 @@ class CommandEncoder:
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Encode wheel rates in rad/s for independent wheel drive.
 
-        On the line, each rate is the speed of the wheel's rim, in ``linear_scale`` LSB per m/s.
+        On the line: rim speeds in ``linear_scale`` LSB per m/s.
         """
         unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps
@@ -115,12 +113,9 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control.
+        """Encode a goal for positional control. The zero goal is a real position, not Stop.
 
-        A zero velocity is sent as Stop, but a zero goal is not. It is a real position: the origin.
-
-        Raises CommandRefused if a coordinate exceeds 16 bits, or if its high byte is one of the
-        letters S, P and R. If the line loses bytes, the board could obey such a byte as a letter.
+        Raises CommandRefused above 16 bits, or if a high byte is a letter (S, P, R).
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)

@@ -2,15 +2,10 @@
 
 """The cost of an interpretation of the bytes: the evidence against it as one number.
 
-A cost is about the negative logarithm of a probability. Each unit of cost makes an interpretation
-about three times less likely.
+A cost is about -ln(probability). Odd content costs less than damage, so true shocks are delivered.
 
-Odd content is weak evidence: it costs less than the assumption that the frame is damaged. So the
-frame of a true shock is delivered if the frames right before and after it are complete.
-
-This module knows what a board is likely to send next, and how likely the line is to damage frames;
-it does not know how interpretations are searched (``trellis``), nor when one is accepted
-(``decoder``).
+This module knows what boards send and lines damage; it does not know the search (``trellis``) or
+the acceptance (``decoder``).
 """
 
 from math import ceil, floor
@@ -52,11 +47,13 @@ BAD_TAIL: Final = 2.5
 UNKNOWN_START: Final = 1.0
 """Cost of assuming that the first bytes are not the beginning of a frame.
 
-After a silence, the first bytes are more likely a whole frame than the rest of one.
+After a silence, a whole frame is more likely.
 """
 BAD_BYTE: Final = 0.35
-"""Cost of each byte of a bad run, in addition to ``BAD_RUN``. A bad run of 14 bytes therefore costs
-more than any true IMU frame."""
+"""Cost of each byte of a bad run, in addition to ``BAD_RUN``.
+
+A bad run of 14 bytes costs more than any true IMU frame.
+"""
 BAD_HEADER: Final = 0.5
 """Cost of a header within a bad run; a header may arise by chance, or from a gyro at rest."""
 GAP: Final = 5.0
@@ -66,8 +63,7 @@ BAD_TEXT: Final = 4.0
 KNOWN_GAP: Final = 11.0
 """Cost of a pause within a frame, on a line that so far paused only between frames.
 
-This cost is so high that the decoder does not accept the frame at once. It is low enough for the
-decoder to accept the frame when there is more evidence.
+The frame is then accepted only with more evidence.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -77,22 +73,21 @@ ENDS_IN_NOISE: Final = 2.0
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Cost of an IMU frame, by the number of words that differ much from those of the frame before.
+"""Cost of an IMU frame, by the number of words that differ much from the frame before.
 
-One word that differs much makes a frame odd; a shock changes several words.
+One such word is odd; a shock changes several.
 """
 AFTERSHOCK: Final = 1.5
 """Cost of an odd IMU frame after another odd one.
 
-It is less than the cost of the first one, because a shock lasts several frames.
+It is low because a shock lasts several frames.
 """
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
 
-The supposed header of such a frame is probably a gyro word of -6, which has the same bytes. The
-gyro words after it are small, and are taken for accelerations.
+The supposed header is probably a gyro word of -6.
 """
 JUMP: Final = 2.5
 """Cost of a counter that did not advance by one, because an earlier frame was lost."""
@@ -101,7 +96,7 @@ IMPOSSIBLE: Final = 2.0
 OFF_BEAT: Final = 1.0
 """Cost of an unexpected number of IMU frames per delta, or of deltas per pose.
 
-With deltas at 25 Hz, four IMU frames per delta and five deltas per pose are expected.
+Expected at 25 Hz: four and five.
 """
 
 CONTRADICTED: Final = 1.5
@@ -111,10 +106,9 @@ IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""``ROUNDING``, ``ROUNDING_PER_DELTA``: largest rounding error of a sum of deltas, in 0.1 mrad. The
-first is a constant part, the second is added for each delta.
+"""``ROUNDING``, ``ROUNDING_PER_DELTA``: rounding error of a sum of deltas, in 0.1 mrad.
 
-The error of the sum of five deltas is therefore at most 4.
+For n deltas: ``ROUNDING`` + n * ``ROUNDING_PER_DELTA``, e.g. 4 for five.
 """
 FASTEST: Final = 1e5
 """Largest possible speed: 10 m/s or 10 rad/s, in the unit 0.1 mm/s or 0.1 mrad/s."""
@@ -155,7 +149,7 @@ NOTHING_KNOWN: Final = Context()
 class Expectation:
     """Judges the content of a frame by the frames before it.
 
-    An object of this class learns from accepted frames how much the IMU's words scatter.
+    Learns from accepted frames how much the IMU's words scatter.
     """
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
@@ -172,11 +166,9 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Limits within which an IMU frame costs nothing, in counts.
+        """Limits within which an IMU frame costs nothing, in counts (integers compare faster).
 
-        The first two are the smallest and the largest squared norm of the acceleration. The others
-        are the largest step of an acceleration word and the largest step of a gyro word. All are
-        integers, because Python compares integers twice as fast as floats.
+        Least and largest squared acceleration; largest steps of an acceleration and a gyro word.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
@@ -272,9 +264,7 @@ class Expectation:
 def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the last byte of this frame may belong to the next header.
 
-    The byte must be part of some header. Of an IMU frame, the last word must also differ from that
-    of the IMU frame before. A last byte FF is an exception: it may belong to the next header even
-    if the word is the same.
+    An IMU frame's last word must also differ from the one before, unless the byte is FF.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -2,21 +2,14 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-The protocol has no checksum. Read as a word, a header is one of the most common readings of a gyro
-at rest. So a header alone proves nothing. The bytes around a frame decide whether the decoder
-accepts it:
+A header alone proves nothing: a gyro at rest reads the same. docs/internals/omnibot_protocol.md
+(10) lists the evidence.
 
-* *In step* means that the frame begins right after an accepted one. If no evidence speaks against
-  the frame, the decoder returns it as soon as its last byte arrives. Four kinds of evidence speak
-  against a frame. The bytes after the frame do not begin like a frame. The content of the frame is
-  a spike. The line was idle within the frame. Its last byte may belong to the next header.
-* *Uncertain* bytes are interpreted in all possible ways (``trellis``). Each interpretation has a
-  cost, which is the sum of the evidence against it (``cost_model``). The decoder returns a frame of
-  the cheapest interpretation when every interpretation without this frame costs clearly more.
-  Otherwise the bytes wait for more evidence, at most until ``DOUBT_BYTES`` are held.
+* *In step*, right after an accepted frame, a frame is accepted unless evidence speaks against it.
+* *Uncertain* bytes wait until the cheapest interpretation (``trellis``) is clear, or
+  ``DOUBT_BYTES`` are held.
 
-This module reads no clock, and no input makes it raise an exception. It holds fewer than
-``DOUBT_BYTES`` bytes between calls, and looks at each byte a bounded number of times.
+This module reads no clock, and no input makes it raise an exception.
 """
 
 import math
@@ -53,8 +46,7 @@ SHORTEST_RUN: Final = DELTA_LENGTH
 CALM_S: Final = 10.0
 """Time in s without damage after which a line is regarded as one that loses few bytes.
 
-If bytes were lost, the last byte of a frame may be the first byte of the next header. On a line
-that loses few bytes, the decoder needs less evidence that this byte belongs to the frame.
+The decoder then doubts the last byte of a frame less.
 """
 FRAMES_TO_SETTLE: Final = 3
 """An uncertain frame is discarded when this number of certain frames has followed it."""
@@ -73,16 +65,12 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    The module ``single_imu`` decodes some frames without this class. For each of these frames, it
-    updates the following attributes:
+    ``single_imu`` decodes some frames without this class, and must update these attributes:
 
-    ``context``: what the frames so far show.
-
-    ``expectation``: which content the next frame may have.
-
-    ``pauses``: where the line was idle.
-
-    ``last_arrival_s``: arrival time of the last bytes in s.
+    * ``context``: what the frames so far show.
+    * ``expectation``: which content the next frame may have.
+    * ``pauses``: where the line was idle.
+    * ``last_arrival_s``: arrival time of the last bytes in s.
     """
 
     def __init__(
@@ -112,7 +100,7 @@ class FrameDecoder:
     def feed(self, data: bytes, now: float) -> list[Frame]:
         """Return the frames that these bytes complete, in the order in which they were sent.
 
-        ``now``: arrival time of ``data`` in s, of any steady clock.
+        ``now``: arrival time in s, of any steady clock.
         """
         found: list[Frame] = []
         self.skipped = []
@@ -233,8 +221,8 @@ class FrameDecoder:
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
         """Return whether, by the arrival times, the last byte held may begin another frame.
 
-        ``start``, ``length``: position and length in bytes of the last frame held. ``due``: whether
-        the board may send another frame right after it.
+        ``start``, ``length``: of the last frame held. ``due``: another frame may follow it
+        directly.
         """
         pauses, calm = self.pauses, self.calm
         if self._arrived >= length:  # in one read: a burst begins after a pause
@@ -250,7 +238,7 @@ class FrameDecoder:
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept all frames of ``walk`` except the last two, because odd bytes follow the last two.
 
-        The result is always False, so that ``_walk`` can return it.
+        Return False, the result of ``_walk``.
         """
         believed = len(walk.frames) - 2
         if believed > 0:
@@ -304,8 +292,7 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield the pieces before the first undecided one, each with whether to accept it.
 
-        A piece is decided if later bytes cannot change the result. A piece that ends at or before
-        the position ``until`` has waited long enough, so it is also decided.
+        Later bytes cannot change a decided piece. Pieces that end by ``until`` are decided too.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

@@ -2,10 +2,8 @@
 
 """The fast path: decodes frames with expected content more quickly than the decoder's own loop.
 
-It accepts a frame only if no evidence speaks against the frame, or if the frame continues a shock.
-The decoder's own loop would accept the same frame; a test compares the results. All other frames
-are left to that loop. If a read brings exactly one IMU frame, there is an even faster path
-(``single_imu``).
+The loop would accept the same frames; a test compares both. ``single_imu`` is faster still, for one
+IMU frame.
 """
 
 import struct
@@ -56,13 +54,9 @@ LEARN_EVERY: Final = 8
 class Walk:
     """Consecutive frames from the first byte held on. No evidence speaks against these frames.
 
-    ``ends``: the position after each frame.
-
-    ``lessons``: the frames from which the expectation will learn. Each entry is the number of
-    frames before it, the frame, and the last IMU frame before it.
-
-    ``known``: the context at some places. Each entry is a number of frames, and the fields of the
-    Context after them.
+    * ``ends``: the position after each frame.
+    * ``lessons``: what to learn: number of frames before, the frame, the last IMU frame before.
+    * ``known``: number of frames, and the Context's fields after them, at some places.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -96,11 +90,9 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Return whether a frame follows at position ``at``.
+    """Return whether a frame follows at position ``at``: then odd content before it is a shock.
 
-    If a frame follows, odd content before ``at`` is a shock, not damage. The frame must be
-    complete, and the bytes after it must be able to begin another frame. If ``at`` is the end of
-    ``held``, no bytes can show this. In this case the result is True only if the line was closed.
+    It must be complete, and another may follow. At the end of ``held``: ``closed``.
     """
     if at == len(held):
         return closed
@@ -121,7 +113,7 @@ def take_run(
 ) -> tuple[int, Context]:
     """Add expected frames from ``at`` on to ``walk``; return their end and the context after them.
 
-    The last frame held is left out if its last byte may belong to the next header.
+    Omit the last frame if its last byte may belong to the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

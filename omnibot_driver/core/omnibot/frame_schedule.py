@@ -2,13 +2,8 @@
 
 """The order in which a running board sends frames, and what it reveals about lost frames.
 
-In nominal mode a delta follows every fourth IMU frame, and a pose every fifth delta. With deltas at
-10 Hz, a delta follows every tenth IMU frame, and a pose every second delta. In IMU-only mode the
-board sends only IMU frames.
-
-So the number of discarded bytes between two frames shows which frames were lost, even if a few of
-their bytes are missing. If this result is wrong, the counters (SEQ) and the arrival times correct
-it.
+At 25 Hz: a delta every fourth IMU frame, a pose every fifth delta. So the number of discarded bytes
+tells which frames were lost. SEQ and arrival times correct errors.
 """
 
 from functools import cache
@@ -63,10 +58,8 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: number of bytes right before the frame that belong to no frame.
-
-        Each lost IMU frame is counted only once. For a pose the result is 0. IMU frames that were
-        lost before a pose are included in the result for the next frame.
+        ``skipped``: discarded bytes before it. A pose returns 0, and leaves its count to the next
+        frame.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

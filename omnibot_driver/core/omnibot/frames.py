@@ -2,11 +2,10 @@
 
 """The wire format: every frame the board sends or obeys, as bytes and as values.
 
-Source: the board's manual ver. 0.3, sections "Serial Command (Rx)", "Serial Data Output (Tx)" and
-"Appendix". All words are signed, 16 bit, most significant byte first.
+Source: the board's manual ver. 0.3, "Serial Command (Rx)", "Serial Data Output (Tx)" and
+"Appendix". Words are signed, 16 bit, big-endian.
 
-This module knows layouts; it does not know what a value means in SI units (``translation``,
-``command_encoder``).
+This module knows layouts; it does not know what a value means in SI units.
 """
 
 import re
@@ -24,8 +23,10 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""The bytes of headers. A frame that ends with one of these bytes may have lost a byte. If it has,
-its last byte belongs to the next header."""
+"""The bytes of headers.
+
+If a frame that ends with such a byte lost one, that byte belongs to the next header.
+"""
 
 _IMU: Final = struct.Struct(">2s6h")
 _DELTA: Final = struct.Struct(">2s3hB")
@@ -145,8 +146,7 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 def measure(data: bytes | bytearray, at: int) -> int:
     """Return the length in bytes of the frame that begins at position ``at``.
 
-    The result is INCOMPLETE if more bytes may complete a frame, and NO_FRAME if no frame begins
-    with these bytes.
+    INCOMPLETE: more bytes may complete it. NO_FRAME: no frame begins so.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)

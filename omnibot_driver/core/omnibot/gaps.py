@@ -2,13 +2,10 @@
 
 """The pauses in which the line was idle, and how reliable they are.
 
-A board sends all frames of a tick at once, so it pauses only between frames. But an adapter that
-collects bytes, or a reader that is scheduled late (``late_reads``), causes pauses anywhere. This
-module finds out what causes the pauses of this line: it counts how often the pauses were between
-accepted frames.
+A board pauses only between frames. Adapters and late readers (``late_reads``) cause other pauses.
+Accepted frames show the kind of line.
 
-This module knows positions and times; it does not know what a frame contains, nor which frames are
-accepted (``decoder``).
+This module knows positions and times; it does not know what a frame contains, or which is accepted.
 """
 
 from bisect import bisect_right
@@ -29,9 +26,9 @@ from omnibot_driver.core.omnibot.late_reads import (
 )
 
 LATE_S: Final = 0.011
-"""Longest pause in s between two reads that is normal while the board runs: about one tick.
+"""Longest normal pause in s between two reads: about one tick.
 
-Causes of a longer pause are lost bytes, an adapter that collects bytes, or a late reader.
+Longer: lost bytes, a collecting adapter, or a late reader.
 """
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
@@ -48,21 +45,12 @@ _FIRST: Final = attrgetter("first")
 class InterFrameGaps:
     """The pauses within the bytes held, and where the pauses of this line normally are.
 
-    ``byte_s``: time in s that the line takes for a byte.
-
-    ``gaps``: the pauses within the bytes held.
-
-    ``sharp``: whether the first byte after a pause normally begins a frame.
-
-    ``between``: whether a frame normally begins somewhere in the read after a pause.
-
-    ``certain``: whether ``sharp`` and ``between`` were confirmed so often that one more
-    confirmation changes nothing.
-
-    ``at_pace``: whether the bytes of the last read came without a pause before them.
-
-    ``collected``: whether the bytes of the last read were collected for more than a tick. Such a
-    read is unlikely to end right after the first byte of a frame.
+    * ``byte_s``: time in s that the line takes for a byte.
+    * ``sharp``: whether the first byte after a pause normally begins a frame.
+    * ``between``: whether a frame normally begins somewhere in the read after a pause.
+    * ``certain``: whether more confirmations of both change nothing.
+    * ``at_pace``: whether the last read's bytes came without a pause before them.
+    * ``collected``: whether they were collected for more than a tick.
     """
 
     def __init__(self, byte_s: float) -> None:
@@ -80,7 +68,7 @@ class InterFrameGaps:
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
         """Record that ``arrived`` bytes were read at ``now``, ``pause_s`` s after the last read.
 
-        ``place``: position of the first of these bytes among the bytes held.
+        ``place``: of the first, among the bytes held.
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
@@ -112,8 +100,7 @@ class InterFrameGaps:
     def compare(self, ends: Sequence[int]) -> None:
         """Learn from accepted frames whether the pauses of this line are between frames.
 
-        The line causes pauses only between frames; an adapter causes pauses anywhere. ``ends``: for
-        each accepted frame, the position of the byte after it, among the bytes held.
+        ``ends``: the position after each accepted frame, among the bytes held.
         """
         start = 0
         for end in ends:

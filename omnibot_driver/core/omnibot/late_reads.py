@@ -2,16 +2,11 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-A read does not return when bytes arrive. The read returns when the operating system runs the
-reader. Its result is all bytes that the adapter has delivered until that moment. So a pause between
-two reads proves little about the line.
+The board's ticks decide. Bytes lost in a frame delay all later frames by whole ticks. After a late
+read, later frames are on time.
 
-The board's clock proves more, because the board sends an IMU frame in every tick. If bytes were
-lost in a pause within a frame, this frame and all later ones are late by whole ticks. If only the
-reader was late, later frames are on time again.
-
-This module knows lengths, ticks and times; it does not know what a frame contains, nor which frame
-is accepted.
+This module knows lengths, ticks and times; it does not know what a frame contains, or which is
+accepted.
 """
 
 from bisect import bisect_right
@@ -39,8 +34,10 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Lost bytes delay frames by whole ticks. If a delay differs from a whole number of ticks by more
-than this time, in s, lost bytes are not its cause."""
+"""Largest distance of a delay from a whole number of ticks, in s, for lost bytes.
+
+Lost bytes delay frames by whole ticks.
+"""
 INTO_TICK_S: Final = 1e-3
 """A delta or pose begins about this time, in s, after its tick began: an IMU frame precedes it."""
 PUNCTUAL_S: Final = 1e-3
@@ -53,12 +50,12 @@ FEW_BYTES: Final = 2
 TICKS_TO_PROVE: Final = 2
 """Number of late ticks, after a first late tick, that prove lost bytes.
 
-Each of these ticks must be read by a read of its own, and must be as late as the first late tick.
+Each must have its own read, and be as late as the first.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Number of bytes after a frame within which the cause of a pause in the frame is decided.
+"""Number of bytes after a frame within which the cause of a pause in it is decided.
 
-If these bytes do not prove an idle line, the reader is assumed to have been late.
+Without proof of an idle line, the reader was late.
 """
 
 
@@ -88,12 +85,9 @@ _END: Final = attrgetter("end")
 class Gap(NamedTuple):
     """A pause between two reads, caused by an idle line or by a late reader.
 
-    ``first``, ``before``: the pause is before one of the bytes from ``first`` to ``before`` - 1.
-
-    ``price``: cost of assuming that a frame was sent partly before and partly after the pause. This
-    cost applies only if the line was idle.
-
-    ``pause_s``: time in s between the two reads.
+    * ``first``, ``before``: the pause is before one of the bytes ``first`` to ``before`` - 1.
+    * ``price``: cost of a frame across the pause, if the line was idle.
+    * ``pause_s``: time in s between the two reads.
     """
 
     first: int
@@ -107,26 +101,10 @@ def cause(
 ) -> Cause:
     """Return the cause of ``gap``, a pause within the supposed frame ``data[start:end]``.
 
-    ``reads``: all reads since the pause, beginning with the read that ended it. ``byte_s``: time in
-    s that the line takes for a byte.
-
-    The reader was late in each of these cases:
-
-    * Later bytes are on time again. There is one exception: all bytes since the pause came at the
-      pace of the line. Perhaps the reader was prompt, and the supposed frame is wrong. In this case
-      the next frame decides.
-    * Bytes came faster than the line can send them, so they had waited to be read.
-    * The frame is a text, or a text follows it. A paused board does not send frames in ticks.
-    * ``MOST_BYTES`` after the frame have not proved an idle line.
-
-    The line was idle in each of these cases:
-
-    * A text begins at the pause.
-    * The bytes after the frame do not begin another frame.
-    * Ticks that were read one by one are equally late.
-
-    The result UNDECIDED means that more bytes are needed.
+    ``reads``: all reads since the pause. ``byte_s``: time of a byte in s. UNDECIDED: more bytes are
+    needed.
     """
+    # A paused board does not send frames in ticks.
     if is_text(data, start):
         return Cause.LATE_READER
     if is_text(data, gap.first) and measure(data, gap.first) > 0:
@@ -161,10 +139,13 @@ def cause(
         at_pace = abs(waited_s) < PACE_S
         if first.end + FEW_BYTES < read_end <= rest_end:
             paced = at_pace
+        # Later bytes are on time again, so the reader was late. If all bytes came at the line's
+        # pace, the supposed frame may be wrong instead.
         if late_s < latest_s:
             if paced and at_pace:
                 return _by_the_next_frame(reads, first, data, rest_end, byte_s)
             return Cause.LATE_READER
+        # Bytes that came faster than the line sends had waited to be read.
         if waited_s > PUNCTUAL_S or read_end > rest_end + MOST_BYTES:
             return Cause.LATE_READER
         if abs(remainder(late_s - on_time_s, TICK_S)) > NEAR_S:
@@ -183,9 +164,8 @@ def _by_the_next_frame(
 ) -> Cause:
     """Return the cause of a pause, from the next frame, which begins at ``start``.
 
-    Perhaps the next frame has a pause too. If this second pause ended a whole number of ticks after
-    the first one, the line was idle. In all other cases the reader was late. ``first``: the read
-    that ended the first pause.
+    IDLE_LINE if that frame has a pause too, whole ticks after ``first``, the read that ended the
+    first.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

@@ -2,10 +2,7 @@
 
 """A lower bound for what the interpretation of the remaining bytes costs, found from headers alone.
 
-From a header on, undamaged frames follow one another, up to a place where no frame begins. There,
-either a frame is damaged, or a run of unexplained bytes (a bad run) begins. A damaged frame covers
-at most ``REACH`` bytes and costs at least ``DAMAGE``. A bad run costs more per byte. So the headers
-show the smallest possible number of damaged frames, before any content is judged.
+The headers show the smallest possible number of damaged frames.
 
 This module knows the shapes of frames and the lowest prices; it does not know what is searched
 (``trellis``).
@@ -29,13 +26,14 @@ _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    An incomplete frame at the end costs nothing, because more bytes may follow. From the start of
-    an edge to its end, the least cost decreases by at most the price of the edge.
+    Along an edge, it decreases by at most the price. An incomplete last frame is free.
     """
     size = len(data)
     ends = _undamaged(data)
     first = min((at for at, end in ends.items() if end == size), default=size)
     boundaries, runs = [0.0] * (size + 1), [0.0] * (size + 1)
+    # Where no frame begins, a damaged frame or a bad run does. A damaged frame covers at most REACH
+    # bytes and costs at least DAMAGE. A bad run costs more per byte.
     filled, damages, reach = size, 0, size
     while reach > 0:
         damages += 1
@@ -59,7 +57,7 @@ def least_costs(data: bytes) -> list[float]:
 def _undamaged(data: bytes) -> dict[int, int]:
     """Return, for each possible start of a frame, where the undamaged frames from there end.
 
-    Keys and values are positions in ``data``. The keys are in descending order.
+    Positions in ``data``, in descending order of the keys.
     """
     size = len(data)
     ends: dict[int, int] = {}

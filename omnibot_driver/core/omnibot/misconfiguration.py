@@ -2,12 +2,7 @@
 
 """Checks for settings that the board's data contradicts. The user is advised to change them.
 
-Three settings are checked:
-
-* The byte order of the poses. It is wrong if the poses are plausible only in the other order.
-* The frame of the deltas, earth or body. It is wrong if the sum of the deltas leads to the next
-  pose only in the other frame.
-* The period of the deltas. It is wrong if the deltas arrive at another rate.
+Checked are the poses' byte order, and the deltas' frame and period.
 
 This module knows what the data means under each setting; it does not know how the user is informed.
 """
@@ -23,28 +18,24 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""Number of poses that prove a setting wrong, if they contradict it and no pose confirms it.
+"""Number of poses (2 s) that prove a setting wrong.
 
-The board sends this number of poses in 2 s.
+All must contradict the setting.
 """
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
-"""``SMALLEST``, ``LARGEST``: limits for a coordinate's absolute value, in mm or mrad.
+"""``SMALLEST``, ``LARGEST``: limits of a coordinate other than 0, in mm or mrad.
 
-A coordinate may also be 0. A value outside the limits shows that its bytes were read in the wrong
-order.
+A value outside was read in the wrong byte order.
 """
 POSE_PERIODS: Final = 2
 """Longest time between two poses that are compared, in pose periods. So one pose between them may
 be lost."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""``CLEARLY_M``, ``TIMES``: limits above which a pose contradicts the configured frame of the
-deltas.
+"""``CLEARLY_M``, ``TIMES``: when a pose contradicts the configured frame of the deltas.
 
-The deltas since the last pose are added to that pose, once in the configured frame and once in the
-other frame. Each sum has a distance from the new pose. The pose contradicts the configured frame if
-the first distance is above ``CLEARLY_M``, in m, and above ``TIMES`` times the second distance.
+The summed deltas must miss the pose by ``CLEARLY_M`` in m, and by ``TIMES`` the other frame's miss.
 """
 
 FEWEST_DELTAS: Final = 10
@@ -88,8 +79,8 @@ class MisconfigurationChecks:
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
         """Check the period of the deltas, with a delta that arrived at ``now`` in s.
 
-        ``imus``: number of IMU frames received since the previous delta, which shows the period.
-        Some IMU frames may be lost, so arrival times must confirm this period.
+        ``imus``: IMU frames since the previous delta. Some may be lost, so arrival times must
+        confirm.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:
@@ -113,7 +104,7 @@ class MisconfigurationChecks:
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
         """Check the byte order of the poses, and the frame of the deltas, with a new pose.
 
-        ``reading``: the pose as the settings interpret it. ``order``: the configured byte order.
+        ``reading``: the pose by the settings. ``order``: configured byte order.
         """
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))

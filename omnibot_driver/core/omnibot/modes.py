@@ -2,12 +2,8 @@
 
 """The board's modes as a table: how the letters S, P and R and the board's data change the mode.
 
-Source: the manual's "Operation State Machine" and "System state command".
-
-The board does not report its mode, so the driver infers it from the data that it *receives*. A
-letter that was sent proves nothing, because the board may have missed it. After R the mode is
-unknown. P toggles between paused and running, so the driver sends P only while it knows that the
-board is running.
+Source: the manual's "Operation State Machine" and "System state command". A sent letter proves
+nothing; only *received* data shows the mode. P toggles, so it is sent only to a running board.
 """
 
 from enum import Enum

@@ -2,8 +2,7 @@
 
 """The rates at which a running board sends each kind of frame.
 
-The manual contradicts itself about deltas: 25 Hz in its frame table, 10 Hz in its mode list. So the
-period of the deltas is a setting. The other rates follow from it.
+The period of the deltas is a setting: the manual says both 25 Hz and 10 Hz.
 
 This module knows rates; it does not know what a frame contains.
 """
@@ -22,7 +21,7 @@ DELTAS_MISSING: Final = 6
 FEWEST_ALONE: Final = 25
 """Least number of IMU frames, without a delta between them, that show IMU-only mode.
 
-This number is enough even if the board sends deltas less often than the setting says.
+Enough for any period of the deltas.
 """
 
 _IMU_BYTES_PER_S: Final = 1400

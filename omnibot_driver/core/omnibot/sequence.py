@@ -2,10 +2,8 @@
 
 """The counters of the board's deltas and poses: missing deltas, and whether the board restarted.
 
-SEQ, the counter of the deltas, is one byte. At 25 Hz it returns to 0 every 10.24 s, and arrival
-times show how often it has done so. Poses have a counter of their own. A pose comes with every
-fifth delta, or with every second delta at 10 Hz. So a pose can reveal lost deltas before the next
-delta does.
+SEQ wraps every 10.24 s at 25 Hz; arrival times show how often. Poses have their own counter, and
+reveal lost deltas sooner.
 
 This module knows counters and arrival times; it does not know what a frame contains.
 """
@@ -18,24 +16,20 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""A restart is assumed if the elapsed time and the time that the counter shows differ by more than
-this time, in s.
+"""Smallest difference of elapsed and counted time, in s, that suggests a restart.
 
-The possible drift of the board's clock is added to this limit. The limit is about twice the largest
-error of arrival times, 0.24 s. This error occurs when the host's buffer is full (4096 bytes, 2.4 s)
-and lacks one byte in ten.
+The clock's drift is added. Arrival times err by up to 0.24 s (full host buffer, every tenth byte
+lost).
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and so of the time that the counter shows.
 
-After a silence of minutes, the error may be seconds. After such a silence, only the board's pose is
-reliable evidence of a restart. The counter is not.
+After minutes of silence, only the board's pose proves a restart.
 """
 EARLY_S: Final = 0.2
-"""After a restart, the counter may show at most this much more time, in s, than has elapsed.
+"""Largest excess of counted over elapsed time after a restart, in s.
 
-The elapsed time is too short if the last delta before the restart was read late. A restart of the
-board takes longer than this tolerance.
+The last delta before the restart may be read late. A restart takes longer than this.
 """
 
 
@@ -43,12 +37,9 @@ board takes longer than this tolerance.
 class Step:
     """What the counter of a new delta or pose shows, compared with its previous value.
 
-    ``lost``: number of missing deltas that were not reported before.
-
-    ``duration_s``: time in s that the delta covers; None if this is unknown.
-
-    ``restarted``: whether the counter seems to have restarted from zero. Only the board's pose can
-    prove a restart.
+    * ``lost``: number of missing deltas that were not reported before.
+    * ``duration_s``: time that the delta covers; None if unknown.
+    * ``restarted``: the counter seems to restart; only the board's pose proves it.
     """
 
     lost: int
@@ -75,8 +66,7 @@ class Sequence:
         self._ahead: int | None = None
         """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        A counter that is too high may have a flipped bit, or its bytes may not be a true frame.
-        Until another delta continues this counter, lost deltas are computed from the elapsed time.
+        It may be damaged: until a delta continues it, elapsed time gives the losses.
         """
         self._left: tuple[int, float, int] | None = None
         """The last counter before a supposed restart, its arrival time in s, and the first counter
@@ -93,8 +83,7 @@ class Sequence:
     def delta(self, count: int, now: float, *, imus: int = 0) -> Step:
         """Return what the counter of a new delta shows about lost deltas and about a restart.
 
-        ``count``: the counter. ``now``: arrival time of the delta in s. ``imus``: number of IMU
-        frames since the previous delta.
+        ``now``: arrival in s. ``imus``: IMU frames since the previous delta.
         """
         self._take_back(count, now)
         period_s, per_pose = self._period_s, self._per_pose
@@ -135,8 +124,8 @@ class Sequence:
     def pose(self, count: int, now: float) -> Step:
         """Return what the counter of a new pose shows about lost deltas and about a restart.
 
-        ``count``: the counter. ``now``: arrival time of the pose in s. In the result, ``lost`` is
-        the number of missing deltas whose motion the pose includes.
+        ``now``: arrival in s. ``lost`` of the result: missing deltas whose motion the pose
+        includes.
         """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0

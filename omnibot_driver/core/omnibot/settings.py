@@ -14,18 +14,11 @@ from omnibot_driver.core.omnibot.frames import ByteOrder
 class OmniBotSettings:
     """Facts about a board that its data does not show.
 
-    ``baudrate``: in bits per second, with ten bits per byte.
-
-    ``linear_scale``, ``angular_scale``: LSB per m/s and LSB per rad/s of a commanded velocity.
-
-    ``position_scale``, ``heading_scale``: LSB per m and LSB per rad of a commanded pose.
-
-    ``delta_frame``: what the board's deltas are. "earth": differences of positions in the board's
-    earth frame. "body": motion along the board's own axes. "wheel_counts": encoder counts of the
-    wheels A, B and C, as older firmware sends them.
-
-    ``delta_period_s``: time between two deltas in s, one of ``schedule.DELTA_PERIODS_S``. This
-    period must not change while the ``OmniBot`` exists.
+    * ``linear_scale``, ``angular_scale``: LSB per m/s and per rad/s of a commanded velocity.
+    * ``position_scale``, ``heading_scale``: LSB per m and per rad of a commanded pose.
+    * ``delta_frame``: "earth", "body", or encoder "wheel_counts" (older firmware).
+    * ``delta_period_s``: one of ``schedule.DELTA_PERIODS_S``; constant while the ``OmniBot``
+      exists.
     """
 
     baudrate: int = 115200

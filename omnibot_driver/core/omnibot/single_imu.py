@@ -2,14 +2,9 @@
 
 """The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
-For such a read, this path replaces the decoder and the translation. Its readings, and the state
-afterwards, are the same as on the normal path; a test compares both. An IMU frame is accepted only
-when one is due, and only if its values are calm: the acceleration is plausible, and all words are
-close to those of the frame before.
-
-An adapter may deliver the frame in pieces. The pieces are kept until the last one arrives, and are
-then decoded as one frame. If the bytes that follow are not the rest of this frame, the decoder gets
-each piece with its own arrival time.
+Readings and state are the same as on the normal path; a test compares both. Only calm frames that
+are due are accepted. Pieces wait for the last one; if the frame fails, the decoder gets each with
+its own arrival time.
 """
 
 import struct
@@ -37,8 +32,7 @@ def is_begun(
 ) -> bool:
     """Return whether the pieces and ``data`` together are an incomplete IMU frame that is due.
 
-    If ``GAP_S`` or more has passed since the first piece, the result is False, because the decoder
-    must judge this pause.
+    False after ``GAP_S``: the decoder must judge such a pause.
     """
     if pieces:
         data = joined(pieces) + data
@@ -62,11 +56,8 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    In three cases this function returns None and changes nothing:
-
-    * The first piece arrived ``GAP_S`` or more before ``now``.
-    * ``take_single`` rejects the frame.
-    * The frame may have lost bytes, so that its last byte may belong to the next header.
+    Return None and change nothing if ``GAP_S`` has passed, the frame is rejected, or a byte may be
+    lost.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -94,11 +85,8 @@ def take_single(
 ) -> ImuReading | None:
     """Return the reading of ``data`` if it is one calm IMU frame that was due.
 
-    In all other cases this function returns None and changes nothing. A calm frame differs little
-    from the IMU frame before it. The last byte is assumed to belong to this frame and not to the
-    next header: either all bytes came in one read, or ``take_pieces`` has checked the last byte.
-
-    ``now``: arrival time of the first bytes in s. ``first``: number of bytes that arrived then.
+    Otherwise return None and change nothing. ``now``: arrival of the ``first`` bytes, in s. If they
+    are fewer than all, the caller (``take_pieces``) has checked the last byte.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -2,8 +2,7 @@
 
 """The translation of frames into readings in SI units, with the number of lost frames.
 
-Source: the board's manual ver. 0.3. On the line, the units of deltas are 0.1 mm and 0.1 mrad, and
-those of poses are mm and mrad.
+Source: the manual ver. 0.3. Deltas are in 0.1 mm and 0.1 mrad; poses in mm and mrad.
 """
 
 import math
@@ -42,12 +41,9 @@ POSE_LSB_RAD: Final = 1e-3
 class Translation:
     """Translates the frames of one line, and infers the board's mode and wrong settings from them.
 
-    ``settings``: may be replaced at any time, except its ``delta_period_s``.
-
-    ``singles_to_come``: number of IMU frames that ``single_imu`` may take without calling this
-    class.
-
-    ``heard_s``: arrival time in s of the last decoded bytes.
+    * ``settings``: may be replaced, except ``delta_period_s``.
+    * ``singles_to_come``: IMU frames that ``single_imu`` may take without this class.
+    * ``heard_s``: arrival time in s of the last decoded bytes.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:
@@ -72,11 +68,10 @@ class Translation:
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
-        """Return the readings of the frames that one read brought.
+        """Return the readings of the frames that one read brought at ``now``.
 
-        ``skipped``: for each frame, the number of bytes before it that belong to no frame. ``now``:
-        time of the read in s. The bytes of a read arrived one after another, so the arrival time of
-        each frame is estimated.
+        ``skipped``: discarded bytes before each frame. Each frame's arrival is estimated, because
+        bytes arrive one by one.
         """
         self._catch_up()
         before_s, self.heard_s = self.heard_s, now

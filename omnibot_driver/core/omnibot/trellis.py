@@ -2,21 +2,11 @@
 
 """The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
-The search looks for the shortest path in a graph. Each place between two bytes has two nodes. At
-the first node, a frame ends or begins. The second node is within a run of unexplained bytes (a bad
-run). An edge is a complete frame, a damaged frame, or one or more unexplained bytes. The price of
-an edge comes from ``cost_model``. The shortest path is the best interpretation. A frame on this
-path is sure if every other interpretation of its first byte costs more by at least ``SURE``.
-
-The price of content depends on the context, that is, on what earlier frames show. The context of a
-node is the context at the end of the cheapest path to that node.
-
-To save time, the search has a cost limit. The search omits every edge that must lead to a path
-above this limit (``lower_bound``). The search raises the limit until no omitted edge can change the
-result. Work and memory are proportional to the length of the stretch.
+The search looks for the shortest path in a graph. Edges are frames, damaged frames and unexplained
+bytes. ``cost_model`` gives their prices. Time and memory grow in proportion to the length.
 
 This module knows how a line damages the shapes of frames; it does not know which frames are
-accepted (``decoder``).
+accepted.
 """
 
 from bisect import bisect_left
@@ -37,17 +27,19 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""A frame is sure if each other interpretation of its first byte costs at least this much more. A
-cost that is higher by this much means an interpretation that is at least 30 times less likely."""
+"""Least extra cost of each other interpretation of a sure frame's first byte.
+
+Such an interpretation is at least 30 times less likely.
+"""
 STEP: Final = 5.5
 """First cost limit of the search, above the lower bound of the cost.
 
-If the search finds no path below this limit, it raises the limit and begins again.
+The limit rises until the search finds a path.
 """
 BEYOND: Final = 0.025
-"""A small amount that is added to the cost limit: half of 0.05, the step of all prices.
+"""Small addition to the cost limit: half of 0.05, the step of all prices.
 
-So a sum of prices never equals the limit, and rounding errors have no effect.
+So rounding errors have no effect.
 """
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
@@ -84,10 +76,8 @@ _BEGINNINGS: Final = (_HEADER, _TEXT)
 class Segment:
     """A complete frame of the best interpretation.
 
-    ``start``, ``end``: its position among the bytes. ``before``, ``after``: the contexts before and
-    after it.
-
-    ``sure``: whether every other interpretation of the frame's first byte costs clearly more.
+    * ``start``, ``end``: its position among the bytes.
+    * ``sure``: whether every other interpretation of its first byte costs clearly more.
     """
 
     start: int
@@ -115,8 +105,7 @@ def read(
 ) -> list[Segment]:
     """Return the complete frames of the best interpretation of ``data``.
 
-    ``in_step``: whether an accepted frame ended right before ``data``. ``closed``: whether the line
-    was closed, so that no more bytes follow.
+    ``in_step``: an accepted frame ended right before. ``closed``: no more bytes follow.
     """
     search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)
@@ -152,6 +141,7 @@ class _Search:
         step = STEP
         limit = self._least[1] + step + BEYOND
         while True:
+            # Edges above the limit are omitted. The limit rises until no omitted edge can matter.
             self._forward(in_step, closed, limit)
             best = self._cost[self._end]
             if best + SURE <= limit:
@@ -269,7 +259,7 @@ class _Search:
     def _context(self, node: int) -> Context:
         """Return the context on the cheapest path to ``node``.
 
-        After a damaged frame or a bad run, only a small part of the context is known.
+        After a damaged frame or a bad run, little of it is known.
         """
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:

@@ -2,11 +2,7 @@
 
 """The diagnosis: a status for each part of the driver, with what an operator should do.
 
-The levels are those of diagnostic_msgs:
-
-* ERROR: the robot cannot be used, or must not be used.
-* WARN: the robot can be used, but the operator should check something.
-* STALE: the condition of this part is unknown.
+ERROR: the robot cannot or must not be used. WARN: check something. STALE: unknown.
 
 This module knows figures and times; it does not know how the figures are obtained.
 """
@@ -30,7 +26,7 @@ LARGEST_SKEW_PPM: Final = 115.0
 SKEW_KNOWN_S: Final = 75.0
 """Time in s for which one arrival time affects the estimated clock skew.
 
-A skew that lasts for less than this time is not reported, because it may come from a busy computer.
+A shorter skew may come from a busy computer, so it is not reported.
 """
 
 BUSY_SHARE: Final = 0.1
@@ -52,7 +48,7 @@ readings of that kind."""
 class Diagnosis:
     """The diagnosis of one board, made about once a second from recent figures.
 
-    ``to_check``: what the operator should check if no valid data comes from the board.
+    * ``to_check``: what to check if no valid data comes.
     """
 
     def __init__(self, to_check: str) -> None:

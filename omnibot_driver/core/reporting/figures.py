@@ -14,15 +14,10 @@ from omnibot_driver.core.readings import Vector3
 class LinkFigures:
     """The figures of the link to the board.
 
-    ``trouble``: a sentence that says why the port is not open; empty while the port is open.
-
-    ``opened``: how often the port was opened.
-
-    ``overruns``: how often the kernel has lost bytes since the port was last opened; None if this
-    is not counted.
-
-    ``waited_s``: time in s for which the reader has waited for the processor; None if this is not
-    counted.
+    * ``trouble``: why the port is not open, as a sentence; empty while open.
+    * ``opened``: how often the port was opened.
+    * ``overruns``: how often the kernel lost bytes since then; None: not counted.
+    * ``waited_s``: the reader's wait for the processor, in s; None: not counted.
     """
 
     port: str
@@ -46,16 +41,10 @@ class Refusals:
 class CommandFigures:
     """The figures of the commands.
 
-    ``source``: the topic that commands the robot now, or None.
-
-    ``age_s``: age in s of the last command from this topic.
-
-    ``monitored``: whether the motion monitor stops a robot that does not move as commanded.
-
-    ``trips``: how often the motion monitor has stopped the robot.
-
-    ``interlock``: a sentence that says why motion is refused, with a remedy; empty while motion is
-    allowed.
+    * ``source``: the topic that commands the robot now, or None.
+    * ``age_s``: age in s of its last command.
+    * ``trips``: how often the motion monitor has stopped the robot.
+    * ``interlock``: why motion is refused, with a remedy; empty if allowed.
     """
 
     source: str | None = None
@@ -71,11 +60,8 @@ class CommandFigures:
 class ImuFigures:
     """The figures of the IMU.
 
-    ``gravity_mps2``, ``noise_radps``: values that were measured at the last standstill; None before
-    the first standstill.
-
-    ``advice``: a sentence that names the parameter that contradicts the measured gravity; empty if
-    there is no contradiction.
+    * ``gravity_mps2``, ``noise_radps``: at the last standstill; None before the first.
+    * ``advice``: names the parameter that contradicts the measured gravity; or empty.
     """
 
     bias_radps: Vector3
@@ -88,10 +74,8 @@ class ImuFigures:
 class SessionFigures:
     """The figures of the board, its readings and its commands.
 
-    ``skew_ppm``: how much faster the board's clock runs than the host's, in ppm.
-
-    ``task``: name, elapsed time and time limit of the board's long task, as text; empty without a
-    long task.
+    * ``skew_ppm``: how much faster the board's clock runs than the host's.
+    * ``task``: name, elapsed time and limit of the long task; or empty.
     """
 
     state: str

@@ -2,7 +2,7 @@
 
 """Notices about lost data, unconfirmed stops and silence, each with a remedy.
 
-A notice is given once, or at a limited rate. This module knows counts, times and texts only.
+Each is given once or at a limited rate. This module knows counts, times and texts only.
 """
 
 import math
@@ -56,8 +56,7 @@ class ThrottledNotice:
     def since_told(self, count: int, now: float) -> int:
         """Return how much the counter has grown since its last report, if a new report is due.
 
-        The result is 0 if the last report is less than ``NEWS_S`` old. ``count``: the counter's
-        value.
+        Return 0 within ``NEWS_S`` of the last report.
         """
         if count == self._told or now - self._told_at < NEWS_S:
             return 0
@@ -78,8 +77,7 @@ class Notices:
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
         """Return notices of lost frames and rejected readings that were not reported before.
 
-        ``lost``: number of odometry frames lost so far. ``overruns``: number of overruns of the
-        serial port so far. ``refused``: numbers of readings rejected so far.
+        All counts are totals. ``lost``: odometry frames. ``overruns``: of the serial port.
         """
         news = []
         if overruns != self._overruns:
@@ -108,11 +106,10 @@ class Notices:
         return [sentence]
 
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
-        """Return the notice that a stop is unconfirmed.
+        """Return the notice that a stop is unconfirmed: Stop was repeated in vain.
 
-        The driver has repeated Stop until its time limit, and has not measured a standstill.
-        ``measured``: whether displacements arrived in this time. ``blind``: whether the board did
-        not measure its wheels after the last command.
+        ``measured``: displacements arrived. ``blind``: the board did not measure its wheels after
+        the last command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
@@ -125,8 +122,7 @@ class Notices:
     def standing(self, sentence: str) -> list[str]:
         """Return the sentence as a list when its condition begins to hold; else an empty list.
 
-        While the condition does not hold, the caller passes an empty sentence. So the condition
-        begins to hold when a sentence follows an empty one.
+        Pass an empty sentence while the condition does not hold.
         """
         before, self._standing = self._standing, sentence
         return [sentence] if sentence and not before else []
@@ -135,8 +131,7 @@ class Notices:
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
     """Return a sentence that reports missing data and says what to check.
 
-    ``silence_s``: time in s without valid data. ``bytes_came``: whether invalid bytes arrived in
-    this time. ``baudrate``: whether the port has a baud rate.
+    ``bytes_came``: invalid bytes arrived. ``baudrate``: the port has a baud rate.
     """
     if bytes_came:
         return (

@@ -66,10 +66,9 @@ class RecentFigures:
         return {name: count / self.span_s for name, count in counts.items()}
 
     def delay_s(self) -> tuple[float, float] | None:
-        """Return the mean and the standard deviation, in s, of the delays of recent reads.
+        """Return mean and standard deviation of recent reads' delays, in s; None without reads.
 
-        A delay is relative to the least delayed read. The result is None if there are no recent
-        reads.
+        Delays are relative to the least delayed read.
         """
         old, new = self._window[0][1].tally, self._window[-1][1].tally
         reads = new.reads - old.reads

@@ -2,8 +2,7 @@
 
 """A clock for boards whose readings carry no time and have no regular tick.
 
-``ArrivalClock`` has the same methods as ``DeviceClock``. It receives times as arguments, and does
-not read a clock itself.
+``ArrivalClock`` has the methods of ``DeviceClock``. The caller passes the time.
 """
 
 import math
@@ -19,7 +18,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time, in increasing order.
 
-    A stamp is later than the arrival time only if the previous stamp has already reached that time.
+    A stamp exceeds the arrival only if the previous stamp reached it.
     """
 
     skew_ppm = 0.0

@@ -2,32 +2,10 @@
 
 """The time of each tick: a straight line over the ticks, fitted to bounds of their times.
 
-The bytes of a tick arrive late, never early. So all arrivals are on or above the line, and the
-line's slope is the true period. Bytes that a read did not bring were sent after that read. So the
-line cannot be far below the arrivals either. The ticks are divided into blocks. Of each block, at
-most two points are kept:
+A block keeps its *latest* point (upper bound: least delayed arrival) and its *earliest* (lower
+bound: a tick not yet read). docs/internals/time.md explains the fit.
 
-* *Latest*: the arrival with the smallest delay. This upper bound is always valid. After bursts,
-  stalls and losses it is higher than necessary.
-* *Earliest*: a tick that a read did not bring, and the time of this read. This lower bound is too
-  high if the read was late, so the highest tenth of these bounds is left out. A bound that is far
-  below the arrivals is of little use, and is not kept.
-
-The line is placed in one of two ways:
-
-* *Between*: in the middle of all bounds. Each latest point and each earliest point together limit
-  the slope. If an adapter's timer hides the true arrival times for seconds, the error is at most
-  half the distance between the bounds.
-* *Under*: as closely as possible under the latest points, along an edge of their lower convex hull.
-  This way is used if there are no earliest points, or if the bounds contradict each other because
-  reads were late.
-
-A read that ends within a sample cuts that sample. A cut sample has not waited to be read. So if
-some latest points are cut samples, a line that is placed under the points uses only these. If all
-latest points are cut samples, the line is always placed under them.
-
-This module knows ticks and times, in s of the host's steady clock; it does not know what is
-sampled, nor how ticks are counted.
+This module knows ticks and times; it does not know what is sampled, nor how ticks are counted.
 """
 
 import math
@@ -38,10 +16,9 @@ from typing import Final
 BLOCK_TICKS: Final = 100
 """Number of ticks in a block: one second of 10 ms ticks."""
 BLOCKS_KEPT: Final = 75
-"""Number of blocks that are kept; together they cover 75 s.
+"""Number of blocks that are kept: 75 s.
 
-If the period of an adapter's timer and the board's tick differ by 100 ppm from their nominal ratio,
-their phases repeat every 20 s. So the blocks cover several repetitions.
+A phase between adapter timer and tick, 100 ppm off, repeats every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
@@ -49,8 +26,7 @@ margin."""
 SUPPORT: Final = 0.75
 """Place at which the line touches the points' hull, as a fraction of the hull's time span.
 
-The place is late enough to follow recent points, and early enough not to follow the jitter of the
-last second.
+Late enough for recent points, early enough against jitter.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -59,11 +35,9 @@ LATE_PART: Final = 0.1
 """Largest assumed fraction of late reads. A read is late if its delay exceeds ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest allowed distance of an earliest point below a latest point, as a fraction of a period.
+"""Largest distance of an earliest point below a latest point, as a fraction of a period.
 
-An earliest point that is farther below is not kept. With a timer of 16 ms in the adapter, the
-distance can be 2 ms, a fifth of the period: reads occur at phases of the 10 ms tick that are 2 ms
-apart.
+A 16 ms timer in the adapter causes 2 ms, a fifth of the tick.
 """
 
 Point = tuple[int, float]
@@ -73,9 +47,7 @@ Point = tuple[int, float]
 class ClockFit:
     """The line that gives the time of each tick, from the first tick seen on.
 
-    ``period_s``: the nominal period in s.
-
-    ``slope_s``: the fitted period in s.
+    * ``slope_s``: the fitted period in s; ``period_s`` is nominal.
     """
 
     def __init__(self, period_s: float, first: Point) -> None:
@@ -96,7 +68,7 @@ class ClockFit:
     def see(self, latest: Point, *, cut: bool) -> None:
         """Add an upper bound: the newest tick of a read, and a time in s by which it had arrived.
 
-        ``cut``: whether the read ended within this tick's sample.
+        ``cut``: the read ended within its sample.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
@@ -124,6 +96,7 @@ class ClockFit:
             is_near = 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s
             if is_near and (not self._earliest or self._earliest[-1][0] < tick):
                 self._earliest.append(earliest)
+        # A cut sample has not waited to be read, so it is the better upper bound.
         always_cut = all(was_cut for _, was_cut in self._latest)
         if always_cut or not (self._earliest and self._lay_between()):
             self._lay_under()

@@ -2,18 +2,8 @@
 
 """Sampling times from arrival times: the board's clock, as seen by the host's clock.
 
-The board samples once a tick, controlled by its own crystal. The bytes from the board arrive with a
-delay that is unknown and always changes. They never arrive before they were sent. For each reading,
-two questions must be answered.
-
-*Which tick is it?* Each IMU reading is one tick. IMU readings that are reported as lost are counted
-too. Some IMU readings are lost without a report. The counter in the displacements shows how many.
-Until the next displacement arrives, or on a board without displacements, arrival times show these
-losses. A read takes all bytes that have arrived. So the newest tick of a read is hardly older than
-one period, and never in the future.
-
-*When was it?* ``ClockFit`` fits a line to the arrivals. The error that remains in the stamps is
-constant: it is the smallest delay that ever occurs.
+Ticks are counted, and ``ClockFit`` gives their times. One constant error remains: the smallest
+delay that ever occurs. docs/internals/time.md explains why.
 
 This module knows readings and times; it reads no clock and does not know any board's bytes.
 """
@@ -40,13 +30,13 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
-If an adapter delivers every 16 ms, the reads occur at five different phases of the 10 ms tick. So
-12 reads contain each phase at least twice.
+A 16 ms adapter reads at five phases of the tick: each occurs twice.
 """
 CALM: Final = 0.45
-"""Largest distance of a read from the line, as a fraction of a period, at which the tick of the
-read is certain. The previous read must be as near to the line. The fraction must be less than a
-half."""
+"""Largest distance from the line, in periods, of a read whose tick is certain.
+
+The previous read must be as near. Must be below 0.5.
+"""
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period. So if the line
 rises, the stamps approach it slowly."""
@@ -60,9 +50,7 @@ WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 class DeviceClock:
     """Stamps readings with the times at which the board sampled them, estimated from arrivals.
 
-    The board sends one ImuReading in each tick.
-
-    ``period_s``: the nominal period of the tick, in s.
+    The board sends one ImuReading per tick of ``period_s`` (nominal).
     """
 
     def __init__(self, period_s: float) -> None:
@@ -91,15 +79,15 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        If two new ticks are seen within half a period, both had waited to be read.
+        Two new ticks within half a period had both waited.
         """
         self._awaited: Point | None = None
         """Lower bound for the tick after the newest one: at this time in s, it had not arrived
         yet."""
         self._cut_off: Point | None = None
-        """Lower bound for the tick whose sample the last read cut; None if no sample was cut.
+        """Lower bound for the tick whose sample the last read cut, or None.
 
-        The bound is valid only if the rest of the sample arrives.
+        Valid only if the rest of the sample arrives.
         """
 
     @property
@@ -113,10 +101,8 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling times in s of the readings that a read at ``now`` completed.
 
-        ``edge``: where the read ended among the samples; None if this is unknown.
-
-        Stamps increase from tick to tick, and no stamp is later than ``now``. A displacement has
-        the stamp of the ImuReading of its tick.
+        They increase per tick, up to ``now``. A displacement has its tick's stamp. ``edge``: the
+        read's end; None: unknown.
         """
         ticks = self._count(readings)
         if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
@@ -150,9 +136,7 @@ class DeviceClock:
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """Return the stamp in s of one reading that came alone and on time, else None.
 
-        If the result is None, nothing has changed, and ``stamps`` must be called. On a board with
-        an IMU, most reads bring one reading on time. For such a read, this method is faster than
-        ``stamps``.
+        This is the fast path. None changes nothing: call ``stamps`` then.
         """
         if reading.lost:
             return None
@@ -207,7 +191,7 @@ class DeviceClock:
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
         """Compare the newest arrival with the line; return how many ticks were not counted so far.
 
-        ``counted``: whether the counter in the displacements has confirmed the number of this tick.
+        ``counted``: whether displacements confirm the tick's number.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -254,8 +238,7 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
 
-        If another tick was read just before, both ticks had waited to be read. In this case only
-        the delay of the new tick is kept.
+        Of ticks read together, only the last delay is kept.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -270,8 +253,8 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set the stamp of a tick to the line's time, but limit the step from the last stamp.
 
-        ``latest_s``: latest allowed stamp. ``room_s``: a step in s after which the later stamps of
-        this read are still possible. No stamp may be later than the read.
+        ``latest_s``: latest allowed stamp. ``room_s``: step that leaves room for this read's later
+        stamps.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

@@ -2,9 +2,8 @@
 
 """The simulated OmniBot board for tests of the driver, written from the manual of the real board.
 
-The package shares no code with the driver, so that tests can reveal a misread manual.
-``SimulatedBoard`` works in board time and uses no ports. ``PtyBoard`` runs it in real time, and
-``python -m omnibot_driver.simulator`` does so from the command line.
+It shares no code with the driver, so tests can reveal a misread manual. ``python -m
+omnibot_driver.simulator`` runs it in real time.
 """
 
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults

@@ -2,8 +2,8 @@
 
 """Kinematics of the three omni wheels (manual, Control equation and Odometry equation).
 
-This module knows the kinematics, and how a displacement changes a pose. It knows neither encoder
-counts, nor time, nor whose pose it is, nor the scales of commands.
+This module knows the kinematics. It knows neither encoder counts, nor time, nor the scales of
+commands.
 """
 
 from math import cos, pi, sin
@@ -26,8 +26,7 @@ class PlanarPose(NamedTuple):
     def moved(self, dx_body_m: float, dy_body_m: float, dyaw_rad: float) -> "PlanarPose":
         """Return the pose after a displacement in the body frame, in m and rad.
 
-        The displacement is rotated by the heading in the middle of the step (manual, Odometry
-        equation).
+        Rotated by the heading in the middle of the step (manual, Odometry equation).
         """
         heading_rad = self.yaw_rad + dyaw_rad / 2
         c, s = cos(heading_rad), sin(heading_rad)
@@ -41,7 +40,7 @@ class PlanarPose(NamedTuple):
 def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) -> Wheels:
     """Return the rim speeds (or distances) of wheels A, B, C for a body twist (or displacement).
 
-    Linear values are in m/s (or m), ``yaw_rate`` is in rad/s (or rad).
+    In m/s and rad/s (or m and rad).
     """
     turning = base_radius_m * yaw_rate
     return (
@@ -54,8 +53,7 @@ def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) 
 def body_from_rims(rims: Wheels, base_radius_m: float) -> tuple[float, float, float]:
     """Return the body twist (or displacement) for rim speeds (or distances) of wheels A, B, C.
 
-    This is the manual's odometry matrix. Linear values are in m/s (or m), the last one is in rad/s
-    (or rad).
+    Source: the manual's odometry matrix. In m/s and rad/s (or m and rad).
     """
     a, b, c = rims
     return (

@@ -2,22 +2,11 @@
 
 """The board's firmware: its modes, the 100 Hz control loop, and when each frame is sent.
 
-The firmware receives bytes, advances by one tick, and returns bytes. The same settings and input
-always give the same output. This module knows the manual's state machine and control equations. It
-must not know ports or real time.
+The same settings and input always give the same output. Comments mark what is assumed because the
+manual is silent.
 
-Where the manual says nothing, or contradicts itself, this module assumes:
-
-- The control loop runs from the end of the boot, and also while the board is paused (motors off).
-  So the first 25 Hz difference after a pause includes motion during the pause. The output periods
-  are counted from the end of the boot.
-- For the difference frame, the manual's list of modes has 10 Hz, but its frame table has 25 Hz. The
-  setting ``delta_period_s`` selects one of them.
-- Pausing and emergency stop switch the motors off; friction stops the wheels within 0.3 s.
-- The number in the paused text starts from zero each time the board becomes paused.
-- With the switch on positional control, the goal determines the wheels' targets (``position``).
-- A control frame whose mode the manual does not name is consumed and ignored.
-- A setting selects how commands are found among the bytes (``receivers``).
+This module knows the manual's state machine and control equations. It must not know ports or real
+time.
 """
 
 from collections import deque
@@ -82,14 +71,11 @@ _LETTER_KINDS: dict[StateLetter, CommandKind] = {
 class SimulatedBoard:
     """An OmniBot board with its robot.
 
-    tick: number of control ticks of 10 ms since construction.
-    mode: current mode.
-    estopped: whether an emergency stop is in effect.
-    commands: commands that the board obeyed, newest last. Motion commands that it refused because
-        of a latched emergency stop are not included.
-    sent: frames and texts that the board sent, newest last.
-    received: all bytes that reached the board's serial port, also during the boot. At more than a
-        million bytes, the older half is discarded.
+    * ``tick``: number of control ticks of 10 ms since construction.
+    * ``estopped``: whether an emergency stop is in effect.
+    * ``commands``: commands that the board obeyed, newest last.
+    * ``sent``: frames and texts that the board sent, newest last.
+    * ``received``: all bytes that reached the board; of a million, the older half is discarded.
     """
 
     channels = CHANNELS
@@ -143,10 +129,9 @@ class SimulatedBoard:
         return self._odometry.reported
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Hold the robot by hand.
+        """Hold the robot by hand: tilt in rad, left turn in rad/s.
 
-        The arguments are the tilt in rad, and the rate in rad/s at which the robot is turned left.
-        Only the IMU senses the tilt and the turn. The true pose does not change.
+        Only the IMU senses both; the true pose does not change.
         """
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
@@ -183,10 +168,7 @@ class SimulatedBoard:
     def receive(self, data: bytes, at_s: float | None = None, channel: int = 0) -> None:
         """Receive bytes, in chunks of any size. Each command takes effect at once.
 
-        at_s: arrival time of the first byte, in s by any monotonic clock. The default is the time
-            of the last tick. The other bytes follow without a pause. Only a receiver that detects
-            idle gaps uses this time.
-        channel: ignored, because the board has only one channel.
+        ``at_s``: arrival of the first byte, in s; default: the last tick. ``channel``: ignored.
         """
         self.received += data
         if len(self.received) > RECEIVED_LOG_BYTES:
@@ -215,6 +197,8 @@ class SimulatedBoard:
                 return b""
             self._pause()
         else:
+            # Assumed: the output periods count from the end of the boot, and the loop also runs
+            # while paused.
             self._ticks_since_boot += 1
             self._control()
         if self.mode is BoardMode.PAUSED:
@@ -244,6 +228,7 @@ class SimulatedBoard:
             self._pause()
 
     def _obey_frame(self, frame: ControlFrame) -> None:
+        # Assumed: a frame whose mode the manual does not name is consumed and ignored.
         kind = _FRAME_KINDS.get(frame.mode)
         if kind is None or (kind == "estop" and not self.settings.obeys_estop):
             return
@@ -269,9 +254,11 @@ class SimulatedBoard:
 
     def _pause(self) -> None:
         self.mode = BoardMode.PAUSED
+        # Assumed: the number in the text starts from zero at each pause.
         self._output.pause()
         self._motors_off()
 
+    # Assumed for pauses and emergency stops: friction stops the wheels within 0.3 s.
     def _motors_off(self) -> None:
         self._goal = None
         self._targets = _ALL_ZERO

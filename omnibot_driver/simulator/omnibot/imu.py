@@ -2,9 +2,9 @@
 
 """The IMU, an MPU6050 with the ranges ±2 g and ±250 °/s. By default the IMU is mounted upside down.
 
-This module knows the sensor's scales, axes, bias and noise. It must not know the frame layout. The
-distance between the sensor and the body's origin is ignored. At 0.5 rad/s it would add less than
-0.01 m/s².
+Its distance from the body's origin is ignored.
+
+This module knows the sensor's scales, axes, bias and noise. It must not know the frame layout.
 """
 
 from math import cos, degrees, sin, sqrt

@@ -2,13 +2,10 @@
 
 """One wheel: a motor with its encoder, and the firmware's speed controller for it.
 
-All speeds are in encoder counts per tick, all efforts in PWM steps. The manual does not describe
-the motor. The model is first order with dry friction and a dead zone, driven by a 12-bit PWM. By
-default a steady speed needs 46 PWM steps per count per tick. So the manual's feed-forward of 40
-supplies seven eighths of the effort, and the integrator supplies the rest.
+Speeds are in encoder counts per tick, efforts in PWM steps. The motor model is assumed: first
+order, with dry friction and a dead zone.
 
-This module knows the 100 Hz tick and the controller gains of the manual. It must not know commands,
-geometry or the wire.
+This module must not know commands, geometry or the wire.
 """
 
 from collections import deque
@@ -28,10 +25,11 @@ STICKING_SPEED = 0.3
 class MotorConstants:
     """Properties of one motor.
 
-    pwm_per_count: effort per speed, in PWM steps per count per tick.
-    time_constant_ticks: time constant of the speed, in ticks.
-    friction_pwm: effort lost to dry friction while the wheel turns.
-    delay_ticks: delay from an effort to its effect, in ticks.
+    * ``pwm_per_count``: PWM steps per count per tick; at 46, the feed-forward supplies seven
+      eighths.
+    * ``time_constant_ticks``: of the speed.
+    * ``friction_pwm``: effort lost to dry friction while the wheel turns.
+    * ``delay_ticks``: delay from an effort to its effect.
     """
 
     pwm_per_count: float = 46.0
@@ -72,7 +70,7 @@ class Motor:
     def advance(self, pwm: float, load_pwm: float = 0.0) -> float:
         """Turn for one tick under a constant effort; return the counts turned, not rounded.
 
-        load_pwm: effort of an outside force. This effort acts without the motor's delay.
+        ``load_pwm``: outside force, without the motor's delay.
         """
         constants, start = self._constants, self.speed
         self._on_the_way.append(pwm)
@@ -105,7 +103,7 @@ class WheelController:
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    While u is saturated, the integral term is added only if it reduces the saturation.
+    The integral never increases a saturation.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

@@ -2,12 +2,10 @@
 
 """The firmware's odometry from its encoders (manual, Odometry equation).
 
-The 25 Hz frame contains the motion since the frame before. Each such difference is computed from
-unrounded values, and is rounded afterwards. So a host that adds the differences also adds their
-rounding errors.
+Each 25 Hz frame rounds its own difference, so a host that adds them also adds rounding errors.
 
-This module knows encoder counts, the robot's dimensions as the firmware assumes them, and the units
-of the 25 Hz frame. It must not know modes, time, or the true pose of the robot.
+This module knows encoder counts, the assumed dimensions and units. It must not know modes, time, or
+the true pose.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import PlanarPose, body_from_rims

@@ -2,7 +2,7 @@
 
 """Options of a simulated OmniBot, except its seed and the faults of its line.
 
-This module knows the names, values and effects of options. It must not know what runs the board.
+This module knows options. It must not know what runs the board.
 """
 
 import argparse

@@ -2,8 +2,7 @@
 
 """The board's output other than IMU frames: odometry frames, and the text of a paused board.
 
-This module knows periods, sequence numbers and the number in the text. It must not know the board's
-modes.
+This module knows periods and counters. It must not know the board's modes.
 """
 
 from omnibot_driver.simulator.omnibot.motors import TICK_S

@@ -2,8 +2,8 @@
 
 """Positional control: driving to a commanded pose.
 
-The manual says only that the switch selects this control; the rest is assumed. This module knows
-the units of a commanded pose, and how fast the robot drives to the pose. It must not know wheels.
+The manual describes only the switch; the rest is assumed. This module knows the units and the
+speed. It must not know wheels.
 """
 
 from math import cos, hypot, sin
@@ -18,8 +18,10 @@ SPEED_PER_WAY = 2.0
 FASTEST_MPS = 0.3
 FASTEST_RADPS = 1.0
 ARRIVED = 0.5e-3
-"""If the distance from the goal, in m, is not larger than this, the robot does not drive. If the
-angle from the goal, in rad, is not larger than this, the robot does not turn."""
+"""Largest distance in m, or angle in rad, at which the robot has arrived.
+
+The robot then does not drive, or turn.
+"""
 
 
 def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
@@ -31,10 +33,9 @@ def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
 
 
 def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
-    """Return the twist straight to the goal: along body x and y in m/s, and the yaw rate in rad/s.
+    """Return the twist straight to the goal: body x and y in m/s, and the yaw rate in rad/s.
 
-    The robot turns while it drives. The heading is unwrapped: if the goal's heading is a full turn
-    away, the robot makes this full turn.
+    The robot turns while it drives. Headings are unwrapped: full turns are made.
     """
     dx_m, dy_m = goal.x_m - pose.x_m, goal.y_m - pose.y_m
     way_m, turn_rad = hypot(dx_m, dy_m), goal.yaw_rad - pose.yaw_rad

@@ -2,17 +2,10 @@
 
 """The firmware's receiver: takes bytes, and returns the commands that they complete.
 
-The manual shows the layout of a command, but not how the firmware finds it among the bytes.
-Therefore several receivers exist, and a driver must be safe with each of them. This module knows
-control frames, letters and the time of a byte. It must not know modes or motion.
+The manual does not say how the firmware finds commands. A driver must be safe with each receiver
+here.
 
-- A ``Framing`` is a function without state. Its arguments are the bytes held so far, a new byte,
-  and the pause before this byte in s. It returns the bytes held now, the control frame that the
-  byte completes (or None), and whether the byte may belong to a frame.
-- A setting decides whether state letters act only between control frames, or anywhere. A letter
-  within a control frame does not end the frame.
-- After power-up the receiver discards three arbitrary bytes as its wake-up. A setting decides
-  whether bytes that arrive during the boot are lost, or count as wake-up bytes.
+This module knows control frames, letters and the time of a byte. It must not know modes or motion.
 """
 
 from collections.abc import Callable
@@ -37,7 +30,9 @@ IDLE_GAP_S: Final = 0.005
 FramingName = Literal["counting", "naive", "idle_gap", "window"]
 LetterPlace = Literal["between", "anywhere"]
 Command = StateLetter | ControlFrame
+# The bytes held now, the completed frame or None, and whether the byte may belong to a frame.
 Step = tuple[bytes, ControlFrame | None, bool]
+# Stateless. Arguments: the bytes held, a new byte, and the pause before it in s.
 Framing = Callable[[bytes, int, float], Step]
 
 _FIRST, _SECOND = COMMAND_HEADER
@@ -74,8 +69,7 @@ def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
 def window(held: bytes, byte: int, pause_s: float) -> Step:
     """Accept the last nine bytes as a frame whenever they begin with FF FE.
 
-    Bytes of an accepted frame are searched again, so an FF FE within a frame may begin another
-    frame. While an FF FE is among the last nine bytes, the new byte may belong to a frame.
+    Accepted bytes are searched again, so frames may overlap.
     """
     seen = held + bytes((byte,))
     held = seen[1 - COMMAND_LENGTH :]
@@ -97,9 +91,9 @@ FRAMINGS: Final[dict[FramingName, Framing]] = {
 class ReceiverKind:
     """Selects the behaviour of the receiver.
 
-    framing: how control frames are found.
-    letters: where a byte that is a state letter acts: between control frames, or anywhere.
-    wakes_while_booting: whether bytes that arrive during the boot are part of the wake-up.
+    * ``framing``: how control frames are found.
+    * ``letters``: where state letters act: between control frames, or anywhere.
+    * ``wakes_while_booting``: whether bytes during the boot wake the receiver; else they are lost.
     """
 
     framing: FramingName = "counting"
@@ -113,9 +107,9 @@ COUNTING: Final = ReceiverKind()
 class CommandReceiver:
     """The receiver from one power-up to the next.
 
-    held: the bytes that the framing keeps.
-    last_at_s: arrival time of the last byte. The framing has no other state.
-    to_swallow: number of wake-up bytes still expected.
+    * ``held``: the bytes that the framing keeps.
+    * ``last_at_s``: arrival time of the last byte.
+    * ``to_swallow``: number of wake-up bytes still expected.
     """
 
     def __init__(self, kind: ReceiverKind = COUNTING, *, awake: bool = False) -> None:
@@ -135,8 +129,7 @@ class CommandReceiver:
     def feed(self, byte: int, at_s: float, *, control_frames: bool) -> tuple[Command, ...]:
         """Process the byte that arrives at ``at_s``; return the commands it completes, in order.
 
-        If ``control_frames`` is False, control frames are not recognised, and each of their bytes
-        may act as a state letter.
+        Without ``control_frames``, each byte may act as a state letter.
         """
         if self.to_swallow:
             self.to_swallow -= 1

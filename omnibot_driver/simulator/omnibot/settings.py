@@ -27,40 +27,29 @@ class BoardPose:
 class BoardSettings:
     """Properties of a simulated board, and deviations of its robot from the ideal.
 
-    seed: seed of all random numbers. Two boards with equal settings and input send equal bytes.
-    frame: meaning of the 25 Hz frame (delta). "earth": the difference of two positions in the
-    board's earth frame. "body": the sum of each control tick's displacement in the robot's frame.
-    "wheel_counts": the encoder counts of wheels A, B, C (manual, Deprecated). delta_period_s:
-    period of the 25 Hz frame, in s: a multiple of the tick of 10 ms. The manual also has 10 Hz.
-    imu_only: whether the board runs in IMU only mode instead of nominal mode. linear_scale: LSB per
-    m/s, of Vx and Vy, and of the rim speeds in wheel mode. angular_scale: LSB per rad/s, of Omega.
-    control: position of the on-board switch. With this switch, base vector control commands either
-    a velocity, or a goal pose in the board's own earth frame. position_scale: LSB per m, of X and
-    Y. heading_scale: LSB per rad, of theta, which is unwrapped as in the 5 Hz frame. receiver: how
-    the firmware finds commands among the bytes. obeys_estop: whether an emergency stop frame stops
-    the robot. If not, it is ignored. estop_latches: whether the board refuses all motion after an
-    emergency stop frame until a reset. If not, the next motion command moves the robot again.
-    pose_byte_order: byte order of the three floats of the 5 Hz frame. axis_signs: signs of the
-    board's x, y and yaw relative to the robot's (forward, left, counter-clockwise). wheel_gains:
-    gains of the firmware's three speed controllers. motors: properties of the motors of wheels A,
-    B, C. motor_wiring: for each controller, the motor that it drives, 1 to 3 for wheels A to C. The
-    number is negative if the two poles of the motor are swapped. The encoders are not affected.
-    wheel_radius_m, base_radius_m, counts_per_revolution: values that the firmware assumes (manual,
-    Vehicle Parameters). wheel_radius_scale: true radius of wheels A, B, C divided by
-    ``wheel_radius_m``. base_radius_scale: true distance of the wheels from the centre divided by
-    ``base_radius_m``. slip: mean fraction of each wheel's rim motion that is lost on the floor. The
-    actual fraction varies around this mean, independently for each wheel. slope_pwm: force with
-    which a sloping floor pulls the robot, in PWM steps: the motor effort at the rim that equals
-    this force. The force is along the x axis that the robot had at construction. imu_rpy_rad:
-    mounting of the IMU. Roll, pitch and yaw about fixed axes turn the body's axes into the sensor's
-    axes, as in a URDF. gyro_bias_dps, gyro_noise_dps: in the sensor's axes, in °/s. The noise is
-    rms per reading. gyro_walk_dps: rms change of the gyro bias within 1 s, in °/s. The change grows
-    with the square root of time. accel_bias_g, accel_noise_g: in the sensor's axes, in g. The noise
-    is rms per reading. gyro_stuck: raw counts that the gyro always reads, whatever the motion; None
-    if the gyro works. boot_time_s: time from power-up or reset until the board is paused. Until
-    then the board sends and obeys nothing. initial_pose: the board's own pose at construction, for
-    a board that has already driven. running: whether the board is awake and in its running mode at
-    construction.
+    * ``seed``: boards with equal settings and input send equal bytes.
+    * ``frame``: meaning of the 25 Hz frame. "earth": difference of positions in the board's earth
+      frame. "body": sum of the ticks' displacements. "wheel_counts": see manual, Deprecated.
+    * ``delta_period_s``: a multiple of 10 ms. The manual also has 10 Hz.
+    * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: per rad/s.
+    * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
+    * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad, unwrapped.
+    * ``obeys_estop``: False: an emergency stop frame is ignored.
+    * ``estop_latches``: whether motion is refused until a reset; else until the next motion
+      command.
+    * ``axis_signs``: of the board's x, y and yaw relative to REP-103.
+    * ``motor_wiring``: each controller's motor, 1 to 3; negative: poles swapped, but not the
+      encoder.
+    * ``wheel_radius_m``, ``base_radius_m``, ``counts_per_revolution``: as the firmware assumes.
+    * ``wheel_radius_scale``, ``base_radius_scale``: true value divided by the assumed one.
+    * ``slip``: mean fraction of the rim motion that is lost; varies for each wheel.
+    * ``slope_pwm``: pull of a slope along the initial x axis, in PWM steps.
+    * ``imu_rpy_rad``: turns the body's axes into the sensor's, as in a URDF.
+    * ``gyro_noise_dps``, ``accel_noise_g``: rms per reading, in the sensor's axes.
+    * ``gyro_walk_dps``: rms change of the bias in 1 s; grows with the square root of time.
+    * ``gyro_stuck``: raw counts that a broken gyro always reads.
+    * ``boot_time_s``: until then, the board sends and obeys nothing.
+    * ``running``: awake and in its running mode at construction.
     """
 
     seed: int = 0

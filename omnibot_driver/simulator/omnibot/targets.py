@@ -2,8 +2,7 @@
 
 """Set-points of the wheels (manual, Control equation), in encoder counts per control tick.
 
-This module knows scales, signs and the kinematics. It must not know modes, nor when a set-point
-takes effect.
+This module knows scales, signs and the kinematics. It must not know modes.
 """
 
 from omnibot_driver.simulator.omnibot.chassis import Wheels, rims_from_body

@@ -2,9 +2,8 @@
 
 """The serial protocol from the board's side: layouts of the frames it sends and receives.
 
-This module is written from the manual alone (sections Serial Command and Serial Data Output), and
-shares no code with the driver's codec. It knows byte layouts. It must not know modes or motion, nor
-how a command is found among the bytes.
+Source: the manual's Serial Command and Serial Data Output alone; shares no code with the driver's
+codec. This module knows byte layouts. It must not know modes or motion.
 """
 
 import struct
@@ -63,7 +62,7 @@ def imu_frame(accel: Triple, gyro: Triple) -> bytes:
 def delta_frame(difference: Triple, seq: int) -> bytes:
     """Encode the 9 bytes of the 25 Hz frame.
 
-    difference: x and y in 0.1 mm, and yaw in 0.1 mrad, or the counts of the three wheels, as int16.
+    ``difference``: in 0.1 mm and 0.1 mrad, or wheel counts, as int16.
     """
     return _DELTA.pack(0xFF, 0xFB, *difference, seq)
 

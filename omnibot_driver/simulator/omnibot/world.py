@@ -2,8 +2,8 @@
 
 """The robot on the floor: how it truly moves when the motors turn.
 
-The firmware reads only the encoders and the IMU of this robot. This module knows motors, true wheel
-sizes, slip and the true pose. It must not know what the firmware assumes, commands or sends.
+This module knows motors, true wheel sizes, slip and the true pose. It must not know what the
+firmware assumes, commands or sends.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ SLIP_CORRELATION_M = 0.1
 
 @dataclass(frozen=True, slots=True)
 class TruePose:
-    """The robot's true pose, and its twist along its own axes.
+    """The robot's true pose, and its twist along its own axes, in m, rad, m/s and rad/s.
 
-    Units are m, rad, m/s and rad/s. The yaw is unwrapped. The pose is zero at construction.
+    The yaw is unwrapped. The pose begins at zero.
     """
 
     x_m: float
@@ -51,8 +51,7 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Both are added to the motor efforts at the rims. The kinematics distributes them over the wheels
-    as it distributes a velocity in the same direction.
+    Added to the motor efforts at the rims, distributed like a velocity.
     """
 
     x_pwm: float = 0.0
@@ -164,10 +163,9 @@ class World:
         return a, b, c
 
     def _wander(self, slip: float, rim_m: float) -> float:
-        """Return the wheel's slip after ``rim_m`` of rim motion.
+        """Return the wheel's slip after ``rim_m`` of rim motion, within 0 and 1.
 
-        The slip varies around the mean slip, with a standard deviation of half the mean. The slip
-        stays within 0 and 1.
+        Standard deviation: half the mean slip.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)
