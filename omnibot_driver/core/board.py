@@ -113,7 +113,7 @@ class Board(Protocol):
     def edge(self) -> SampleBoundary | None:
         """Position in the stream of IMU samples at which the last read of the port ended.
 
-        None while the framing is uncertain, or without new information.
+        None if uncertain or unchanged.
         """
         return None
 
@@ -246,10 +246,10 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the packets that the guard sends if this process hangs.
+        """Return two sets of packets; the guard sends one if this process hangs.
 
-        First set: Stop. Second set, for a latched e-stop: emergency stop, then Stop. Called after
-        each input and before each output.
+        First: Stop. Second, for a latched e-stop: emergency stop, then Stop. Called after each
+        input and before each output.
         """
         stop = self.stop()
         return stop, self.emergency_stop() + stop

@@ -44,8 +44,8 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes, and return the estimates to publish at once. Call ``process`` afterwards.
 
-        If the mode changes, ``hear`` calls ``process`` itself, so that no command comes between.
-        The estimates are then events.
+        If the mode changes, ``hear`` calls ``process`` itself, before any command. The estimates
+        then become events.
         """
         self._liveness.came_at = now
         before = self._board.mode

@@ -2,8 +2,8 @@
 
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
-The single-letter commands (S, P, R) may be lost, and P toggles. So each request is an exchange with
-a deadline. This module does not know bytes, and reads no clock.
+The letters S, P and R may be lost, and P toggles between pause and run. So each request is an
+exchange with a deadline. This module does not know bytes, and reads no clock.
 """
 
 import math
@@ -19,17 +19,17 @@ START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
 """Time of uninterrupted data, in s, after which a pause or reset is sent again.
 
-A paused board sends a notice every second.
+A paused board sends a notice every second; without one, the command was lost.
 """
 FLOWING_S: Final = 0.1
-"""Largest time, in s, that one pause between receptions adds to the time of data.
+"""Largest time, in s, that one pause between two reads adds to the time of data.
 
 A running board sends every 10 ms.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command or a notice of a paused board takes to arrive.
 
-A notice proves nothing if it follows a command, or precedes data, by less.
+A notice within this time after a command, or before data, proves nothing.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""

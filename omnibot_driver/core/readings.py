@@ -145,12 +145,12 @@ Reading = (
 
 @value(frozen=True, slots=True)
 class SampleBoundary:
-    """Where a read of the port ended in the stream of IMU samples.
+    """Where a read of the port ended in the stream of IMU samples. Times count from the read.
 
     * ``ahead``: samples (0 or 1) after the last ImuReading, of which at least a part came.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
-    * ``latest_s``: longest time, in s, until the last sample is complete; 0: already complete.
-    * ``earliest_s``: shortest time, in s, until the next (or incomplete) sample is complete.
+    * ``latest_s``: longest time until the last sample is complete; 0: complete already.
+    * ``earliest_s``: shortest time until the next sample, or the cut one, is complete.
     """
 
     ahead: int

@@ -2,8 +2,8 @@
 
 """A session with one board: it takes bytes and commands, and gives measurements and packets.
 
-After each input, write ``take_output`` to the port and handle ``take_events``. Call ``tick`` at
-``wake_at``. A session is not thread-safe, reads no clock and does not log.
+After each input, the caller writes ``take_output`` and handles ``take_events``. It calls ``tick``
+at ``wake_at``. Not thread-safe; reads no clock.
 
 This module connects the parts of a session. It does not know bytes or threads.
 """
@@ -138,8 +138,7 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin a connection, because the port is open now.
 
-        ``missing``: which lines are not open, as a sentence; empty if none. While a line is
-        missing, the robot is not driven.
+        ``missing``: which lines are not open, as a sentence. With any, the robot is not driven.
         """
         self._board.connect()
         self._commanding.begin(now)
@@ -186,8 +185,8 @@ class Session:
     ) -> None:
         """Command a body velocity. After CommandRefused, the earlier command stays in effect.
 
-        * ``age_s``: age of the sender's stamp in s; negative: in the future.
-        * ``planar``: False if the sender also asked for motion out of the plane.
+        ``age_s``: age of the sender's stamp in s. ``planar``: False if the sender also asked for
+        motion out of the plane.
         """
         self._command(self._commanding.twist(twist, now, age_s=age_s), now)
         sideways = self._commanding.shaper.sideways

@@ -20,16 +20,13 @@ class Traits:
     * ``wheels``: names of the wheels, in the order of ``wheel_cmd``.
     * ``unheard_s``: time without data, in s, after which the robot is stopped.
     * ``silence_s``: time without data, in s, after which the mode is unknown.
-    * ``own_odometry``: whether OdometryReadings give the pose; else the driver integrates
-      displacements.
+    * ``own_odometry``: OdometryReadings give the pose; else the driver integrates displacements.
     * ``stands_after_s``: time without motion, in s, that proves a standstill.
     * ``unproved_s``: longest repetition of Stop without such a proof, in s.
-    * ``baudrate``: whether the line has a baud rate to set.
-    * ``calibrates_gyro``: the board subtracts the gyro's bias; its profile offers
-      ``~/calibrate_gyro``.
-    * ``stops_within_s``: longest delay of an acknowledged stop, in s; 0: never acknowledged.
-    * ``slack_mps``, ``slack_radps``: extra tolerance of the motion monitor, in m/s and rad/s, for
-      coarse displacements or lagging wheels.
+    * ``calibrates_gyro``: the board subtracts the bias; its profile offers ``~/calibrate_gyro``.
+    * ``stops_within_s``: longest time to obey an acknowledged stop, in s; 0: no acknowledgement.
+    * ``slack_mps``, ``slack_radps``: extra tolerance of the motion monitor, for coarse
+      displacements or lagging wheels.
     * ``advice``: what to check at each motion fault; replaces the general advice.
     """
 

@@ -2,8 +2,8 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method returns why not, as a sentence with a remedy; empty if possible. This module knows modes
-and phases.
+Each method returns the reason why not, as a sentence with a remedy, or an empty string. This module
+knows modes and phases.
 """
 
 from omnibot_driver.core.board import Board, Mode

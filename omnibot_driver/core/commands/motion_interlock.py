@@ -56,7 +56,7 @@ class MotionInterlock:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Record that a sender of commands is active: only a pause ends a refusal.
+        """Record that a sender of commands is active. Only a pause without commands ends a refusal.
 
         Call this when a command is refused, and after a stall of this process.
         """

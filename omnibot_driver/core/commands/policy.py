@@ -2,9 +2,8 @@
 
 """The command policy: which command is in effect, when it expires, and how the robot is stopped.
 
-A board does not stop by itself: after the expiry, Stop is repeated until displacements show a
-standstill. This module knows commands and times; it does not know how Stop is encoded, and reads no
-clock.
+A board does not stop by itself. This module knows commands and times; it does not know how Stop is
+encoded, and reads no clock.
 """
 
 import math

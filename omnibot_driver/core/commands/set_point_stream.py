@@ -22,7 +22,7 @@ PACE_S: Final = 0.01
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
 
-Shorter: set-points damaged by lost bytes act longer (docs/internals/integrity.md).
+With less, damaged set-points act longer (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
@@ -96,8 +96,8 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        Their first bytes can complete a damaged motion frame. So the set-point is repeated at once,
-        except after a Stop on every channel.
+        Packets other than Stop can complete a damaged motion frame, so the set-point is then
+        repeated at once.
         """
         if self._heard is not None:
             self._heard(packets, now)

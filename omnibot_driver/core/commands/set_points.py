@@ -2,8 +2,7 @@
 
 """Set-points: motion commands that return the order to send at each time.
 
-The order is computed when a frame is sent, so acceleration limits need no timer. Other modules
-decide when that is, and whether a set-point is allowed.
+The actuator asks for the order with each frame, so acceleration limits need no timer.
 """
 
 import math
@@ -22,7 +21,7 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: added distance to the goal, in m and rad, of a leaving robot.
+"""``LEAVING_M``, ``LEAVING_RAD``: growth of the distance to the goal that shows leaving.
 
 No controller overshoots that far.
 """
@@ -65,7 +64,8 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * ``is_zero``: argument: ``Actuator.is_zero``, may raise CommandRefused; attribute: its result.
+    * ``is_zero``: as argument ``Actuator.is_zero``, which may raise CommandRefused; then its
+      result.
     * ``before``: the previous set-point; a ramp starts at its velocity, else at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
@@ -115,7 +115,8 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    * ``is_zero``: argument: ``Actuator.is_zero``, may raise CommandRefused; attribute: its result.
+    * ``is_zero``: as argument ``Actuator.is_zero``, which may raise CommandRefused; then its
+      result.
     """
 
     settled: Final = True
@@ -142,7 +143,7 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: ``Odometry.alignments`` at the command; identifies the relation of both frames.
+    * ``alignment``: ``Odometry.alignments`` at the time of the command.
     * ``check``: raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """

@@ -2,8 +2,8 @@
 
 """The outlier filter: it rejects physically impossible readings that arrive in valid frames.
 
-Impossible are a too fast displacement and a spike: one reading leaps, the next leaps back. So a
-leaping reading waits for the next one. docs/internals/architecture.md gives all rules.
+A spike leaps and leaps back. So a reading that leaps waits for the next one.
+docs/internals/architecture.md gives the rules.
 
 This module knows readings and the robot's limits; it does not know bytes or a clock.
 """
@@ -235,8 +235,8 @@ class _Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the previous values were a spike, and whether these values leap.
 
-        ``periods``: since the previous values. ``topmost_bit``: size of the highest bit of the
-        knocked values.
+        ``periods``: since the previous values. ``topmost_bit``: highest bit of the ``knocked``
+        values.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False
@@ -268,8 +268,7 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether a flipped bit can explain the step, within the recent variation.
 
-        ``value``: magnitude after the step. At the end of the scale, a knock explains the step too:
-        False.
+        ``value``: magnitude after the step. A knock can reach the end of the scale: False.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -2,8 +2,8 @@
 
 """The measurement pipeline: readings are stamped, checked, integrated, corrected and counted.
 
-Only IMU readings are processed at once, by ``hear``; ``flush`` processes the rest. This module does
-not know commands or modes.
+``hear`` processes IMU readings at once; the others wait for ``flush``. This module knows readings
+and the parts that process them; it does not know commands or modes.
 """
 
 from collections.abc import Sequence
@@ -88,8 +88,7 @@ class MeasurementPipeline:
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
         """Return the IMU estimates that these readings complete. ``now``: their time of arrival.
 
-        Other readings, and IMU readings after them, wait for ``flush``. One IMU reading alone takes
-        a fast path.
+        Other readings, and IMU readings after them, wait for ``flush``.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

@@ -34,7 +34,7 @@ It is independent of the noise, so the squares are added.
 OVERSHOOT: Final = 0.15
 """Overshoot allowed in any direction, as a fraction of the change of the set-point.
 
-Not allowed after rest.
+None is allowed if the earlier set-point was rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
@@ -54,7 +54,7 @@ YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
-"""Directions in which the distance to the hull is computed: at most 2 % too small."""
+"""Directions in which the distance to the hull is computed. The result is at most 2 % too small."""
 
 
 def outside(
@@ -62,8 +62,8 @@ def outside(
 ) -> tuple[float, float]:
     """Return how far the motion is outside the envelope, in m/s and in rad/s; <= 0: inside.
 
-    ``explained``: velocities that set-points allow, the current first. Without a known heading,
-    directions are not checked.
+    ``explained``: velocities by set-points, current first. An unknown heading leaves linear
+    directions unchecked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0

@@ -14,7 +14,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s before a displacement whose set-points also count.
+"""Time in s before a displacement: set-points from then on are compared with its motion.
 
 A robot clearly slower than all of them is assumed to be held.
 """
@@ -66,8 +66,8 @@ class FollowingError:
     ) -> None:
         """Add one displacement to the error, or reset the error if the displacement is inside.
 
-        ``motion``: mean twist in ``seconds`` from ``begun_s`` on. Without a known heading,
-        directions are not checked.
+        ``motion``: mean twist in ``seconds`` from ``begun_s`` on. An unknown heading leaves linear
+        directions unchecked.
         """
         newest = history.since(begun_s - RISING_S)
         way_mps = turn_radps = 0.0

@@ -126,7 +126,8 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board may still hold its own: a robot at rest is then HELD_BY_ESTOP, not BLOCKED.
+        The board may still hold its own. A robot that does not move is then HELD_BY_ESTOP, not
+        BLOCKED.
         """
         self._released = True
 
@@ -162,8 +163,8 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: mean twist in the ``seconds`` before ``stamp_s``. Without a known heading,
-        directions are not checked.
+        ``motion``: mean twist in the ``seconds`` before ``stamp_s``. An unknown heading leaves
+        linear directions unchecked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -207,7 +208,7 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        After rest, a person may be pushing it: Stop is sent ever less often.
+        A pushed robot is sent Stop ever less often.
         """
         if not self._error.outside:
             self._stood_s += seconds

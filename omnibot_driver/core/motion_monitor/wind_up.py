@@ -26,7 +26,7 @@ A single one does not prove a hold: the robot may have turned round.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
-"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: decay of the wind-up, in motion and at rest, in s.
+"""``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
 A robot that is still held at rest keeps its wind-up.
 """
@@ -81,7 +81,7 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance by which a held robot falls behind; decay the wind-up of any other.
+        """Add the distance by which a held robot falls behind. Otherwise the wind-up decays.
 
         ``motion``: mean twist, inside the envelope. ``newest``: set-points not yet reached, the
         current first.

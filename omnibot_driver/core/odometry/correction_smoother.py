@@ -14,10 +14,7 @@ SPREAD_S: Final = 0.2
 
 
 class CorrectionSmoother:
-    """Keeps two poses, and moves the published one towards the best known one.
-
-    * ``pose``: the published pose.
-    * ``target``: the best known pose.
+    """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
     A step corrects ``pose`` by at most the largest possible motion minus the robot's own.
     """

@@ -2,12 +2,10 @@
 
 """The uncertainty of the odometry, from three sources of error that are kept separately.
 
-* Errors of the wheels: random slip, wrong sizes and constant slip. The last two shrink on the way
-  back.
-* Unreported motion in gaps (``gap``), until a pose of the board reveals it.
-* Corrections of the published pose that are still due.
+They are the wheels, unreported motion in gaps, and corrections still due.
+docs/internals/architecture.md explains when each shrinks.
 
-This module does not know frames or boards.
+This module knows covariances and the wheels' geometry; it does not know frames or boards.
 """
 
 import math
@@ -126,7 +124,7 @@ class Uncertainty:
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        ``heading_rad``: before the move. Pose objects would be slow here.
+        ``heading_rad``: before the move. Plain numbers are used, because Pose objects are slow.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return

@@ -44,7 +44,7 @@ in this time."""
 class OdometrySettings:
     """The settings of the odometry.
 
-    * ``use_board_pose``: whether the board's poses correct more than the initial heading.
+    * ``use_board_pose``: the board's poses correct the odometry; else only the initial heading.
     * ``fastest_mps``, ``fastest_radps``: never exceeded, even by a pushed robot.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the board's.
     """
@@ -249,8 +249,7 @@ class Odometry:
     def _judge(self, told: Pose, confirmed: bool) -> None:
         """Accept a pose that is reachable and expected, or that confirms the last unexpected pose.
 
-        A confirmed pose out of reach changes only the relation of the frames. Other poses await
-        confirmation.
+        A confirmed pose out of reach changes only the relation of the frames.
         """
         assert self._board is not None
         way = self._board.way_to(told)

@@ -54,7 +54,7 @@ class PendingDisplacements:
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Return the time in s without a report before the first waiting displacement.
 
-        ``last_stamp_s``: stamp before the gap, for a displacement without duration.
+        ``last_stamp_s``: stamp before the gap; used if the displacement has no duration.
         """
         if not self._waiting:
             return 0.0

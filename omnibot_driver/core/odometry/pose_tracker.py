@@ -2,8 +2,8 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-Inputs: tangents (twist x time) in the board's axes and wheel sizes. Outputs: REP-103's axes, true
-size. This module does not know which of the board's reports to believe.
+Inputs are tangents (twist x time) in the board's axes and wheel sizes. Outputs are in REP-103's
+axes, of true size. This module does not know which of the board's reports to believe.
 """
 
 from typing import Final
@@ -66,8 +66,8 @@ class PoseTracker:
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
         """Move along a tangent that took ``seconds``.
 
-        ``stamped_s``: time between the stamps before and after, in s; limits the published pose's
-        step.
+        ``stamped_s``: time between the stamps before and after, in s. It limits the step of the
+        published pose.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail

@@ -2,12 +2,9 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-A header alone proves nothing: a gyro at rest reads the same. docs/internals/omnibot_protocol.md
-(10) lists the evidence.
-
-* *In step*, right after an accepted frame, a frame is accepted unless evidence speaks against it.
-* *Uncertain* bytes wait until the cheapest interpretation (``trellis``) is clear, or
-  ``DOUBT_BYTES`` are held.
+A header proves nothing: a gyro at rest reads the same. A frame *in step* with the last one is
+accepted unless evidence speaks against it. *Uncertain* bytes wait until ``trellis`` has a clear
+result, or ``DOUBT_BYTES`` are held.
 
 This module reads no clock, and no input makes it raise an exception.
 """
@@ -238,7 +235,7 @@ class FrameDecoder:
     def _believe_but_the_last(self, walk: Walk, found: list[Frame]) -> bool:
         """Accept all frames of ``walk`` except the last two, because odd bytes follow the last two.
 
-        Return False, the result of ``_walk``.
+        Always return False, for ``_walk`` to return.
         """
         believed = len(walk.frames) - 2
         if believed > 0:

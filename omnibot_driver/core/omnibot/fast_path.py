@@ -92,7 +92,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a frame follows at position ``at``: then odd content before it is a shock.
 
-    It must be complete, and another may follow. At the end of ``held``: ``closed``.
+    The bytes after this frame must be able to begin another. At the end of ``held``, return
+    ``closed``.
     """
     if at == len(held):
         return closed

@@ -58,8 +58,7 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: discarded bytes before it. A pose returns 0, and leaves its count to the next
-        frame.
+        ``skipped``: discarded bytes before it. For a pose: 0; its losses count with the next frame.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

@@ -146,7 +146,7 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 def measure(data: bytes | bytearray, at: int) -> int:
     """Return the length in bytes of the frame that begins at position ``at``.
 
-    INCOMPLETE: more bytes may complete it. NO_FRAME: no frame begins so.
+    INCOMPLETE: more bytes may complete a frame. NO_FRAME: no frame begins with these.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)

@@ -2,10 +2,10 @@
 
 """The pauses in which the line was idle, and how reliable they are.
 
-A board pauses only between frames. Adapters and late readers (``late_reads``) cause other pauses.
-Accepted frames show the kind of line.
+A board pauses only between frames; adapters and late readers (``late_reads``) cause other pauses.
+Accepted frames show which pauses this line has.
 
-This module knows positions and times; it does not know what a frame contains, or which is accepted.
+This module knows positions and times; it does not know what a frame contains.
 """
 
 from bisect import bisect_right
@@ -50,7 +50,7 @@ class InterFrameGaps:
     * ``between``: whether a frame normally begins somewhere in the read after a pause.
     * ``certain``: whether more confirmations of both change nothing.
     * ``at_pace``: whether the last read's bytes came without a pause before them.
-    * ``collected``: whether they were collected for more than a tick.
+    * ``collected``: whether the last read's bytes were collected for more than a tick.
     """
 
     def __init__(self, byte_s: float) -> None:

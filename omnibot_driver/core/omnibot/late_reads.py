@@ -2,8 +2,7 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-The board's ticks decide. Bytes lost in a frame delay all later frames by whole ticks. After a late
-read, later frames are on time.
+Bytes lost in a frame delay all later frames by whole ticks; a late read does not.
 
 This module knows lengths, ticks and times; it does not know what a frame contains, or which is
 accepted.
@@ -164,8 +163,8 @@ def _by_the_next_frame(
 ) -> Cause:
     """Return the cause of a pause, from the next frame, which begins at ``start``.
 
-    IDLE_LINE if that frame has a pause too, whole ticks after ``first``, the read that ended the
-    first.
+    The line was idle if this frame also has a pause, whole ticks later. ``first``: the read that
+    ended the first pause.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

@@ -26,7 +26,7 @@ _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    Along an edge, it decreases by at most the price. An incomplete last frame is free.
+    Along an edge, the least cost decreases by at most the price. An incomplete last frame costs 0.
     """
     size = len(data)
     ends = _undamaged(data)

@@ -2,8 +2,6 @@
 
 """Checks for settings that the board's data contradicts. The user is advised to change them.
 
-Checked are the poses' byte order, and the deltas' frame and period.
-
 This module knows what the data means under each setting; it does not know how the user is informed.
 """
 
@@ -18,9 +16,7 @@ from omnibot_driver.core.omnibot.schedule import DELTA_PERIODS_S, TICK_S, USUAL,
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 SURE: Final = 10
-"""Number of poses (2 s) that prove a setting wrong.
-
-All must contradict the setting.
+"""Number of poses (2 s) that prove a setting wrong, if no pose between them confirms the setting.
 """
 SMALLEST: Final = 1e-6
 LARGEST: Final = 1e7
@@ -35,7 +31,7 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M``, ``TIMES``: when a pose contradicts the configured frame of the deltas.
 
-The summed deltas must miss the pose by ``CLEARLY_M`` in m, and by ``TIMES`` the other frame's miss.
+The summed deltas miss the pose by ``CLEARLY_M``, and by ``TIMES`` the distance in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
@@ -79,8 +75,7 @@ class MisconfigurationChecks:
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
         """Check the period of the deltas, with a delta that arrived at ``now`` in s.
 
-        ``imus``: IMU frames since the previous delta. Some may be lost, so arrival times must
-        confirm.
+        ``imus``: IMU frames since the previous delta. Arrival times must confirm the result.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:

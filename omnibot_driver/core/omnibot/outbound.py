@@ -2,14 +2,10 @@
 
 """The encoding of frames and letters for a line that loses bytes, and for unknown firmware.
 
-docs/internals/omnibot_protocol.md (5) gives the reasons.
+Zeros precede everything; nothing follows a motion frame; no payload contains a letter or a header.
+docs/internals/omnibot_protocol.md ("The line to the board") gives the reasons.
 
-1. *Zeros precede everything*: they complete a damaged frame harmlessly. 2. *Nothing follows a
-motion frame*: it would complete a damaged one at once. 3. *A payload without its header is
-harmless*: no letter, no FF FE in it. 4. *What is lost is sent again*, or the board's data confirms
-it.
-
-This module knows bytes; it does not know what is commanded, or when.
+This module knows bytes; it does not know what is commanded, nor when.
 """
 
 import re
@@ -31,6 +27,8 @@ ZEROS: Final = bytes(8)
 
 Three wake a board.
 """
+# Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
+# that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """Zeros before a motion frame. They are few, so that this frame soon replaces a damaged frame
 before it."""

@@ -66,7 +66,7 @@ class Sequence:
         self._ahead: int | None = None
         """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        It may be damaged: until a delta continues it, elapsed time gives the losses.
+        It may be damaged. Until a delta continues it, elapsed time gives the losses.
         """
         self._left: tuple[int, float, int] | None = None
         """The last counter before a supposed restart, its arrival time in s, and the first counter

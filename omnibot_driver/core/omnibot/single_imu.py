@@ -2,9 +2,8 @@
 
 """The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
-Readings and state are the same as on the normal path; a test compares both. Only calm frames that
-are due are accepted. Pieces wait for the last one; if the frame fails, the decoder gets each with
-its own arrival time.
+Readings and state are as on the normal path; a test compares both. If a frame fails, the decoder
+gets each piece with its own arrival time.
 """
 
 import struct
@@ -56,8 +55,7 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    Return None and change nothing if ``GAP_S`` has passed, the frame is rejected, or a byte may be
-    lost.
+    Return None and change nothing after ``GAP_S``, for a rejected frame, or if a byte may be lost.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -85,8 +83,8 @@ def take_single(
 ) -> ImuReading | None:
     """Return the reading of ``data`` if it is one calm IMU frame that was due.
 
-    Otherwise return None and change nothing. ``now``: arrival of the ``first`` bytes, in s. If they
-    are fewer than all, the caller (``take_pieces``) has checked the last byte.
+    Otherwise return None and change nothing. ``now``: arrival in s of the ``first`` bytes. The
+    caller has checked the last byte if ``data`` came in pieces.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -3,7 +3,7 @@
 """The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
 The search looks for the shortest path in a graph. Edges are frames, damaged frames and unexplained
-bytes. ``cost_model`` gives their prices. Time and memory grow in proportion to the length.
+bytes.
 
 This module knows how a line damages the shapes of frames; it does not know which frames are
 accepted.
@@ -259,7 +259,7 @@ class _Search:
     def _context(self, node: int) -> Context:
         """Return the context on the cheapest path to ``node``.
 
-        After a damaged frame or a bad run, little of it is known.
+        After a damaged frame or a bad run, little of the context is known.
         """
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:

@@ -16,7 +16,7 @@ class LinkFigures:
 
     * ``trouble``: why the port is not open, as a sentence; empty while open.
     * ``opened``: how often the port was opened.
-    * ``overruns``: how often the kernel lost bytes since then; None: not counted.
+    * ``overruns``: how often the kernel lost bytes since the opening; None: not counted.
     * ``waited_s``: the reader's wait for the processor, in s; None: not counted.
     """
 

@@ -2,8 +2,8 @@
 
 """The time of each tick: a straight line over the ticks, fitted to bounds of their times.
 
-A block keeps its *latest* point (upper bound: least delayed arrival) and its *earliest* (lower
-bound: a tick not yet read). docs/internals/time.md explains the fit.
+*Latest* points are arrivals; *earliest* points are ticks that a read did not bring.
+docs/internals/time.md explains the fit.
 
 This module knows ticks and times; it does not know what is sampled, nor how ticks are counted.
 """
@@ -18,7 +18,7 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s.
 
-A phase between adapter timer and tick, 100 ppm off, repeats every 20 s.
+If an adapter's timer is 100 ppm off, its phase to the tick repeats every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
@@ -68,7 +68,7 @@ class ClockFit:
     def see(self, latest: Point, *, cut: bool) -> None:
         """Add an upper bound: the newest tick of a read, and a time in s by which it had arrived.
 
-        ``cut``: the read ended within its sample.
+        ``cut``: the read ended within this tick's sample.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor

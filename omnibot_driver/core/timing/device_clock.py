@@ -30,12 +30,12 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
-A 16 ms adapter reads at five phases of the tick: each occurs twice.
+An adapter of 16 ms reads at five phases of the tick: 12 reads have each twice.
 """
 CALM: Final = 0.45
 """Largest distance from the line, in periods, of a read whose tick is certain.
 
-The previous read must be as near. Must be below 0.5.
+The previous read must be as near to the line. Keep the value below 0.5.
 """
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period. So if the line
@@ -79,7 +79,7 @@ class DeviceClock:
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        Two new ticks within half a period had both waited.
+        Two new ticks within half a period had both waited to be read.
         """
         self._awaited: Point | None = None
         """Lower bound for the tick after the newest one: at this time in s, it had not arrived
@@ -101,8 +101,8 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling times in s of the readings that a read at ``now`` completed.
 
-        They increase per tick, up to ``now``. A displacement has its tick's stamp. ``edge``: the
-        read's end; None: unknown.
+        Stamps increase from tick to tick, up to ``now``. A displacement has its tick's stamp.
+        ``edge``: end of the read.
         """
         ticks = self._count(readings)
         if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
@@ -136,7 +136,7 @@ class DeviceClock:
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """Return the stamp in s of one reading that came alone and on time, else None.
 
-        This is the fast path. None changes nothing: call ``stamps`` then.
+        This is the fast path. After None, nothing has changed: call ``stamps``.
         """
         if reading.lost:
             return None
@@ -253,8 +253,7 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set the stamp of a tick to the line's time, but limit the step from the last stamp.
 
-        ``latest_s``: latest allowed stamp. ``room_s``: step that leaves room for this read's later
-        stamps.
+        ``latest_s``: latest allowed stamp. ``room_s``: step that leaves room for later stamps.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

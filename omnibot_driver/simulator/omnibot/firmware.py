@@ -72,10 +72,9 @@ class SimulatedBoard:
     """An OmniBot board with its robot.
 
     * ``tick``: number of control ticks of 10 ms since construction.
-    * ``estopped``: whether an emergency stop is in effect.
     * ``commands``: commands that the board obeyed, newest last.
     * ``sent``: frames and texts that the board sent, newest last.
-    * ``received``: all bytes that reached the board; of a million, the older half is discarded.
+    * ``received``: all bytes that reached the board; above a million, the older half is discarded.
     """
 
     channels = CHANNELS

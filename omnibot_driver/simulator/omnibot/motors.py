@@ -28,7 +28,6 @@ class MotorConstants:
     * ``pwm_per_count``: PWM steps per count per tick; at 46, the feed-forward supplies seven
       eighths.
     * ``time_constant_ticks``: of the speed.
-    * ``friction_pwm``: effort lost to dry friction while the wheel turns.
     * ``delay_ticks``: delay from an effort to its effect.
     """
 

@@ -27,14 +27,12 @@ class BoardPose:
 class BoardSettings:
     """Properties of a simulated board, and deviations of its robot from the ideal.
 
-    * ``seed``: boards with equal settings and input send equal bytes.
     * ``frame``: meaning of the 25 Hz frame. "earth": difference of positions in the board's earth
-      frame. "body": sum of the ticks' displacements. "wheel_counts": see manual, Deprecated.
+      frame. "body": sum of the ticks' displacements. "wheel_counts": manual, Deprecated.
     * ``delta_period_s``: a multiple of 10 ms. The manual also has 10 Hz.
     * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: per rad/s.
     * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
     * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad, unwrapped.
-    * ``obeys_estop``: False: an emergency stop frame is ignored.
     * ``estop_latches``: whether motion is refused until a reset; else until the next motion
       command.
     * ``axis_signs``: of the board's x, y and yaw relative to REP-103.
