@@ -2,9 +2,8 @@
 
 """What colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` find it.
 
-If the environment contains ``OMNIBOT_DRIVER_COMPILE=1``, mypyc compiles the modules of the core
-that process received bytes. If this fails, the reason is printed, and the package is installed as
-plain Python.
+With ``OMNIBOT_DRIVER_COMPILE=1``, mypyc compiles the core's inbound modules. If this fails, plain
+Python is installed.
 """
 
 import os
@@ -26,13 +25,10 @@ COMPILED_OF_OMNIBOT = (
     *("cost_model", "decoder", "fast_path", "frame_schedule", "gaps", "late_reads", "lower_bound"),
     *("misconfiguration", "modes", "schedule", "sequence", "single_imu", "translation", "trellis"),
 )
-"""``COMPILED``, ``COMPILED_OF_OMNIBOT``: the modules that mypyc compiles.
+"""``COMPILED``, ``COMPILED_OF_OMNIBOT``: the modules that mypyc compiles. Not compiled:
 
-They process received bytes. Some modules are not compiled:
-
-- modules that decide whether a robot moves, so that they run as they were debugged
-- base classes
-- frames, because they are created faster without mypyc's dataclasses
+- modules that decide whether a robot moves, so that they run as they were debugged - base classes -
+frames, because they are created faster without mypyc's dataclasses
 """
 
 
@@ -88,7 +84,7 @@ class CompileCore(build_ext):
 class InstallAnew(install_lib):
     """The install step that first removes the compiled modules of an earlier installation.
 
-    colcon leaves them in place, and Python would use them instead of the new sources.
+    Python would use them instead of the new sources.
     """
 
     def install(self) -> list[str]:

@@ -2,7 +2,7 @@
 
 """Settings of Sphinx for `make docs`. rosdoc2 also executes this file, with its own defaults.
 
-The site is built from the whole repository, so that each link leads to the same place as on GitHub.
+Sphinx reads the whole repository. So links lead to the same places as on GitHub.
 """
 
 project = "omnibot_driver"

@@ -2,8 +2,7 @@
 
 """Writes the parts of the documents that come from the code.
 
-``make docs`` runs this script. A test compares the files with the script's output. The output
-depends only on the code. So after a change, the test shows which files must be written again.
+``make docs`` runs this script. A test compares the files with the script's output.
 """
 
 import textwrap

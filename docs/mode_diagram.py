@@ -93,8 +93,7 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 def _label(before: Mode, after: Mode) -> list[str]:
     """Return the label of an arrow.
 
-    The label is at the middle of a horizontal arrow, and near the start of any other arrow. At
-    these places, labels do not overlap.
+    In the middle of sloping arrows, labels would overlap. So these labels are near the start.
     """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)

@@ -2,8 +2,7 @@
 
 """Launch file that publishes the robot's description and fixed frames; it can also start RViz.
 
-robot_state_publisher and the driver put ``frame_prefix`` before the names of frames, but not before
-the names of joints.
+``frame_prefix`` precedes the names of frames, but not those of joints.
 """
 
 from launch import LaunchDescription

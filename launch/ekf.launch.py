@@ -2,12 +2,8 @@
 
 """Launch file that starts the driver, the description and robot_localization's filter.
 
-The filter combines the odometry with the gyro, or with the compass on a board that has one. It
-publishes the transform from odom to base_link, so the driver does not. The filter needs the
-description, which says how the sensors are mounted: OmniBot's IMU, for example, is upside down.
-
-The launch arguments include those of driver.launch.py and description.launch.py. A board without
-parameters for the filter is refused.
+The filter publishes the transform from odom to base_link, so the driver does not. The filter needs
+the description, because the description says how the sensors are mounted.
 """
 
 from pathlib import Path

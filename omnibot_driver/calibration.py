@@ -1,10 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The calibration file: measured values of one robot in YAML, which the driver reads at start.
-
-``save`` replaces the file completely or not at all. It keeps the names that the driver does not
-use, but loses the comments.
-"""
+"""The calibration file: measured values of one robot in YAML, which the driver reads at start."""
 
 import contextlib
 import os
@@ -36,10 +32,9 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """Return the values that the file has for this board's calibrated parameters.
+    """Return the file's values of this board's calibrated parameters; empty if there is no file.
 
-    The result is empty if the file does not exist. Raises ParameterError, with a remedy, if the
-    file cannot be read or has a wrong value.
+    Raises ParameterError, with a remedy, if the file cannot be read or has a wrong value.
     """
     content = _read(path)
     try:
@@ -53,21 +48,18 @@ def load(path: Path, table: Table) -> dict[str, Value]:
 
 
 def names(path: Path) -> list[str]:
-    """Return all names in the file, even those that the driver does not read.
+    """Return all names in the file, even unread ones; empty if the file does not exist.
 
-    The result is empty if the file does not exist. Raises ParameterError if the file cannot be
-    read.
+    Raises ParameterError if the file cannot be read.
     """
     return [str(name) for name in _read(path)]
 
 
 def save(path: Path, values: Mapping[str, Any]) -> None:
-    """Write these values into the file, and keep its other values.
+    """Write these values into the file, completely or not at all, and keep its other values.
 
-    A program that reads the file meanwhile gets either the old content or the new content. Even
-    after a power failure, the file has one of these two. Comments are lost. If ``path`` is a
-    symbolic link, the link is kept and the file behind it is replaced. Raises ParameterError if the
-    present file cannot be read, and OSError if the new file cannot be written.
+    Comments are lost. A symbolic link is kept. Raises ParameterError if the present file cannot be
+    read, OSError if the new file cannot be written.
     """
     import tempfile  # takes 1 MB, and few drivers ever save
 

@@ -1,14 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Serialise measurements to CDR as rclpy does, and parse velocity commands from CDR.
+"""Serialise measurements to CDR, the format of DDS messages, and parse velocity commands from CDR.
 
-CDR is the format in which DDS sends messages. This module writes CDR without ROS message objects,
-which saves processor time.
-
-CDR aligns every number to its own size, like a C struct on a 64-bit machine. So Python's ``struct``
-with native alignment can write CDR. A string is its length, then its bytes and a NUL. A sequence is
-its length, then its elements. On some machines this layout may be wrong, so ``difference`` compares
-the result with rclpy's own bytes.
+Without ROS message objects this takes less processor time. CDR aligns numbers like a C struct on a
+64-bit machine, so ``struct`` can write it. On some machines the layout may differ from rclpy's:
+check it with ``difference``.
 """
 
 import itertools
@@ -113,8 +109,7 @@ class Serializer:
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
     """Return the planar part of a serialised Twist, and whether all its other parts are zero.
 
-    Raises CommandRefused for NaN or infinity, and for bytes that are not a geometry_msgs/Twist. A
-    middleware might deliver such bytes.
+    Raises CommandRefused for NaN, infinity, or bytes that are not a geometry_msgs/Twist.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)
@@ -132,7 +127,7 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
 class Messages:
     """A replacement for Serializer that returns rclpy messages instead of bytes.
 
-    The driver uses it on a machine on which the bytes of Serializer differ from rclpy's own.
+    The driver uses it if the bytes of Serializer differ from rclpy's own.
     """
 
     def __init__(self, settings: MessageSettings) -> None:

@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Callbacks for the topics that command the robot: they pass each message on to the link.
-
-A command is refused if it expired in transit, or was sent while this process was stalled.
-"""
+"""Callbacks for the topics that command the robot: they pass each message on to the link."""
 
 import contextlib
 import time
@@ -31,12 +28,9 @@ def obeying(
 ) -> Callable[[Any, MessageInfo], None]:
     """Return a callback that passes each message to ``action``, with the session of the link.
 
-    If a command is refused, the link reports the refusal.
-
     * ``expires_s``: returns the age, in s, at which a command expires.
-    * ``may_be_old``: returns True for a message whose time in transit does not matter.
-    * ``is_stop``: returns True for a message that stops the robot. Neither the age of this message
-      nor a stall of this process matters.
+    * ``may_be_old``: whether the message's time in transit does not matter.
+    * ``is_stop``: whether the message stops the robot. Neither age nor stalls matter then.
     * ``moves_base``: whether the commands move the base, and not another part of the robot.
     """
     transit = Transit()

@@ -29,8 +29,7 @@ NOT_OURS: Final = re.compile(
 def declare(node: Node) -> dict[str, Any]:
     """Declare all parameters on the node, and return their values at start.
 
-    Values in the calibration file replace those that the user has given. Raises ParameterError if a
-    value is not allowed.
+    The calibration file takes precedence. Raises ParameterError for a value that is not allowed.
     """
     given = {
         name: override.value
@@ -50,11 +49,10 @@ def declare(node: Node) -> dict[str, Any]:
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
-    """Return the values of all the driver's parameters after a change.
+    """Return all values after a change; ``values`` are those before it.
 
-    ``values`` are the values before the change. Each value is converted to the type of its
-    parameter, because ROS accepts an integer for a real parameter. Without the conversion, a
-    message would publish that integer as 0.
+    ROS accepts 1 for the real parameter 1.0. The result has the parameter's type, because a message
+    would publish an integer as 0.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})
@@ -67,8 +65,7 @@ def _ours(changed: list[rclpy.Parameter], table: parameters.Table) -> dict[str, 
 def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, parameters.Value]:
     """Return the parameters that the calibration file sets, and log their names.
 
-    A warning is logged if the file does not exist, because its path may be misspelt. Another
-    warning is logged for names in the file that the driver does not read.
+    A missing file causes only a warning, because the first calibration creates it.
     """
     found, names = calibration.load(path, table), calibration.names(path)
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]

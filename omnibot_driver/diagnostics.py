@@ -2,8 +2,7 @@
 
 """Diagnostics: a report on the link, the board and the commands, once a second on ``/diagnostics``.
 
-If diagnostic_updater is installed, it publishes the report. Otherwise this module publishes an
-equal message, with the same topic, names, levels, hardware id and period. The timer uses the steady
+Without diagnostic_updater, this module publishes an equal message itself. The timer uses the steady
 clock, so it does not stop with simulated time.
 """
 
@@ -28,8 +27,7 @@ Publish = Callable[[Sequence[Status]], None]
 class Diagnostics:
     """The publisher of the diagnostics of one link.
 
-    * ``refusals``: is called for each report, and returns the number of refused commands and the
-      reason for the last refusal.
+    * ``refusals``: called for each report.
     * ``hardware_id``: text that distinguishes this robot from others.
     * ``to_check``: what the user should check if the driver cannot decode the board's data.
     """

@@ -38,9 +38,8 @@ SETUP: Final = (
 class Ending:
     """Lets the main thread wait until the driver must end: at a signal or a call of ``begin``.
 
-    The main thread reads from a pipe. Python writes the number of each signal into this pipe,
-    whichever thread receives the signal. A lock cannot replace the pipe: a thread that waits for a
-    lock can miss a signal, and a signal handler must not use a lock.
+    Python writes each signal's number into a pipe. A lock cannot replace this pipe: signal handlers
+    must not use locks.
 
     ``defect``: the exception that ended the driver, or None.
     """
@@ -75,12 +74,9 @@ class Ending:
 def main(args: list[str] | None = None) -> int:
     """Run the driver until it must end, and return the exit code of the process.
 
-    The driver ends at a signal in ``STOPPED_BY``, at a shutdown of its ROS context, or after a
-    defect. The exit code is 0 after a request to end and for help, 1 after a defect, and 2 if the
-    driver cannot start.
+    0: after a request to end, or help. 1: after a defect. 2: the driver cannot start.
 
-    The main thread only waits. So a signal takes effect even if the executor is busy, and a second
-    signal cannot interrupt the shutdown.
+    The main thread only waits, so that a second signal cannot interrupt the shutdown.
     """
     args = sys.argv if args is None else args
     with UnblockedOutput():

@@ -2,16 +2,13 @@
 
 """The guard: a separate process that stops the robot when the driver no longer can.
 
-The guard shares the driver's open lines (serial ports or connected sockets). The driver sends a
-heartbeat to the standard input of the guard. If the heartbeat ceases, or the driver has ended, the
-guard repeats the stop command for a second, or until the heartbeat returns. If the last heartbeat
-said that the e-stop is latched, the guard repeats the emergency stop instead. The guard works with
-any board. It imports very little, so that it is small and starts quickly.
+The guard shares the driver's open lines. The driver sends heartbeats to the guard's standard input.
+When the heartbeats cease, the guard repeats the stop command, or the emergency stop if the e-stop
+is latched. The guard works with any board, and must import very little.
 
-`keeper.py` starts the guard as ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets
-in order, as ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``: the descriptor of a line, and the bytes to write to
-it. If these stop commands change, the driver sends ``=STOP EMERGENCY_STOP`` and a newline between
-two heartbeats.
+Usage: ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets as
+``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. New stop commands come as ``=STOP EMERGENCY_STOP`` and a newline,
+between two heartbeats.
 """
 
 import _signal as signal  # type: ignore[import-not-found]  # ``signal`` itself brings ``enum``
@@ -73,10 +70,7 @@ def watch(stop: Words, emergency_stop: Words) -> None:
 
 
 def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
-    """Split the input into its heartbeats, the newest stop commands and an incomplete rest.
-
-    The stop commands are the text of the last complete message that begins with ``WORDS``.
-    """
+    """Split the input into heartbeats, the newest stop commands and an incomplete rest."""
     beats = given = b""
     while WORDS in heard:
         before, _, after = heard.partition(WORDS)

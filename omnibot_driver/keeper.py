@@ -2,8 +2,7 @@
 
 """The driver's side of `guard.py`: keeps a guard process running while a port is open.
 
-This module starts the process, sends it heartbeats, replaces it when it dies, and ends it. It does
-not know threads or boards. Its user calls ``beat`` from the thread that the guard must watch.
+The guard watches the thread that calls ``beat``. This module does not know threads or boards.
 """
 
 import contextlib
@@ -43,8 +42,7 @@ class Keeper:
     """The guard process for a set of open lines, from construction until ``end``.
 
     * ``descriptors``: file descriptor of each line, by channel. None for a line that is not open.
-    * ``stop``: packets that the guard sends to stop the robot.
-    * ``emergency_stop``: packets that the guard sends instead while the e-stop is latched.
+    * ``stop``, ``emergency_stop``: packets to send without and with a latched e-stop.
     """
 
     def __init__(
@@ -66,8 +64,7 @@ class Keeper:
     def beat(self, now: float, *, latched: bool = False) -> str:
         """Send the guard a heartbeat. Call this every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence for the user when the guard fails for the first time, otherwise an empty
-        string. The call does not wait for any process.
+        Returns a sentence for the user when the guard fails for the first time.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -95,8 +92,7 @@ class Keeper:
     def end(self, *, stopped: bool) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        ``stopped``: whether the robot is known to be stopped. If not, the guard sends its stop
-        command before it ends.
+        If the robot is not known to be ``stopped``, the guard first sends its stop command.
         """
         self._restart_at = math.inf
         if stopped:
@@ -130,8 +126,7 @@ class Keeper:
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
         """Kill the guard without waiting for its end. Later heartbeats check whether it has ended.
 
-        Waiting for a guard in an uninterruptible sleep would delay the e-stop, because the e-stop
-        needs the lock that the caller holds.
+        The caller holds the lock that the e-stop needs. Waiting would delay the e-stop.
         """
         assert process.stdin is not None
         process.stdin.close()

@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Two figures of the Linux kernel: losses of a serial port, and the time a thread waited to run.
-
-Each function returns None if the kernel does not have this figure.
-"""
+"""Figures of the Linux kernel: losses of a serial port, and the time a thread waited to run."""
 
 import fcntl
 import struct
@@ -22,8 +19,7 @@ overruns of the receiver, and of the tty's buffer."""
 def overruns(descriptor: int) -> int | None:
     """Return how often the kernel has lost bytes of the port; None if the kernel does not count.
 
-    Pseudo-terminals and sockets have no count, because they do not lose bytes. Some USB adapters do
-    not have a count either.
+    Pseudo-terminals, sockets and some USB adapters have no count.
     """
     try:
         counts = _COUNTS.unpack(fcntl.ioctl(descriptor, TIOCGICOUNT, bytes(_COUNTS.size)))

@@ -2,15 +2,11 @@
 
 """The threads that serve a port and a session, and the shutdown of the driver.
 
-* The *reader* opens the port and waits for bytes. It passes them to the session and delivers the
-  results at once, on its own thread. So no timer and no other thread delays a measurement.
-* The *pacer* sleeps until something is due: a repeated command, a timeout or a retry. So the
-  watchdog does not depend on an executor. The pacer also sends the guard its heartbeat.
-* The *teller* delivers the events that the pacer and callers of the link cause. So a slow listener
-  delays neither the pacer nor a caller.
+* The *reader* passes received bytes to the session, and delivers the results at once.
+* The *pacer* sleeps until a repeated command, a timeout, a retry or the guard's heartbeat is due.
+* The *teller* delivers the events that the pacer and callers of the link cause.
 
-The threads and all callers use one lock. All events are delivered in the order in which they
-occurred under that lock.
+The threads and all callers use one lock. Events are delivered in their order under that lock.
 """
 
 import threading
@@ -29,18 +25,17 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longest wait for a thread to end, in s. The reader may have to wait until the guard has repeated
-Stop. This wait is shorter than ``JOIN_TIMEOUT_S``."""
+"""Longest wait for a thread to end, in s. The reader may wait for the guard, which takes less
+time."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board needs more time
-for a proof, the driver waits for that time. If no proof comes, the guard repeats Stop."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board's proof takes
+longer, this time is longer."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, if no guard process can repeat Stop. In this case ``UNGUARDED_S``
 replaces ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
-"""Longest wait, in s, for a second proof that the robot is at rest. If a board needs more time for
-a proof, the driver waits for that time. The driver sends nothing during this wait. So the second
-proof shows that the board received the last Stop undamaged."""
+"""Longest wait, in s, for a second proof of rest; longer if the board's proof takes longer. The
+driver sends nothing meanwhile. So the proof shows that the last Stop arrived undamaged."""
 
 T = TypeVar("T")
 
@@ -48,20 +43,15 @@ T = TypeVar("T")
 class Link:
     """One session on one port, which is opened again whenever it is lost.
 
-    * ``opener``: opens the transport.
     * ``port``: name of the port in messages to the user.
-    * ``guard``: whether a separate process sends the board's stop commands when this process
-      cannot.
-    * ``deliver``: receives the session's events.
-    * ``report``: receives a sentence when the port, or one of its lines, cannot be opened or is
-      lost. Receives None when the port and all its lines are open.
+    * ``guard``: whether a separate process stops the robot when this process cannot.
+    * ``report``: receives a sentence when a line is missing, and None when all are open.
     * ``refused``: receives the reason whenever a command is refused.
     * ``on_read``, ``on_write``: receive each packet that was read or written.
-    * ``failed``: receives the exception that ended a thread. Only a defect can cause such an
-      exception.
+    * ``failed``: receives the exception that ended a thread. Only a defect causes one.
 
-    All of these functions except ``opener`` and ``failed`` are called one at a time, in the order
-    of the events. They run on the reader's thread or on another thread.
+    The functions except ``opener`` and ``failed`` are called one at a time, in the order of the
+    events. They run on any of several threads.
     """
 
     def __init__(
@@ -153,9 +143,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        If the port was lost while the robot drove, the reader tries once more to open it and send
-        Stop. Returns whether this call has sent Stop and ended the threads. Afterwards, ``stands``
-        is True if the board has shown that the robot is at rest.
+        Returns whether this call sent Stop and ended the threads. ``stands``: whether the board has
+        proved rest. If the port was lost, the reader tries Stop once more.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:
@@ -194,7 +183,7 @@ class Link:
     def _stop_for_good(self) -> None:
         """Stop the robot and wait until it is at rest. The caller holds the lock.
 
-        The lock is released during the wait, so that the pacer can repeat Stop.
+        The wait releases the lock, so that the pacer can repeat Stop.
         """
         self._session.shutdown.begin(now := time.monotonic())
         self._shared.settle()

@@ -2,8 +2,7 @@
 
 """Conversion between the core's values and ROS messages: pure functions without a node.
 
-Conventions: REP-103 (axes, units), REP-105 (odom to base_link), REP-145 (an IMU without
-orientation).
+Conventions: REP-103 (axes, units), REP-105 (odom to base_link), REP-145 (IMU without orientation).
 """
 
 import math
@@ -51,7 +50,7 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 """State of the wheels, in three parts.
 
 * Sum of the robot's displacements along its own axes, in m and rad.
-* Angle by which each wheel has turned in total, in rad.
+* Angle of each wheel, in rad.
 * Rate of each wheel, in rad/s. Empty if unknown.
 """
 
@@ -60,8 +59,8 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 class MessageSettings:
     """What messages contain besides measurements: frames, standard deviations and wheels.
 
-    The names of the frames include the prefix. The standard deviations are in SI units. For a board
-    without an IMU, ``imu_frame`` is the prefix alone, and the IMU's standard deviations are 0.
+    The frames include the prefix. Standard deviations are in SI units. Those of a missing IMU are
+    0.
     """
 
     odom_frame: str
@@ -195,8 +194,7 @@ def diagnostic_message(
 def body_twist(twist: Any) -> BodyTwist:
     """Return the planar part of a geometry_msgs/Twist, in m/s and rad/s.
 
-    Raises CommandRefused for NaN or infinity in any of its six values: if one value is invalid, the
-    other values cannot be trusted either.
+    Raises CommandRefused if any of the six values is NaN or infinity.
     """
     linear, angular = twist.linear, twist.angular
     require_finite("cmd_vel", (linear.x, linear.y, linear.z, angular.x, angular.y, angular.z))
@@ -211,12 +209,8 @@ def is_planar(twist: Any) -> bool:
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
     """Return the planar pose of a geometry_msgs/PoseStamped; z must be finite, but is ignored.
 
-    Raises CommandRefused in these cases:
-
-    * The frame is neither ``odom_frame`` nor empty.
-    * A value is not finite.
-    * The length of the quaternion is below ``SHORTEST_QUATERNION``, or above its inverse.
-    * The orientation is tilted by more than ``MOST_TILT_RAD``.
+    Raises CommandRefused if the pose is in another frame, is not finite, is tilted, or has no unit
+    quaternion.
     """
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):
@@ -245,7 +239,7 @@ def goal_pose(stamped: Any, odom_frame: str) -> Pose:
 def age(stamp: Time, now_ns: int) -> float:
     """Return the age of a stamp, in s. A stamp of zero has the age 0.
 
-    ``now_ns``: present time of the clock that made the stamp, in ns.
+    ``now_ns``: present time of the stamp's clock.
     """
     stamp_ns = stamp.sec * 10**9 + stamp.nanosec
     return (now_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
@@ -268,12 +262,10 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return the time of the wall clock minus that of the steady clock, in ns.
+    """Return the wall clock minus the steady clock, in ns; ``known_ns`` if the readings allow it.
 
-    The caller has read three clocks in this order: the steady clock (``before_ns``), the wall clock
-    (``wall_ns``), and the steady clock again (``after_ns``). If the old offset ``known_ns`` is
-    consistent with these readings, it is returned unchanged. So a pause of the thread between the
-    readings does not change the offset, but a step of the wall clock changes it at once.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. A pause between
+    the readings does not change the result.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -2,8 +2,7 @@
 
 """The ROS node: it connects topics, services and parameters to a link and its session.
 
-This module does not compute anything. The link's reader thread publishes the measurements as they
-arrive. The executor sleeps unless a timer, a message, a service call or a parameter wakes it.
+This module does not compute anything. The link's reader thread publishes the measurements.
 """
 
 import math
@@ -90,9 +89,8 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        The executor would check each of these callbacks before it takes a command. Without these
-        callbacks, the driver logs no warning about an incompatible quality of service; the
-        subscriber does.
+        The executor would check all these callbacks before each command. So only the subscriber
+        reports an incompatible quality of service.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
@@ -232,10 +230,7 @@ class OmniBotDriver(Node):
         return selfcheck.waiting_advice(self._values["port"], self.get_clock().now().nanoseconds)
 
     def _refuse(self, text: str) -> None:
-        """Count each refusal, and log each kind of refusal at most once every ``WARN_EVERY_S``.
-
-        Frequent refusals of one kind therefore do not hide those of another kind.
-        """
+        """Count each refusal, and log each kind of refusal at most once every ``WARN_EVERY_S``."""
         self._refusals = Refusals(count=self._refusals.count + 1, last=text)
         kind, now_s = text.partition(":")[0], time.monotonic()
         if now_s - self._refused_at_s.get(kind, -math.inf) >= WARN_EVERY_S:

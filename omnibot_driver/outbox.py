@@ -2,11 +2,9 @@
 
 """A queue of calls to listeners, which several threads fill and empty.
 
-The calls are made in the order of the events that caused them. A thread queues a call while it
-holds the lock under which the event occurred. The thread makes the queued calls after it has
-released that lock. So a slow listener does not delay commands. Only one thread makes calls at a
-time. A second thread that wants to make calls leaves its calls to the first one. This module knows
-threads; it does not know what is delivered.
+A thread queues calls while it holds the lock of the event, and makes them after releasing this
+lock. So calls keep the order of events, and a slow listener does not delay commands. This module
+knows threads; it does not know what is delivered.
 """
 
 import threading
@@ -15,8 +13,7 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls from which ``deliver`` waits while another thread makes calls. With fewer
-queued calls, ``deliver`` leaves them to that thread and returns at once."""
+"""Number of queued calls from which ``deliver`` waits for another thread that makes calls."""
 
 Delivery = Callable[[], object]
 
@@ -38,11 +35,9 @@ class Outbox:
         self._waiting.append(delivery)
 
     def claim(self) -> bool:
-        """Return whether the caller may call the listener directly, without the queue.
+        """Return whether the caller may bypass the queue and call the listener directly.
 
-        This is cheaper than ``put`` and ``deliver``. The caller must hold the lock under which the
-        event occurred. If ``claim`` returns True, the caller must call ``release`` after the
-        delivery.
+        The caller holds the lock of the event. After True, the caller must call ``release``.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 

@@ -2,11 +2,9 @@
 
 """Standard output and standard error that never block the process.
 
-rclpy holds the interpreter's lock while it writes a log line. If the user stops the terminal with
-ctrl-S, or if nothing reads a pipe, this write would block every thread, even the watchdog. The
-robot would continue with its last command. So all output passes through a pipe. When the pipe is
-full, lines are lost, and the process is not blocked. This module knows descriptors; it does not
-know what is printed.
+rclpy holds the interpreter's lock while it writes a log line. After ctrl-S, or with an unread pipe,
+this write would block even the watchdog. So output passes through a pipe. A full pipe loses lines.
+This module knows descriptors; it does not know what is printed.
 """
 
 import contextlib
@@ -65,8 +63,7 @@ class UnblockedOutput:
 def _fill_gaps() -> None:
     """Open /dev/null on each of the descriptors 0 to 2 that is closed.
 
-    Otherwise the port might get the number of a closed standard output, and the log would be sent
-    to the board.
+    Otherwise the port might become standard output, and the board would receive the log.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
         pass

@@ -2,8 +2,8 @@
 
 """Publication of the session's events: measurements and states on topics, notices in the log.
 
-`outbox.py` calls the methods of this module one at a time, in the order of the events. So the state
-that is published last is the present one. Measurements are published on the reader's thread.
+`outbox.py` calls this module's methods one at a time, in the order of the events. Measurements are
+published on the reader's thread.
 """
 
 import contextlib
@@ -152,8 +152,7 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock.
 
-        This clock is 0 at first. While it is 0, measurements are not published. The clock may also
-        jump back.
+        While this clock is 0, measurements are not published. The clock may also jump back.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -232,10 +231,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text is new: not logged since valid data last came from the board.
+        """Return whether this text was not logged since valid data last came from the board.
 
-        So if a port is lost and opened again and again without valid data, this is reported only
-        once.
+        So repeated losses of a port are reported only once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

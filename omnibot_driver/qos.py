@@ -11,6 +11,5 @@ LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL
 DEEP: Final = QoSProfile(depth=1000)
 """Quality of service of messages and calls that must not be lost while the driver is busy.
 
-A queue of the usual depth 10 drops its oldest message when more messages wait. For example, the
-message that a button was pressed would be lost after ten later messages.
+A queue of 10 would drop, for example, a pressed button after ten later messages.
 """

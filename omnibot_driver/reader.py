@@ -2,9 +2,9 @@
 
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
-The reader delivers measurements at once, on its own thread, so no timer and no other thread delays
-them. The reader opens a lost port again, with a new guard process. Before the reader ends the use
-of a port, for any reason, it stops the robot.
+The reader delivers measurements on its own thread, so that nothing delays them. The reader stops
+the robot before it ends the use of a port, for any reason. A lost port is opened again, with a new
+guard.
 """
 
 import math
@@ -31,14 +31,9 @@ LONGEST_WAIT_S: Final = 2.0
 class Reader:
     """The work of the reader thread, which runs ``serve``, and its counts.
 
-    ``opener`` and the arguments after it are those of ``Link``.
-
-    * ``trouble``: why the port, or one of its lines, is not open, as a sentence. Empty if all are
-      open.
+    * ``trouble``: why the port, or one of its lines, is not open. Empty if all are open.
     * ``opened``: how often the port was opened.
-    * ``received_bytes``: number of bytes that were received.
-    * ``overruns``: how often the kernel has lost bytes since the port was last opened. None if the
-      kernel does not count.
+    * ``overruns``: the kernel's losses since the last opening. None if the kernel does not count.
     """
 
     def __init__(

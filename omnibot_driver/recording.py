@@ -2,8 +2,8 @@
 
 """A recording in place of a port: the URL ``replay://bag?speed=10`` names a rosbag2.
 
-This module knows the URL, and the library rosbags, which reads bags without ROS. It does not know
-when the bytes are needed, or what they mean.
+This module knows the URL and the library rosbags. It does not know when the bytes are needed, or
+what they mean.
 """
 
 import math
@@ -27,7 +27,7 @@ class Recording:
 
     * ``path``: the bag, which is a folder or a single file.
     * ``topics``: the topic of each channel.
-    * ``speed``: factor of the playback speed. Infinity plays as fast as possible.
+    * ``speed``: factor of the playback speed. Infinity: as fast as possible.
     * ``delay_s``: time until playback begins, in s.
     """
 
@@ -63,10 +63,9 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that the URL names.
+    """Return the recording that the URL names. The bag must have a topic for each channel.
 
-    ``channels``: names of the board's channels. The bag must have a topic for each of them. Raises
-    ParameterError, which says what is wrong with the URL or the bag.
+    Raises ParameterError if the URL or the bag is wrong.
     """
     location, _, query = url[len(SCHEME) :].partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))

@@ -2,10 +2,8 @@
 
 """A session that is fed from a recording: the counterpart of `Link` for recorded bytes.
 
-The session's time is that of the recording. The session gets each packet at the time at which the
-packet was received, and ``tick`` is called whenever ``wake_at`` is reached. So the session's output
-depends on the recording alone, not on this machine or on the playback speed. Packets that the
-session would send are discarded.
+The session's time is that of the recording. So the session's output does not depend on this machine
+or on the playback speed. Packets that the session would send are discarded.
 """
 
 import threading
@@ -32,14 +30,12 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    * ``deliver``: receives the session's events, and the time of day, in ns, at which the session's
-      time is zero.
+    * ``deliver``: also receives the time of day, in ns, of the session's time zero.
     * ``report``: receives None when the recording begins.
     * ``refused``: receives the reason whenever a command is refused.
-    * ``failed``: receives the exception that ended the thread. Only a defect can cause such an
-      exception.
+    * ``failed``: receives the exception that ended the thread. Only a defect causes one.
 
-    All of these functions except ``failed`` are called one at a time, in the order of the events.
+    The functions except ``failed`` are called one at a time, in the order of the events.
     """
 
     def __init__(

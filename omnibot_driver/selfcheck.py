@@ -2,10 +2,8 @@
 
 """Advice on what disturbs the driver: settings of the computer, and other nodes.
 
-This module checks the USB adapter of an open port, the clock, nodes of the same name, and
-publishers of ``cmd_vel`` with another message type. It reads sysfs; it does not use pyserial, ROS
-or a board. If a port cannot be opened, for example because of its permissions, ``transports``
-reports the reason.
+This module reads sysfs; it does not use pyserial, ROS or a board. ``transports`` reports why a port
+cannot be opened.
 """
 
 from collections.abc import Iterable
@@ -58,7 +56,7 @@ def clock_advice(port: str, use_sim_time: bool) -> str:
 def waiting_advice(port: str, now_ns: int) -> str:
     """Return a warning if the node's clock, ``now_ns``, is still 0; otherwise empty.
 
-    A recording has stamps of its own, so the clock is not checked for a recording.
+    A recording has its own stamps, so it needs no clock.
     """
     if now_ns or port.lower().startswith(RECORDING):
         return ""

@@ -30,8 +30,7 @@ from omnibot_driver.replay import Replay
 class Services:
     """The services of one node, except those that only one kind of board has.
 
-    ``calibration_file``: file in which a measured gyro bias is saved. If it is empty, the bias is
-    not saved.
+    ``calibration_file``: file in which a measured gyro bias is saved. If empty, it is not saved.
     """
 
     def __init__(

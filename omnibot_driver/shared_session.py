@@ -2,9 +2,8 @@
 
 """One session and its open port, which several threads share under one lock.
 
-After each input to the session, ``settle`` writes the packets that are due, gives the guard the
-present stop commands, and queues the events in the outbox. So all events keep their order. This
-module starts no thread and opens no port.
+``settle`` must follow each input to the session: it writes the packets that are due, and queues the
+events in order. This module starts no thread and opens no port.
 """
 
 import math
@@ -35,10 +34,8 @@ class SharedSession:
     Only ``call``, ``command`` and ``blocked`` may be used without holding ``lock``.
 
     * ``changed``: condition of this lock, on which the pacer and the shutdown wait.
-    * ``port``: the open port, or None.
-    * ``keeper``: keeper of the guard process for this port, or None.
+    * ``port``, ``keeper``: None if the port is not open, or has no guard.
     * ``write_error``: the error after which nothing more is written to the port, or None.
-    * ``deliver``, ``refused``, ``on_write``: as in ``Link``.
     """
 
     def __init__(
@@ -61,9 +58,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the board is sent when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop was written to every line. The last Stop is written when the link
-        ends. If the port was lost while the robot drove, the last Stop is written when the port is
-        open again."""
+        """Whether the last Stop, at the end of the link, was written to every line. After a loss
+        while driving, Stop waits until the port is open again."""
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
@@ -75,8 +71,7 @@ class SharedSession:
     def call(self, action: Callable[[Session, float], T]) -> T:
         """Call ``action`` with the session and the time in s, and return the result of ``action``.
 
-        The resulting packets are written before ``call`` returns. Another thread delivers the
-        events.
+        Packets are written before ``call`` returns. Another thread delivers the events.
         """
         try:
             with self.lock:
@@ -100,11 +95,10 @@ class SharedSession:
         """Pass ``wish``, the motion that a sender wants, to the session by calling ``action``.
 
         * ``sent_ns``: the possible times of day, in ns, at which the command was sent.
-        * ``moves_base``: whether ``wish`` is a motion of the base. Only the refusal of such a
-          motion affects the motion interlock.
+        * ``moves_base``: whether a refusal of ``wish`` affects the motion interlock.
 
-        Raises CommandRefused for a command that waited while this process was stalled. Each refusal
-        is also passed to ``refused``, in the order of the events, unless the outbox is full.
+        Raises CommandRefused for a command that waited while this process was stalled. ``refused``
+        receives each refusal, unless the outbox is full.
         """
         try:
             with self.lock:
@@ -129,11 +123,7 @@ class SharedSession:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets, so that it will be opened again.
-
-        This is True only for a moment, because the reader is already awake and opens the port
-        again.
-        """
+        """Whether the port did not accept the last packets; the reader then opens it again."""
         with self.lock:
             return self.write_error is not None
 

@@ -2,10 +2,8 @@
 
 """Detection of stalls: times in which this process, or its watchdog, did not run.
 
-A stall can come from SIGSTOP, from a swapped-out or suspended host, or from a thread that hangs.
-During a stall commands keep arriving. After the stall, the driver must not obey the commands that
-were sent during it. Every time ``now`` is a time of ``boot_time_s``. This module knows times; it
-does not know threads or commands.
+The driver must not obey commands that were sent during a stall. Every ``now`` is a time of
+``boot_time_s``. This module knows times; it does not know threads or commands.
 """
 
 import math
@@ -13,12 +11,10 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Time without a call of ``passed``, in s, from which the process is regarded as stalled.
-``passed`` should be called ten times a second. The guard waits longer before it acts, so the driver
-notices every stall in which the guard acts."""
+"""Time without a call of ``passed``, in s, from which the process is regarded as stalled. It must
+be shorter than the guard's limit."""
 SETTLE_S: Final = 0.25
-"""Time after a stall, in s. A command that arrives within this time is regarded as sent during the
-stall, whatever its send time. The same is true of a command that was sent within this time, because
+"""Time after a stall, in s. Commands that arrive or were sent within this time are refused, because
 a sender's clock is known only roughly."""
 LATEST_S: Final = 10.0
 """Longest assumed time in transit, in s, retransmissions included. A command that seems to be older
@@ -38,12 +34,9 @@ def boot_time_ns() -> int:
 class StallDetector:
     """Knows whether this process is stalled now, and when the last stall ended.
 
-    The watchdog's thread calls ``passed`` to show that it runs. Other threads call ``begun`` before
-    they act, to learn of a stall. While ``begun`` would report a stall, ``outlived_by`` returns
-    False for every command.
-
-    All times are kept by the steady clock, so a step of the time of day does not change them. Each
-    call of ``passed`` measures the difference between the time of day and the steady clock.
+    The watchdog's thread calls ``passed`` ten times a second. Other threads call ``begun`` before
+    they act. All times are kept by the steady clock, so a step of the time of day does not change
+    them.
     """
 
     def __init__(self) -> None:
@@ -57,7 +50,7 @@ class StallDetector:
     def begun(self, now: float) -> float:
         """Return the length of the present stall so far, in s; 0 without a stall.
 
-        Each stall is reported only once: a second call during the same stall returns 0.
+        Each stall is reported only once.
         """
         length_s = now - self._passed_at
         if self._begun or length_s < STANDSTILL_S:
@@ -79,7 +72,7 @@ class StallDetector:
     def outlived_by(self, sent_ns: int, now: float) -> bool:
         """Return False if a command may have been sent before or during a recent stall, else True.
 
-        ``sent_ns``: time of day at which the command was sent, in ns.
+        ``sent_ns``: time of day, in ns.
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False

@@ -2,26 +2,9 @@
 
 """Transit time of a command without a stamp, from the time at which the middleware sent it.
 
-The sender's clock may be off by any amount, so a single message does not show its delay. This
-module compares the messages of one sender. For each message, it computes a difference: the time of
-our clock when the message arrived, minus the time of the sender's clock when the message was sent.
-The smallest difference belongs to the message that was in transit for the shortest time. This
-difference is taken as the offset of the two clocks. The delay of any other message is its
-difference minus this offset. Our own clock measures exactly how long a message then waits in this
-process.
-
-Clocks can step. So each difference is computed twice, by our time of day and by our steady clock,
-and the smaller of the two delays is used. A common step of our time of day and the sender's clock
-(one host, or NTP everywhere) does not change the difference by our time of day. A step of our time
-of day alone does not change the difference by our steady clock.
-
-If a sender's clock alone is set back, all later messages of that sender seem to be late. When all
-messages have been late for ``HEALS_AFTER_S``, the smallest difference among them becomes the
-sender's offset. A real delay that lasts as long has the same effect, because it looks the same.
-
-The middleware numbers the messages of each sender, but does not report who sent a message. A
-message whose number is not above a sender's last number must come from another sender. This module
-does not read a clock, and does not use ROS.
+difference = arrival by our clock - sending by the sender's clock. A sender's smallest difference is
+the offset of the clocks; delay = difference - offset. docs/internals/stopping.md explains why. This
+module does not read a clock, and does not use ROS.
 """
 
 import math
@@ -35,32 +18,30 @@ LONGEST_SILENCE_S: Final = 2.0
 """Longest pause, in s, between two late messages of one series. After a longer pause, a late
 message begins a new series."""
 LARGEST_DRIFT: Final = 5e-4
-"""Largest assumed drift between two clocks, in s per s. A crystal is off by a tenth of this value,
-and NTP corrects a clock at most at this rate."""
+"""Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
+rate."""
 CLOCK_RETREATS: Final = 10.0
-"""A message is assigned to the sender that it fits best. A message that is 1 s too early for a
-sender fits as badly as a message that is ``CLOCK_RETREATS`` seconds too late."""
+"""A message that is 1 s too early for a sender fits as badly as a message that is
+``CLOCK_RETREATS`` seconds too late."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
-"""Number of messages after which the offset of a sender is regarded as known, because at least one
-of them had almost no delay. If there are fewer messages, perhaps all of them were delayed. In that
-case the estimated send time of the next message is too late."""
+"""Number of messages after which the offset of a sender is regarded as known. Before that, perhaps
+all messages were delayed."""
 
 Differences = tuple[float, float]
-"""Time of our clock when a message arrived, minus the time of the sender's clock when it was sent.
-The first number, in s, is by our time of day. The second is by our steady clock."""
+"""Arrival by our clock minus sending by the sender's clock, in s: by our time of day, and by our
+steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
     """One message and its times, in ns.
 
-    * ``sent_ns``: time of day by the sender's clock when the message was sent.
-    * ``received_ns``: time of day by our clock when the message came in.
+    * ``sent_ns``: time of day by the sender's clock.
+    * ``received_ns``: time of day by our clock.
     * ``now_ns``: present time of day by our clock.
     * ``steady_ns``: present time of a steady clock.
-    * ``number``: number of this message among its sender's messages. None if the middleware does
-      not count them.
+    * ``number``: the message's number at its sender. None if the middleware does not count.
     """
 
     sent_ns: int
@@ -75,9 +56,8 @@ class Delay:
     """The age of a message, and the time at which it was sent.
 
     * ``total_s``: time since the message was sent, in s.
-    * ``waited_s``: part of this time in which the message waited in our own queue, in s.
-    * ``sent_ns``: possible times of day at which the message was sent, by our clock, in ns. There
-      are two of them until enough messages of the sender have arrived.
+    * ``waited_s``: part of this time, in s, in our own queue.
+    * ``sent_ns``: time of sending by our clock, in ns; two values until the sender is known.
     """
 
     total_s: float
@@ -108,13 +88,14 @@ class Transit:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """Return the delay of this message.
+        """Return the delay of this message; a message is late above ``longest_s``.
 
-        If the delay exceeds ``longest_s``, the message is regarded as late. The first message of
-        each sender is assumed to have had no delay in transit.
+        The first message of each sender is assumed to have had no delay in transit.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
+        # A step of our time of day and the sender's clock together changes only the second difference.
+        # A step of our time of day alone changes only the first. So the smaller delay is right.
         differences_s = (
             (arrival.received_ns - arrival.sent_ns) / 1e9,
             (arrival.steady_ns - waited_ns - arrival.sent_ns) / 1e9,
@@ -197,6 +178,8 @@ class _Offset:
         self._least_late_s = min(self._least_late_s, difference_s)
         if at_s - self._late_since_s < HEALS_AFTER_S:
             return late_s
+        # All messages are late since the sender's clock was set back, or the network became slow.
+        # The two cases look the same.
         self._late_at_s = -math.inf
         self._least_s, self._least_at_s = self._least_late_s, at_s
         return difference_s - self._least_s

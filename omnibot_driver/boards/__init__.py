@@ -2,9 +2,8 @@
 
 """The boards that the driver supports. Each has a profile, which is imported only if it is chosen.
 
-A profile is the only module outside the core that knows its board. The profile has the board's
-parameters, and makes the board's objects from their values. The rest of the driver works with any
-board.
+The profile makes the board's objects from the values of its parameters. Outside the core, only the
+profile knows its board.
 """
 
 from collections.abc import Callable, Mapping
@@ -54,11 +53,9 @@ class Profile(Protocol):
         """Return the kinematics of the wheels, from checked values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Give the node the publishers, services and subscriptions that only this board has.
+        """Create the board's own ROS interfaces; return how to publish ``Extra`` values, by type.
 
-        Returns the functions that publish the values of ``Extra`` events, by type of value. The
-        methods ``call`` and ``command`` of ``link`` give access to the session. The driver calls
-        this once, on the executor's thread, before bytes arrive.
+        The driver calls this once, on the executor's thread, before bytes arrive.
         """
 
 
@@ -89,9 +86,7 @@ def table_for(given: Mapping[str, object]) -> Table:
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     """Return the values of all parameters of the given board.
 
-    Raises ParameterError if a value is wrong, or if the board lacks a given parameter. For a
-    parameter that the board lacks, the error names the boards that have it. If no board has it, the
-    error names the parameter with the nearest name.
+    Raises ParameterError if a value is wrong, or if the board lacks a given parameter.
     """
     table = table_for(given)
     for name in given:

@@ -89,11 +89,7 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's own topics and services, and return its publishing functions.
-
-    The topics from the board are steering joint, orientation, magnetic field, battery and ranges.
-    Other topics and the services are for brush, lift, lights and jobs.
-    """
+    """Create this board's own topics and services, and return its publishing functions."""
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
 
     publish: Mapping[type, Any] = FejemisTopics(node, link, values).publish

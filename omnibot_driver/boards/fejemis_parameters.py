@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The parameters of a Fejemis, except those that all boards have. This module must not use ROS.
+"""The parameters that only a Fejemis has. This module must not use ROS.
 
-The two Teensys store some of these values themselves. Such a value is unset by default, and the
-driver writes it only if the user sets it (`fejemis_values.py`).
+The two Teensys store some values. Such a value is unset by default. The driver writes only values
+that the user sets (`fejemis_values.py`).
 """
 
 import math

@@ -37,10 +37,8 @@ from omnibot_driver.qos import DEEP
 NAN: Final = float("nan")
 WARN_EVERY_S: Final = 2.0
 STEERING_EVERY_NS: Final = 40_000_000
-"""Shortest time between two published steering angles, in ns.
-
-The board sends 66 angles a second; joint states are for display, so fewer angles are enough.
-"""
+"""Shortest time between two published steering angles, in ns. The board sends 66 angles a
+second."""
 NOT_CONNECTED: Final = "the boards are not connected; check their power, cables and ports"
 RANGES: Final = ("tof", "sonar", "ir1", "ir2")
 SERVICES: Final = {
@@ -247,7 +245,7 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``off``: whether the action switches something off. Such an action needs no connection.
+        ``off``: whether the action switches something off. This needs no connection.
         """
 
         def say(session: Session, now: float) -> str:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Values of a Fejemis' parameters: what is written to the boards, and which values fit together.
+"""Selects the values to write to a Fejemis' boards, and checks that they fit together.
 
 This module must not use ROS. It does not know what a parameter means to the boards.
 """
@@ -57,8 +57,7 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
 def require_whole_settings(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if only a part of the parameters of one command is set.
 
-    The driver writes these parameters together, with one command. So the user must set all of them
-    or none.
+    The driver writes these parameters together, with one command.
     """
     _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
     _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")

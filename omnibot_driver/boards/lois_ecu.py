@@ -98,11 +98,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's own topics and services, and return its publishing functions.
-
-    The topics are GPS fix, GPS time, heading, e-stop button, text lines of sensors, and duties. The
-    services are LED, balls and records.
-    """
+    """Create this board's own topics and services, and return its publishing functions."""
     from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
 
     publish: Mapping[type, Any] = LoisEcuTopics(node, link, values).publish

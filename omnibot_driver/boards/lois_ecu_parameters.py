@@ -2,8 +2,8 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
-The board stores some of these values itself. Such a value is unset by default, and the driver
-writes it only if the user sets it.
+The board stores some values. Such a value is unset by default. The driver writes only values that
+the user sets.
 """
 
 from collections.abc import Mapping
@@ -17,8 +17,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest allowed rate of commands in a terminal mode, in Hz. A command has 14 characters. The
-board can forward 34 such commands per second to the compass."""
+"""Largest rate of commands in a terminal mode, in Hz. The board can forward 34 commands of 14
+characters per second to the compass."""
 
 WHEELS: Final = (
     Parameter(
@@ -164,8 +164,7 @@ _RANGES: Final = {
     "long_correction": (0.1, 10.0),
     "feed_forward": (0.0, 1000.0),
 }
-"""Smallest and largest value for each kind of setting. A negative gain would be unstable, and Tn is
-a divisor, so it must not be 0."""
+"""Limits for each kind of setting. A negative gain would be unstable. The board divides by Tn."""
 
 
 _UNITS: Final = {"tn": "s", "td": "s"}
@@ -244,7 +243,7 @@ SENT: Final = (
 def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if a terminal mode is chosen and checksums are off.
 
-    In a terminal mode the board expects checksums, and would ignore a stop without one.
+    In a terminal mode, the board would ignore a stop without a checksum.
     """
     if values["terminal_mode"] != "host" and not values["checksum"]:
         raise ParameterError(
@@ -256,8 +255,7 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the command rate is too high for a terminal mode.
 
-    The driver sends Stop at ``command_rate``. The board forwards each Stop to a sensor whose line
-    has 4800 baud, so a higher rate would delay Stop.
+    The board forwards each Stop to a sensor at 4800 baud. A higher rate would delay Stop.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
@@ -270,9 +268,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_possible_periods(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the board cannot work with a period.
 
-    A period must be 0 (off) or at least ``SHORTEST_PERIOD_S``: with a period near 0 the public
-    firmware would always be sending, and would miss all commands. ``ticks_period`` must not be 0,
-    and must be at most 0.5 s.
+    With a period near 0, the public firmware would send without pause and miss all commands.
     """
     for name in PERIODS:
         period_s = values[name]

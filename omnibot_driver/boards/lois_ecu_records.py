@@ -27,12 +27,8 @@ Row = tuple[object, ...]
 def table(reading: RecordReading) -> Iterator[Row]:
     """Yield the header of the file, then one row for each sample; an unknown value is empty.
 
-    The columns depend on the kind of record:
-
-    * RPM: the time from tick to tick in s, the speed calculated from this time, and the board's
-      timer counts.
-    * Torque: counts of a 12 bit ADC. The board does not report their scale.
-    * Heading: degrees clockwise from magnetic north.
+    Headings are in degrees clockwise from magnetic north. Torques are counts of a 12 bit ADC; their
+    scale is unknown.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:
@@ -87,8 +83,7 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
     """Write the record to ``path``; return whether the file exists afterwards.
 
-    ``wanted``: a function that is called when the data is on the disk. If it returns False, the
-    written data is discarded. Raises OSError if the file cannot be written.
+    ``wanted`` is called after the data is on the disk. False discards the data. Raises OSError.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)

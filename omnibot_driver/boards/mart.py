@@ -87,10 +87,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's own topics and services, and return its publishing functions.
-
-    The topics show battery, sonars and dock. The services are for gyro, docking, log and downloads.
-    """
+    """Create this board's own topics and services, and return its publishing functions."""
     from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
 
     publish: Mapping[type, Any] = MartTopics(node, link, values).publish

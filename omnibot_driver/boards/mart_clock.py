@@ -2,25 +2,22 @@
 
 """The numbers of the command TIME, and when they may be sent.
 
-The server ignores the seconds of TIME: it sets its clock to the full minute. The server also
-computes the heading with this clock. If the clock is set back between two motions, the heading is
-wrong. This module knows times only.
+TIME sets the server's clock to a full minute. If the clock is set back between two motions, the
+server computes a wrong heading. This module knows times only.
 """
 
 import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of a minute in which the driver sends TIME with the number of the next minute. The next
-minute begins within 4 s, so the clock is at most 4 s fast."""
+"""Seconds of a minute in which the driver sends TIME with the next minute. So the server's clock is
+at most 4 s fast."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second for TIME (UTC), or None if TIME must wait.
 
-    ``now_s``: this computer's time in s since 1970. ``may_set_back``: whether the server's clock
-    may be set back. If not, TIME must wait for the end of a minute. In the seconds ``ENDS_S``, the
-    numbers are those of the next minute.
+    ``now_s``: time in s since 1970. ``may_set_back``: whether the server's clock may be set back.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -141,8 +141,7 @@ OMNIBOT: Final = (
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if a goal pose has no consistent meaning with these axis signs.
 
-    If x or y alone is reversed, yaw is reversed too. So the sign of yaw must be the product of the
-    signs of x and y.
+    Reversing x or y alone also reverses yaw.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

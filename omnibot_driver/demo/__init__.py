@@ -2,7 +2,6 @@
 
 """The demo: a robot with a simulated board drives a square.
 
-Simulator and driver run as separate processes. The demo uses the driver's topics, as any ROS
-program does, and the simulator's console. The demo must not know the bytes on the line to the
-board.
+Simulator and driver run as separate processes. The demo uses the driver's topics and the
+simulator's console. It must not know the board's protocol.
 """

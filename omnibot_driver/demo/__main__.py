@@ -32,8 +32,7 @@ ROW_EVERY_S: Final = 1.0
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
     """Run the demo with this board for ``seconds``, or until ``asked_to_end`` returns True.
 
-    Raises ParameterError for an unknown board, DemoFailed if the demo cannot continue, and
-    ImportError without ROS.
+    Raises ParameterError for an unknown board, DemoFailed, and ImportError without ROS.
     """
     capability = capabilities.of(board)
     namespace = f"/demo_{os.getpid()}"
@@ -114,10 +113,7 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demo until its time is over, or until SIGINT or SIGTERM.
-
-    Return 0 at the end, 1 after a failure, and 2 on wrong usage.
-    """
+    """Run the demo until its time is over, or until SIGINT or SIGTERM; return the exit code."""
     parser = argparse.ArgumentParser(
         prog="demo",
         description="Lets a simulated robot drive a square. A real robot is not needed.",

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the demo must know about a board. The board's profile has it, so nothing has to run.
+"""What the demo must know about a board, from the board's profile.
 
 This module must not name a board, and must not use ROS or processes.
 """
@@ -20,12 +20,9 @@ class Capability:
 
     ``title``: name of the board, for the sentence "A simulated ... drives".
 
-    ``imu``: whether the driver publishes ``imu/data_raw``.
-
     ``sideways``: whether the robot can drive along its y axis.
 
-    ``ports``: names of the driver's parameters, one for each address that the simulator prints. A
-    name is empty if the driver derives this address from another one.
+    ``ports``: the driver's parameter for each address that the simulator prints; empty if derived.
 
     ``real``: arguments of the driver for the real robot.
 

@@ -16,8 +16,6 @@ from omnibot_driver.tools.monitor.screen import has_screen
 class Dashboard:
     """The tool ``monitor`` on this terminal, until the user quits it or ``close`` is called.
 
-    The monitor waits for the driver in ``namespace``, and then shows it.
-
     ``possible``: whether the terminal and the installed libraries allow the monitor to run.
     """
 

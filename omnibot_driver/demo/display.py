@@ -31,9 +31,7 @@ def status_row(
 ) -> str:
     """Return a row of the table under HEADING.
 
-    ``rates_hz``: rates of the IMU, None without one, and of the odometry.
-
-    ``velocities``: the commanded twist, then the measured one.
+    ``rates_hz``: of IMU and odometry. ``velocities``: the commanded twist, then the measured one.
     """
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
@@ -60,9 +58,7 @@ def introduce(
 ) -> None:
     """Print what the demo does, and commands that the user can try.
 
-    ``options``: the arguments of the simulator and of the driver.
-
-    ``exports``: environment variables that the user must set in another terminal.
+    ``options``: arguments of simulator and driver. ``exports``: environment variables to set.
     """
     imu = f"\n  ros2 topic hz {namespace}/imu/data_raw" * capability.imu
     turning = (
@@ -92,8 +88,6 @@ class Drive:
     ``pose``, ``true_pose``: the robot's pose at the end, by odometry and as simulated.
 
     ``points``: the driven path.
-
-    ``imu_hz``, ``odom_hz``: rates of the received messages; ``imu_hz`` is None without an IMU.
 
     ``real``: arguments of the driver for the real robot.
 

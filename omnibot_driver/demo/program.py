@@ -21,8 +21,7 @@ class DemoFailed(Exception):
 class Program:
     """A module of this package as a child process, which ends at the latest with its parent.
 
-    Signals from the terminal do not reach the child process, so ctrl-C does not end it. ``end``
-    ends it.
+    Ctrl-C does not reach the child process. ``end`` ends it.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:

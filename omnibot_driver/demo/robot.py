@@ -38,9 +38,6 @@ class Robot:
 
     ``driving``: whether this velocity drives the square. Otherwise it is zero.
 
-    ``imu``: in the constructor, whether the robot has an IMU. Afterwards, the rate of the IMU's
-    messages, or None.
-
     ``sideways``: whether the robot can drive along its y axis.
 
     ``leg``: how many sides of the square are complete.

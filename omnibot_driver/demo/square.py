@@ -2,8 +2,7 @@
 
 """Steers the robot around the square, from its pose and its present side of the square.
 
-A side is called a leg. Leg 0 leads along +x of the odometry frame, leg 1 along +y, leg 2 along -x,
-leg 3 along -y, and leg 4 along +x again.
+A side is called a leg. Legs 0 to 3 lead along +x, +y, -x and -y of the odometry frame.
 """
 
 import math
@@ -30,8 +29,7 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     """Return the present leg, and the robot's velocity in its own axes.
 
-    This robot drives along a leg and turns at the same time. It turns by 90° to the left on even
-    legs, and back on odd legs.
+    The robot drives and turns at the same time: 90° left on even legs, back on odd legs.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD

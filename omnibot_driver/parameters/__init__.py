@@ -2,15 +2,11 @@
 
 """Parameters: the rows that are common to boards, and the table of one board.
 
-A row has a name, a default, a unit, a range and a meaning. A board's table consists of its own
-rows, and of the common rows that the board can use. With the table, the node declares and checks
-its parameters. ``make docs`` writes config/<board>.yaml and docs/parameters.md from the tables.
+With the table, the node declares and checks its parameters. ``make docs`` writes
+config/<board>.yaml and docs/parameters.md from the tables.
 
-A new common row belongs in ``operating`` or ``robot``. A row of a single board belongs in the
-module beside that board's profile. A wrong value raises a ParameterError that names the parameter
-and the allowed values.
-
-This package uses plain Python types; it knows neither ROS nor a board.
+A new common row belongs in ``operating`` or ``robot``, a board's own row beside the board's
+profile. This package uses plain Python types; it knows neither ROS nor a board.
 """
 
 from omnibot_driver.parameters.parameter import RANGE_TYPES, Parameter, Value

@@ -24,22 +24,17 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 class Parameter:
     """One row of the table.
 
-    ``default``: the value if the user gives none. Its type is the parameter's type. The default of
-    a list has at least one item.
+    ``default``: its type is the parameter's type. A list has at least one item.
 
-    ``low``, ``high``: smallest and largest allowed value, or limits for each item of a list.
-
-    ``choices``: the allowed values, or the allowed items of a list.
+    ``low``, ``high``, ``choices``: what is allowed, for each item of a list.
 
     ``fixed``: whether the value is read-only after the start.
 
     ``calibrated``: whether a calibration file may contain the value.
 
-    ``length``: smallest and largest number of items of a list; None if a list must have as many
-    items as the default.
+    ``length``: smallest and largest number of items of a list; None: as many as the default.
 
-    ``unset``: whether the value is None if the user gives none, because the board keeps its own
-    value. For such a parameter, the default only defines the type.
+    ``unset``: whether the value is None unless given, because the board stores its own value.
     """
 
     name: str

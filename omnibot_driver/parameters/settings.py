@@ -2,8 +2,7 @@
 
 """Settings of the core's session, made from checked parameter values.
 
-If a board's table lacks a parameter, the parameter has no meaning for this board. In its place, the
-settings have a default.
+If a board lacks a parameter, its setting has a default.
 """
 
 import math

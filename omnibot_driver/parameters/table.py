@@ -2,8 +2,7 @@
 
 """The table of one board's parameters: the common ones that the board can use, and its own.
 
-A board's profile makes the table from the board's traits and from the board's own rows. This module
-does not use ROS, and does not name any board.
+This module does not use ROS, and does not name any board.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -61,8 +60,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""For each listed common parameter: a function that returns whether a board with given traits has
-the parameter. Common parameters that are not listed do not depend on the traits."""
+"""For a common parameter: whether a board with given traits has it. Other common parameters do not
+depend on the traits."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -143,14 +142,11 @@ def table(
 
     ``own``: rows that only this board has, by section.
 
-    ``without``: names in ``DISPENSABLE`` that have no meaning for this board. Rows that do not fit
-    its traits are left out in any case.
+    ``without``: names in ``DISPENSABLE`` that have no meaning for this board.
 
-    ``changed``: fields of common rows that differ for this board, by the row's name, for example
-    ``{"port": {"default": "udp://"}}``.
+    ``changed``: changed fields of common rows, e.g. ``{"port": {"default": "udp://"}}``.
 
-    ``checks``: checks that need the values of several parameters, in addition to those of every
-    board.
+    ``checks``: this board's checks of several parameters together.
     """
     changes = {
         "on_exit": {

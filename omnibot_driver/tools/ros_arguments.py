@@ -8,8 +8,7 @@ from collections.abc import Sequence
 def split_ros_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """Return the arguments for the program, and those for ROS.
 
-    The arguments for ROS are those from ``--ros-args`` to ``--``, or to the end. Both markers are
-    included.
+    ROS gets everything from ``--ros-args`` to ``--``, including both markers.
     """
     own: list[str] = []
     ros: list[str] = []

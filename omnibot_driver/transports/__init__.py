@@ -2,8 +2,8 @@
 
 """Transports that carry packets to a board and back: serial ports, datagrams, several lines.
 
-Every failure is a LinkError whose text says what to do. The transports know descriptors and bytes;
-they know neither threads nor boards.
+Every LinkError says what to do. The transports know descriptors and bytes; they know neither
+threads nor boards.
 """
 
 from collections.abc import Mapping
@@ -31,9 +31,9 @@ class Transport(Protocol):
 
     @property
     def descriptors(self) -> tuple[int | None, ...] | None:
-        """File descriptors by channel. Another process may inherit them, and write to the board.
+        """File descriptors by channel, for another process to inherit; None for a missing line.
 
-        The result is None if descriptors cannot be inherited. The item of a missing line is None.
+        The result is None if descriptors cannot be inherited.
         """
 
     @property
@@ -51,15 +51,14 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet and return it; return an empty packet if none arrives for a while.
 
-        Raises LinkError when the line is lost, and LinesChanged when one of several lines is lost
-        or open again.
+        Raises LinkError when the line is lost, LinesChanged when one of several is lost or open
+        again.
         """
 
     def write(self, packets: Packets) -> None:
         """Write all packets; discard packets for a missing line.
 
-        Raises LinkError if a line is lost. In this case, bytes that were written but not sent yet
-        are discarded.
+        Raises LinkError if a line is lost, and discards its unsent bytes.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -2,8 +2,7 @@
 
 """One open serial port or pyserial URL: the only module that knows pyserial.
 
-The port reads and writes bytes. Every failure is a LinkError whose sentence says what to do. This
-module knows ports; it knows neither threads nor boards.
+Every LinkError says what to do. This module knows ports; it knows neither threads nor boards.
 """
 
 import contextlib
@@ -32,8 +31,7 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""Options of a network socket. A peer that acknowledges nothing for five seconds is regarded as
-lost. While the line is idle, the peer is checked every second."""
+"""Options of a network socket. A peer that acknowledges nothing for five seconds is lost."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Major device numbers of pseudo-terminals in Linux."""
 
@@ -43,9 +41,8 @@ class SerialPort:
 
     ``parameter``: the parameter that names the port, for error messages.
 
-    Linux raises the lines DTR and RTS when the first program opens a port. This class leaves both
-    raised when it closes the port. So a board that restarts when a line is raised restarts at most
-    once after it is plugged in.
+    Linux raises DTR and RTS at the first opening. Both must stay raised at ``close``: some boards
+    restart whenever a line is raised.
     """
 
     ends_with_us = False

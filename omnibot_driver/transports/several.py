@@ -2,9 +2,8 @@
 
 """Several lines of bytes as one transport; each line is one channel.
 
-If a line is missing or blocked, the others are still read and written. The transport opens the
-missing line again, while the others stay open. When a line is lost or open again, ``read`` raises
-LinesChanged.
+If a line is missing or blocked, the others are still read and written. The transport opens missing
+lines again.
 """
 
 import select
@@ -69,8 +68,8 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        A missing line may still have an open descriptor. This descriptor is not given to the guard:
-        with a copy in another process, the driver could not open the line again.
+        The guard must not get a missing line's descriptor: the driver could not open the line
+        again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -86,18 +85,14 @@ class Several:
 
     @property
     def overruns(self) -> int | None:
-        """How often the kernel has lost bytes, added over all open lines.
-
-        The result is None if the kernel does not count this for one of the lines.
-        """
+        """How often the kernel has lost bytes, over all open lines; None if a line has no count."""
         counts = [port.overruns for port in self._ports]
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines that have bytes are read in turn.
 
-        Raises LinesChanged when a line is lost or open again, and LinkError when all lines are
-        missing.
+        Raises LinesChanged when a line is lost or open again, LinkError when all are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -197,7 +192,7 @@ class Several:
     def _write_what_waits(self, now: float) -> None:
         """Write waiting bytes to lines with room. Let ``poll`` watch the lines without room.
 
-        A line that has no room for ``WRITE_TIMEOUT_S`` is regarded as missing.
+        After ``WRITE_TIMEOUT_S`` without room, a line is missing.
         """
         with self._writing:
             for line in self._lines:
@@ -264,7 +259,7 @@ class Line:
     def write(self, data: bytes, now: float) -> bool:
         """Write the waiting bytes, then ``data``; return False if bytes have waited for too long.
 
-        If the line is missing but still open, only the bytes that it accepts at once are written.
+        A missing line gets only the bytes that it accepts at once.
         """
         if self.port is None:
             return True
@@ -279,8 +274,7 @@ class Line:
     def flush(self, now: float) -> bool:
         """Write waiting bytes; return False if some of them have waited for ``WRITE_TIMEOUT_S``.
 
-        If the result is False, the waiting bytes are discarded, and also bytes that were written
-        but not sent yet.
+        After False, all unsent bytes are discarded.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

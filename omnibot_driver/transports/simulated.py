@@ -2,9 +2,8 @@
 
 """``sim://``: a simulated board inside this process, as a transport.
 
-Options follow a question mark: ``sim://?seed=1&lose=0.001``. The board starts when the transport is
-opened, and ends when it is closed. This module knows the name of the simulated board's package; it
-does not know the meaning of the board's bytes.
+Options follow a question mark: ``sim://?seed=1&lose=0.001``. This module knows the name of the
+simulated board's package; it does not know the meaning of the board's bytes.
 """
 
 import threading
@@ -29,8 +28,7 @@ class SimulatedTransport:
 
     ``simulator``: full name of the package of the simulated board.
 
-    Raises LinkError if the URL is wrong. ``read`` and ``close`` raise RuntimeError if the board's
-    thread has died, which only a defect of the simulator can cause.
+    Raises LinkError if the URL is wrong, RuntimeError if the board's thread has died.
     """
 
     missing = NONE_MISSING

@@ -2,9 +2,8 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-A packet is one datagram. Each socket receives only datagrams from the address to which it writes.
-If the host is absent, or does not listen on a port, it is treated as a silent board and not as an
-error. The host may answer again later, so the sockets stay open.
+Each socket receives only from the address to which it writes. An absent host is a silent board, not
+an error, because the host may answer later.
 """
 
 import contextlib

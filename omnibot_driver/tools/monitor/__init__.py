@@ -2,6 +2,5 @@
 
 """Shows a running driver on a terminal, with keys that start, stop and steer the robot.
 
-The monitor uses the driver's topics and services, as any ROS program does. The monitor must not
-know the protocol on the line to the board.
+The monitor uses the driver's topics and services. It must not know the board's protocol.
 """

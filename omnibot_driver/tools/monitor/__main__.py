@@ -146,11 +146,9 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 
 
 def _gather(feed: "Feed", timeout_s: float) -> View:
-    """Wait until the view is complete, and return it.
+    """Wait for a message on each expected topic, at most ``timeout_s``; return the view.
 
-    The view is complete if each topic that the driver publishes in its present state has sent a
-    message. The monitor waits for this until ``timeout_s`` is over. The rates are measured over
-    ``WINDOW_S``.
+    The rates are measured over ``WINDOW_S``.
     """
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)

@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The monitor's screen.
+"""The monitor's screen. A ``Robot`` provides its values, and carries out what the keys request.
 
-The module knows terminals and keys; it does not know ROS. A ``Robot`` provides the values to show,
-and carries out what the keys request.
+The module knows terminals and keys; it does not know ROS.
 """
 
 import asyncio
@@ -142,8 +141,7 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Textual starts a new thread that reads keys. ``suspend`` ends the old thread before that.
-        Otherwise two threads would read keys.
+        Textual starts a new thread that reads keys. ``suspend`` must end the old thread first.
         """
         with self.suspend():
             pass

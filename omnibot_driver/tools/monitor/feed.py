@@ -2,7 +2,7 @@
 
 """Connects the monitor to the driver: stores received messages in a model, and sends requests.
 
-Messages are received in a separate thread, so the screen does not delay them.
+A separate thread receives messages, so the screen does not delay them.
 """
 
 import os
@@ -55,11 +55,10 @@ IMU_PARAMETER: Final = "imu_frame"
 class Feed:
     """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
 
-    ``dead_man``: the dead man's switch. With it, the monitor publishes ``cmd_vel`` while a key is
-    held. Without it, the monitor never publishes ``cmd_vel``.
+    ``dead_man``: with it, the monitor publishes ``cmd_vel`` while a key is held; otherwise never.
 
-    Any thread may call ``estop``, ``release``, ``start``, ``pause`` and ``reset_odometry``. The
-    result of such a call appears in the view. Raises ToolError for invalid names.
+    Any thread may send requests, such as ``estop``. Their results appear in the view. Raises
+    ToolError for invalid names.
     """
 
     def __init__(

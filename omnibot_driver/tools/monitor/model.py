@@ -2,8 +2,8 @@
 
 """The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
-The model stores values as received, even NaN and infinity, because the user should see that they
-are invalid. The model must not know ROS, terminals or the clock.
+The model keeps NaN and infinity, because the user should see invalid values. The model must not
+know ROS, terminals or the clock.
 """
 
 import math
@@ -24,26 +24,21 @@ DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
 """Time in s for which a command is valid: the default of the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Age in s above which diagnostics are outdated. The driver publishes them every second.
-
-A driver that has sent nothing for this time is regarded as silent.
-"""
+"""Age of the last message, in s, above which a driver is silent, and its diagnostics are
+outdated."""
 STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
 """``JUMP_M``, ``JUMP_MPS``: how far the pose may move between two messages, in m and in m/s.
 
-The sum of both is allowed: the distance, and the speed multiplied by the time. If the pose moves
-further, the monitor assumes a reset of the odometry, and begins a new path.
+Limit: JUMP_M + JUMP_MPS · time. Beyond it the odometry was reset, so a new path begins.
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
     """How often messages arrive on a topic.
-
-    ``hz``: the present rate.
 
     ``age_s``: time in s since the last message; None if no message came recently.
 
@@ -59,7 +54,7 @@ class Flow:
 class View:
     """The values to show at one moment. A value that is unknown or outdated is None or empty.
 
-    ``estop_asked``: whether the user has requested the e-stop, and the driver has not confirmed it.
+    ``estop_asked``: the e-stop is requested, but the driver has not confirmed it.
 
     ``silent_s``: time in s since the driver's last message.
 

@@ -19,10 +19,7 @@ DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
 BARS: Final = " ▁▂▃▄▅▆▇"
 ARROWS: Final = "→↗↑↖←↙↓↘"
 SMALLEST_M: Final = 0.5
-"""Smallest width or height, in m, that a path's picture shows.
-
-With this limit, the noise of a robot at rest does not fill the picture.
-"""
+"""Smallest width or height, in m, of a path's picture, so that noise does not fill the picture."""
 LARGEST_M: Final = 1e6
 
 
@@ -39,8 +36,7 @@ def draw_path(
 ) -> Picture:
     """Draw a path from above, as large as possible; x is to the right, y is up.
 
-    An arrow shows the ``robot``. Points that are not finite, or a million metres away, are left
-    out.
+    An arrow shows the ``robot``. Points that cannot be drawn are left out.
     """
     columns, rows = max(1, columns), max(1, rows)
     seen = [point for point in points if _drawable(*point)]
@@ -78,10 +74,7 @@ def draw_path(
 
 
 def sparkline(values: Sequence[float], columns: int) -> str:
-    """Return the newest values as bars, with the newest at the right end.
-
-    The largest of these values has the highest bar, and 0 has no bar.
-    """
+    """Return the newest values as bars, newest at the right. The largest value has full height."""
     shown = values[-columns:] if columns > 0 else []
     peak = max(shown, default=0.0) or 1.0
     bars = "".join(BARS[math.ceil(value / peak * (len(BARS) - 1))] for value in shown)

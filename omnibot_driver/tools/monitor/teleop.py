@@ -2,9 +2,8 @@
 
 """Steers the robot by keys, with a dead man's switch.
 
-A terminal reports that a key is pressed, and repeats this report while the key is held. It does not
-report the release of a key. So a pressed key moves the robot only for a short time, and a held key
-renews this time.
+A terminal repeats a held key, but does not report its release. So each report of a key moves the
+robot only for a short time.
 
 The module knows keys and times; it does not know ROS or terminals.
 """
@@ -15,10 +14,8 @@ from typing import Final
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 FIRST_S: Final = 0.6
-"""Time in s for which a newly pressed key moves the robot.
-
-Most keyboards begin to repeat a held key after 0.25 s to 0.6 s.
-"""
+"""Time in s for which a newly pressed key moves the robot. Keyboards begin to repeat after 0.25 s
+to 0.6 s."""
 REPEAT_S: Final = 0.3
 """Time in s for which a repeated key moves the robot. Several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
@@ -52,7 +49,7 @@ MOTIONS: Final = {
 class DeadMan:
     """Turns pressed keys into commands. The caller calls ``command`` regularly.
 
-    ``press`` may be called by another thread. It stores key and time together, in one assignment.
+    Another thread may call ``press``, which stores key and time in one assignment.
     """
 
     def __init__(self) -> None:

@@ -84,10 +84,7 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Return the driver's statuses as lines of text, each with its level.
-
-    Each status that is not OK has a line of its own. All OK statuses share one line.
-    """
+    """Return the driver's statuses as lines with levels. All OK statuses share one line."""
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)

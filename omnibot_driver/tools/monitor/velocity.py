@@ -24,9 +24,7 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """The topic ``cmd_vel``, with the message type that the driver uses.
-
-    A topic cannot have two types in one process. So subscription and publisher use the same type.
+    """The topic ``cmd_vel``, with the driver's message type, as a topic has one type in a process.
 
     ``heard``: receives each command on the topic.
 

@@ -120,9 +120,9 @@ def _report(wanted: argparse.Namespace) -> int:
 
 
 def main(given: list[str] | None = None) -> int:
-    """Write the report; return 0, or 3 if the report finds something wrong.
+    """Write the report. Return 0, or 3 if it finds something wrong.
 
-    Return 1 if there is nothing to report on, and 2 on wrong usage.
+    Return 1 without anything to report, and 2 on wrong usage.
     """
     try:
         return _report(arguments(given))

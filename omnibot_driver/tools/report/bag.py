@@ -31,8 +31,7 @@ Progress = Callable[[int, int], None]
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
     """Return the log of one robot in a bag.
 
-    Raises ToolError if the bag has no readable message of the robot, or if it contains several
-    robots and ``namespace`` is None.
+    Raises ToolError without a readable message, or for several robots if ``namespace`` is None.
     """
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)

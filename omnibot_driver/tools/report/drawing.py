@@ -53,11 +53,7 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return a shorter line that has the same extremes.
-
-    The line is divided into pieces. The minimum and the maximum of each piece are kept, in their
-    order. A line of at most ``POINTS`` points is returned unchanged.
-    """
+    """Shorten a line to about ``POINTS`` points: the minimum and the maximum of each piece."""
     if len(times_s) <= POINTS:
         return times_s, values
     size = -(-len(times_s) // (POINTS // 2))
@@ -88,10 +84,7 @@ def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> 
 
 
 def shade(axes: Axes, log: Log) -> None:
-    """Shade the times in which the e-stop was latched or the driver was not in a running state.
-
-    The e-stop is red. Each state has its own colour.
-    """
+    """Shade the times of the latched e-stop (red), and of each state that is not a running one."""
     for span in log.latched:
         axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
     for span in log.states:

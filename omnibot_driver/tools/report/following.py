@@ -17,7 +17,7 @@ TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
 """Speed of a wheel's rim, in m/s, above which the robot is regarded as commanded or as moving.
 
-Lower commanded speeds are ignored, because friction may prevent the motion.
+Friction may prevent slower motions.
 """
 STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
@@ -30,14 +30,9 @@ AFTER_STOP_S: Final = 1.5
 class Pair:
     """A command topic, and measurements of the motion that it commands.
 
-    ``axes``, ``units``: names and units of the values.
-
     ``weights``: factors that convert the values to the speed of a wheel's rim in m/s.
 
-    ``scales``: parameter of the driver that the user must change if the values on an axis are
-    wrong.
-
-    ``commands``, ``measured``: the messages of the command topic, and the measurements.
+    ``scales``: the driver's parameter to change if the values on an axis are wrong.
     """
 
     topic: str
@@ -68,8 +63,7 @@ def twists(log: Log) -> Pair:
 def _scales(log: Log) -> tuple[str, str]:
     """Return the names of the parameters that scale linear and angular speed.
 
-    The user must change these parameters if the measured speeds are wrong. On a robot with two
-    wheels, the parameters scale the odometry. On other robots, they scale the commands.
+    The parameters scale the odometry on a robot with two wheels, the commands on other robots.
     """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
@@ -115,10 +109,9 @@ class Answer:
 
     ``lag_s``: delay of the motion.
 
-    ``gains``: for each axis, the ratio of measured to commanded motion; NaN if unknown.
+    ``gains``: for each axis, measured / commanded motion; NaN if unknown.
 
-    ``error``: for each axis, the rms difference between two motions: the measured one, and the
-    product of the gain and the commanded one.
+    ``error``: for each axis, rms of measured - gain · commanded motion.
     """
 
     lag_s: float
@@ -129,8 +122,7 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    The delay is the one at which commands and measurements fit best. ``usable``: which measurements
-    to use.
+    ``usable``: which measurements to use. The delay is the one that fits best.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -195,8 +187,7 @@ def judge(log: Log) -> Iterator[Finding]:
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
     """Return the commanded and the measured speed of a wheel's rim in m/s, and their times in s.
 
-    The measurements, and the times, are those of the first pair. If several topics command the
-    robot, the fastest command is used.
+    If several topics command the robot, the fastest command is used.
     """
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
@@ -213,8 +204,8 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 def _stopped(log: Log, at_s: Array) -> Mask:
     """Return at which of these times the driver did not carry out commands.
 
-    These are the times with a state that is not running, or with a latched e-stop. The time of
-    ``COMMAND_TIMEOUT_S`` after each of them is included.
+    The latched e-stop and states that are not running count, each with the ``COMMAND_TIMEOUT_S``
+    after it.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [

@@ -76,11 +76,7 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """Find the robot; return its namespace, its topics, message types, and whether it is alone.
-
-    The message types are those of all topics in ROS, by the name of the topic. The last value is
-    True if no other robot runs.
-    """
+    """Find the robot; return its namespace, topics, all message types, and whether it is alone."""
     began_s = time.monotonic()
     while True:
         executor.spin_once(timeout_sec=0.1)

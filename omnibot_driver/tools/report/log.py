@@ -25,8 +25,6 @@ class Series:
     ``arrived_s``: when each message arrived.
 
     ``stamp_s``: the timestamp in each message.
-
-    ``values``: the values, one column for each number in a message.
     """
 
     arrived_s: Array
@@ -93,7 +91,7 @@ class Status:
 class Log:
     """The messages of one robot. All values are in SI units.
 
-    ``start_ns``: the time of day at the beginning of the log.
+    ``start_ns``: the time of day at the beginning.
 
     ``imu``: angular velocity and specific force, 6 columns.
 
@@ -103,15 +101,11 @@ class Log:
 
     ``cmd_vel``: the twist, 3 columns.
 
-    ``wheels``: names of the wheels' joints.
-
-    ``states``, ``estops``: the successive states of the driver and of the e-stop.
-
     ``absent``: topics without a message.
 
     ``troubles``: what could not be read.
 
-    ``alone``: whether this is the only robot. If so, everything in /diagnostics belongs to it.
+    ``alone``: whether everything in /diagnostics belongs to this robot.
     """
 
     robot: str
@@ -144,8 +138,6 @@ class Log:
 
     def interrupted(self, begin_s: float, end_s: float, running: tuple[str, ...]) -> bool:
         """Return whether the driver's state explains a gap between messages of a topic.
-
-        ``begin_s``, ``end_s``: beginning and end of the gap.
 
         ``running``: the states in which the driver publishes the topic.
         """

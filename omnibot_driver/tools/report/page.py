@@ -97,10 +97,7 @@ img{width:100%;height:auto;display:block}
 
 
 def write(log: Log, findings: Sequence[Finding], source: str, folder: Path) -> Path:
-    """Write pictures and report.html into the folder; return the path of report.html.
-
-    Each picture is a PNG file. The folder is created if it does not exist.
-    """
+    """Write pictures (PNG) and report.html into the folder; return the path of report.html."""
     folder.mkdir(parents=True, exist_ok=True)
     sections = []
     for name, title, draw, enough, explanation in PICTURES:

@@ -39,10 +39,8 @@ LEVELS: Final = ("#7FC8A9", "#F2C14E", "#C0272D", "#C9CDD3")
 SHORT_WAY_M: Final = 0.05
 ARROWS: Final = 24
 SHOWN: Final = 1.5
-"""How far the axis of a plot of times reaches, as a multiple of the 99 % quantile of the values.
-
-Larger values are drawn at the edge of the plot.
-"""
+"""Range of a plot of times, as a multiple of the 99 % quantile. Larger values are drawn at the
+edge."""
 
 
 def path(log: Log) -> Figure:
@@ -168,8 +166,7 @@ def spectra(log: Log) -> Figure:
 def timing(log: Log) -> Figure:
     """Draw how evenly messages are timed: the steps between timestamps, and the delays of arrival.
 
-    The median step and the smallest delay are subtracted. Both plots show values over time, with a
-    histogram beside them.
+    The median step and the smallest delay are subtracted.
     """
     figure = new_figure(5.6)
     grid = figure.subplots(2, 2, width_ratios=(2.6, 1.0), sharey="row")

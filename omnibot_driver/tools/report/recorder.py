@@ -50,8 +50,7 @@ def _wheels(message: Any) -> Row:
 class Role:
     """How the messages of a topic are converted.
 
-    ``width``: how many values a row has. None means one value for each wheel. The names in
-    ``joint_states`` show how many wheels the robot has.
+    ``width``: how many values a row has. None: one for each wheel.
 
     ``read``: for each message type, the function that returns the row.
     """
@@ -186,7 +185,7 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Return the spans of time in which the value on a topic stayed the same.
 
-        ``name``: returns the text that a span gets for its value.
+        ``name``: returns the text of a value's span.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

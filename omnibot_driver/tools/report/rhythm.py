@@ -30,8 +30,7 @@ FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
 """Longest time in s in which short steps can compensate a long step of the timestamps.
 
-After a long step, several short steps may follow, until the timestamps are right again. If they do
-not become right within this time, messages are missing.
+After this time, messages are regarded as missing.
 """
 
 
@@ -39,14 +38,11 @@ not become right within this time, messages are missing.
 class Stream:
     """The expected timing of a topic.
 
-    ``rate_hz``: the expected rate.
-
     ``running``: the driver's states in which it publishes the topic.
 
     ``lost``: keys of the driver's counts of lost messages in its diagnostics.
 
-    ``rates``: keys of the expected rate in the driver's diagnostics. The first key that has a value
-    is used.
+    ``rates``: keys of the expected rate in the diagnostics. The first one with a value is used.
     """
 
     name: str
@@ -91,21 +87,16 @@ If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 class FrameSchedule:
     """The measured timing of a topic.
 
-    ``steps_s``: steps between successive timestamps.
+    ``steps_s``, ``period_s``: steps between successive timestamps, and their median.
 
     ``at_s``: the timestamp before each step.
 
-    ``period_s``: the median step.
-
-    ``gap_at_s``, ``gap_s``: beginning and length of each gap, without gaps that the driver's state
-    explains. The last gap may be the time from the last message to the end of the log.
+    ``gap_at_s``, ``gap_s``: beginning and length of each gap that the driver's state does not
+    explain.
 
     ``missing``: how many messages are missing in each gap.
 
-    ``leap_at_s``, ``leap_s``: beginning and length of each long step that short steps compensate.
-    No message is missing there.
-
-    ``arrived_s``: when each message arrived.
+    ``leap_at_s``, ``leap_s``: each long step that short steps compensate. No message is missing.
 
     ``late_s``: time from the timestamp of each message to its arrival.
     """
@@ -161,7 +152,7 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
     """Return the gap from the last message to the end of the log.
 
-    Return None if this time is shorter than ``LONG_GAP_S``, or if the driver's state explains it.
+    Return None if the gap is short, or if the driver's state explains it.
     """
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
@@ -172,8 +163,7 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the end of the steps that may compensate it.
 
-    The compensating steps end before the next long step, and after at most ``most`` steps.
-    ``wide``: indices of the long steps.
+    ``wide``: indices of the long steps. ``most``: largest number of compensating steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
@@ -317,9 +307,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    The growth is unknown if no count has two values in the log, or if several robots share
-    /diagnostics. If a count becomes smaller, a driver has started again and counts from zero. In
-    this case the new count is added to the growth.
+    If a count becomes smaller, a driver has started again at zero.
     """
     if not log.alone:
         return None

@@ -36,11 +36,10 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that the name of a topic allows.
+    """Return the roles that a topic's name allows: the namespace, and whether the topic fits.
 
-    For each role, the first value is the namespace of the robot. The second value is whether the
-    topic fits the role. A topic fits if ``kind`` is the right message type. A topic below the name
-    of a driver's node, such as ``state``, also needs this node in ``drivers``.
+    A topic fits if ``kind`` is right. A topic below a node, such as ``state``, also needs this node
+    in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -56,9 +55,7 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
     """Return the namespace and the topics of one robot.
 
-    ``wanted``: namespace of the robot. If it is None, there must be only one robot.
-
-    ``where``: where the robots were found, for the message.
+    ``wanted``: its namespace; None: the only robot. ``where``: place for the error's message.
 
     Raises ToolError if no robot can be chosen.
     """

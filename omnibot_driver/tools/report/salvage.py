@@ -2,9 +2,8 @@
 
 """Repairs copies of bag files whose recording was not finished.
 
-An mcap file (mcap.dev/spec) is a sequence of records, followed by an index. A record has one byte
-for its kind, eight bytes for its length, and its content. So the records can be read without the
-index. The latest changes of an sqlite3 database are in a journal: a separate file beside it.
+An mcap file (mcap.dev/spec) is records and an index. A record is its kind (1 byte), its length (8
+bytes) and its content. An sqlite3 database has its latest changes in a separate journal.
 """
 
 import shutil

@@ -27,17 +27,15 @@ BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
 """Rate in rad/s above which the robot is regarded as turning, if there is no odometry.
 
-A constant rate above this value might be a bias, but such a large bias is rare.
+A larger bias is rare.
 """
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Fraction of the time between two odometry messages that gyro readings must cover.
-
-If they cover less, this time is left out of the comparison of the turns by gyro and by odometry.
-"""
+"""Fraction of the time between two odometry messages that gyro readings must cover. Otherwise turns
+by gyro and odometry are not compared there."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
 """Frequency in Hz up to which motion is regarded as caused by driving, not by vibration."""
@@ -52,10 +50,9 @@ def rate_hz(imu: Series) -> float:
 
 
 def at_rest(log: Log, imu: Series) -> Mask:
-    """Return for each reading whether the robot was at rest.
+    """Return for each reading whether the robot was at rest, by odometry.
 
-    The odometry decides. If there is none, the mean and the spread of each block of IMU readings
-    decide.
+    Without odometry, the mean and the spread of each block of readings decide.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
@@ -92,8 +89,7 @@ class Spectrum:
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
     """Return Welch's mean spectrum of the selected ``rows``; None if there is too little data.
 
-    The mean is over all pieces of the log in which no reading is missing and all rows are selected.
-    Short pieces are left out.
+    The mean is over long pieces without missing readings.
     """
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
@@ -212,8 +208,7 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
     """Return the turns by gyro divided by those by odometry, and how far the robot turned, in rad.
 
-    The second value adds all turns by odometry, to the left and to the right. Gaps of the odometry
-    are left out, and so are steps without gyro readings.
+    Turns to the left and to the right both count as positive.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

@@ -15,18 +15,16 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: largest difference between a pose and where the twist leads.
+"""``LEAP_M``, ``LEAP_RAD``: largest difference between a pose and where the twist leads, m and rad.
 
-The units are m and rad. A larger difference is a leap. The driver's own corrections of odom are
-smaller in each step, because fastest_linear_speed limits them.
+A larger difference is a leap. fastest_linear_speed keeps the driver's corrections of odom smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
 """A step between two messages that takes at least this time, in s, is a gap.
 
-The twist does not show the motion during a gap. So a gap is a leap only if the pose after the gap
-is zero.
+The twist does not show the motion during a gap.
 """
 
 
@@ -43,8 +41,7 @@ class Steps:
 
     ``off_m``, ``off_rad``: difference between the pose and where the twist leads.
 
-    ``leap``: whether this difference is too large. A gap is a leap only if the pose after it is
-    zero.
+    ``leap``: whether this difference is too large; for a gap, only if the pose after it is zero.
 
     ``reset``: whether the step is a leap to zero.
     """
