@@ -2,8 +2,8 @@
 
 """What colcon and pip install, and where ``ros2 run`` and ``ros2 launch`` find it.
 
-With ``OMNIBOT_DRIVER_COMPILE=1``, mypyc compiles the core's inbound modules. If this fails, plain
-Python is installed.
+With ``OMNIBOT_DRIVER_COMPILE=1``, mypyc compiles core modules. If this fails, plain Python is
+installed.
 """
 
 import os
@@ -27,8 +27,8 @@ COMPILED_OF_OMNIBOT = (
 )
 """``COMPILED``, ``COMPILED_OF_OMNIBOT``: the modules that mypyc compiles. Not compiled:
 
-- modules that decide whether a robot moves, so that they run as they were debugged - base classes -
-frames, because they are created faster without mypyc's dataclasses
+* modules that decide whether a robot moves, so that they run as they were debugged
+* base classes, and frames: these are created faster without mypyc's dataclasses
 """
 
 

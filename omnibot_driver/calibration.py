@@ -32,9 +32,9 @@ def locate(file: str) -> Path:
 
 
 def load(path: Path, table: Table) -> dict[str, Value]:
-    """Return the file's values of this board's calibrated parameters; empty if there is no file.
+    """Return the file's values of this board's calibrated parameters; empty without a file.
 
-    Raises ParameterError, with a remedy, if the file cannot be read or has a wrong value.
+    Raises ParameterError, with a remedy, for an unreadable file or a wrong value.
     """
     content = _read(path)
     try:
@@ -58,8 +58,8 @@ def names(path: Path) -> list[str]:
 def save(path: Path, values: Mapping[str, Any]) -> None:
     """Write these values into the file, completely or not at all, and keep its other values.
 
-    Comments are lost. A symbolic link is kept. Raises ParameterError if the present file cannot be
-    read, OSError if the new file cannot be written.
+    Comments are lost. A symbolic link is kept. Raises ParameterError if the old file is unreadable,
+    and OSError.
     """
     import tempfile  # takes 1 MB, and few drivers ever save
 

@@ -2,9 +2,8 @@
 
 """Serialise measurements to CDR, the format of DDS messages, and parse velocity commands from CDR.
 
-Without ROS message objects this takes less processor time. CDR aligns numbers like a C struct on a
-64-bit machine, so ``struct`` can write it. On some machines the layout may differ from rclpy's:
-check it with ``difference``.
+CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write CDR quickly.
+``difference`` checks this on each machine.
 """
 
 import itertools
@@ -109,7 +108,7 @@ class Serializer:
 def twist(data: bytes) -> tuple[BodyTwist, bool]:
     """Return the planar part of a serialised Twist, and whether all its other parts are zero.
 
-    Raises CommandRefused for NaN, infinity, or bytes that are not a geometry_msgs/Twist.
+    Raises CommandRefused for NaN, infinity, or bytes of another type.
     """
     try:
         encapsulation, x, y, z, roll, pitch, yaw = TWIST(data)

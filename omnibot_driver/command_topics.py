@@ -30,8 +30,7 @@ def obeying(
 
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: whether the message's time in transit does not matter.
-    * ``is_stop``: whether the message stops the robot. Neither age nor stalls matter then.
-    * ``moves_base``: whether the commands move the base, and not another part of the robot.
+    * ``is_stop``: whether the message stops the robot, at any age and after any stall.
     """
     transit = Transit()
 

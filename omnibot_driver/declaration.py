@@ -29,7 +29,7 @@ NOT_OURS: Final = re.compile(
 def declare(node: Node) -> dict[str, Any]:
     """Declare all parameters on the node, and return their values at start.
 
-    The calibration file takes precedence. Raises ParameterError for a value that is not allowed.
+    The calibration file takes precedence. Raises ParameterError for a wrong value.
     """
     given = {
         name: override.value
@@ -51,8 +51,7 @@ def declare(node: Node) -> dict[str, Any]:
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
     """Return all values after a change; ``values`` are those before it.
 
-    ROS accepts 1 for the real parameter 1.0. The result has the parameter's type, because a message
-    would publish an integer as 0.
+    ROS accepts 1 for the real parameter 1.0. The result is 1.0, because messages need it.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})

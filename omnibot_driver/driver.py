@@ -38,8 +38,7 @@ SETUP: Final = (
 class Ending:
     """Lets the main thread wait until the driver must end: at a signal or a call of ``begin``.
 
-    Python writes each signal's number into a pipe. A lock cannot replace this pipe: signal handlers
-    must not use locks.
+    Python writes each signal's number into a pipe, because signal handlers must not use locks.
 
     ``defect``: the exception that ended the driver, or None.
     """
@@ -72,11 +71,9 @@ class Ending:
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the driver until it must end, and return the exit code of the process.
+    """Run the driver until it must end; return 0, 1 after a defect, or 2 if it cannot start.
 
-    0: after a request to end, or help. 1: after a defect. 2: the driver cannot start.
-
-    The main thread only waits, so that a second signal cannot interrupt the shutdown.
+    The main thread must only wait: a second signal must not interrupt the shutdown.
     """
     args = sys.argv if args is None else args
     with UnblockedOutput():

@@ -2,9 +2,8 @@
 
 """The guard: a separate process that stops the robot when the driver no longer can.
 
-The guard shares the driver's open lines. The driver sends heartbeats to the guard's standard input.
-When the heartbeats cease, the guard repeats the stop command, or the emergency stop if the e-stop
-is latched. The guard works with any board, and must import very little.
+When the driver's heartbeats on standard input cease, the guard repeats the stop command. If the
+e-stop is latched, it repeats the emergency stop. The guard must import very little.
 
 Usage: ``python guard.py STOP EMERGENCY_STOP``. Each argument lists packets as
 ``DESCRIPTOR:HEX,DESCRIPTOR:HEX``. New stop commands come as ``=STOP EMERGENCY_STOP`` and a newline,

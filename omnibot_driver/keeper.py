@@ -41,7 +41,7 @@ guard process needs to start."""
 class Keeper:
     """The guard process for a set of open lines, from construction until ``end``.
 
-    * ``descriptors``: file descriptor of each line, by channel. None for a line that is not open.
+    * ``descriptors``: file descriptor of each line, by channel. None if the line is not open.
     * ``stop``, ``emergency_stop``: packets to send without and with a latched e-stop.
     """
 
@@ -64,7 +64,7 @@ class Keeper:
     def beat(self, now: float, *, latched: bool = False) -> str:
         """Send the guard a heartbeat. Call this every ``BEAT_S``, neither more nor less often.
 
-        Returns a sentence for the user when the guard fails for the first time.
+        Returns a sentence for the user at the guard's first failure.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -92,7 +92,7 @@ class Keeper:
     def end(self, *, stopped: bool) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        If the robot is not known to be ``stopped``, the guard first sends its stop command.
+        If the robot may not be ``stopped``, the guard stops it first.
         """
         self._restart_at = math.inf
         if stopped:
@@ -126,7 +126,7 @@ class Keeper:
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
         """Kill the guard without waiting for its end. Later heartbeats check whether it has ended.
 
-        The caller holds the lock that the e-stop needs. Waiting would delay the e-stop.
+        The caller holds the lock, so waiting would delay the e-stop.
         """
         assert process.stdin is not None
         process.stdin.close()

@@ -19,7 +19,7 @@ overruns of the receiver, and of the tty's buffer."""
 def overruns(descriptor: int) -> int | None:
     """Return how often the kernel has lost bytes of the port; None if the kernel does not count.
 
-    Pseudo-terminals, sockets and some USB adapters have no count.
+    Pseudo-terminals and sockets have no count.
     """
     try:
         counts = _COUNTS.unpack(fcntl.ioctl(descriptor, TIOCGICOUNT, bytes(_COUNTS.size)))

@@ -3,10 +3,10 @@
 """The threads that serve a port and a session, and the shutdown of the driver.
 
 * The *reader* passes received bytes to the session, and delivers the results at once.
-* The *pacer* sleeps until a repeated command, a timeout, a retry or the guard's heartbeat is due.
-* The *teller* delivers the events that the pacer and callers of the link cause.
+* The *pacer* sleeps until a command, a timeout, a retry or the guard's heartbeat is due.
+* The *teller* delivers all other events.
 
-The threads and all callers use one lock. Events are delivered in their order under that lock.
+All threads and callers use one lock. Events are delivered in their order under this lock.
 """
 
 import threading
@@ -34,8 +34,8 @@ UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, if no guard process can repeat Stop. In this case ``UNGUARDED_S``
 replaces ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
-"""Longest wait, in s, for a second proof of rest; longer if the board's proof takes longer. The
-driver sends nothing meanwhile. So the proof shows that the last Stop arrived undamaged."""
+"""Longest wait, in s, for a second proof of rest; longer for a slow board. Meanwhile nothing is
+sent, so the proof shows that the last Stop arrived undamaged."""
 
 T = TypeVar("T")
 
@@ -47,11 +47,10 @@ class Link:
     * ``guard``: whether a separate process stops the robot when this process cannot.
     * ``report``: receives a sentence when a line is missing, and None when all are open.
     * ``refused``: receives the reason whenever a command is refused.
-    * ``on_read``, ``on_write``: receive each packet that was read or written.
-    * ``failed``: receives the exception that ended a thread. Only a defect causes one.
+    * ``failed``: receives the exception, always a defect, that ended a thread.
 
     The functions except ``opener`` and ``failed`` are called one at a time, in the order of the
-    events. They run on any of several threads.
+    events. Any thread may call them.
     """
 
     def __init__(
@@ -143,8 +142,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether this call sent Stop and ended the threads. ``stands``: whether the board has
-        proved rest. If the port was lost, the reader tries Stop once more.
+        Returns whether Stop was sent and the threads ended. After a lost port, the reader tries
+        Stop again.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:
@@ -183,7 +182,7 @@ class Link:
     def _stop_for_good(self) -> None:
         """Stop the robot and wait until it is at rest. The caller holds the lock.
 
-        The wait releases the lock, so that the pacer can repeat Stop.
+        The wait releases the lock, so that the pacer repeats Stop.
         """
         self._session.shutdown.begin(now := time.monotonic())
         self._shared.settle()

@@ -207,10 +207,9 @@ def is_planar(twist: Any) -> bool:
 
 
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
-    """Return the planar pose of a geometry_msgs/PoseStamped; z must be finite, but is ignored.
+    """Return the planar pose of a geometry_msgs/PoseStamped; z is ignored.
 
-    Raises CommandRefused if the pose is in another frame, is not finite, is tilted, or has no unit
-    quaternion.
+    Raises CommandRefused for another frame, NaN or infinity, a tilt, or no unit quaternion.
     """
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):
@@ -262,10 +261,9 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return the wall clock minus the steady clock, in ns; ``known_ns`` if the readings allow it.
+    """Return wall clock minus steady clock, in ns; ``known_ns`` if the readings allow this value.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. A pause between
-    the readings does not change the result.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -89,8 +89,7 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        The executor would check all these callbacks before each command. So only the subscriber
-        reports an incompatible quality of service.
+        The executor would check each callback before each command.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)

@@ -2,9 +2,9 @@
 
 """A queue of calls to listeners, which several threads fill and empty.
 
-A thread queues calls while it holds the lock of the event, and makes them after releasing this
-lock. So calls keep the order of events, and a slow listener does not delay commands. This module
-knows threads; it does not know what is delivered.
+A thread queues calls under the event's lock, and makes them after releasing this lock. So the order
+is kept, and a slow listener does not delay commands. This module knows threads; it does not know
+what is delivered.
 """
 
 import threading
@@ -37,7 +37,7 @@ class Outbox:
     def claim(self) -> bool:
         """Return whether the caller may bypass the queue and call the listener directly.
 
-        The caller holds the lock of the event. After True, the caller must call ``release``.
+        The caller holds the event's lock. After True, call ``release``.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
@@ -53,7 +53,7 @@ class Outbox:
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the waiting calls, or leave them to the thread that is making calls now.
+        """Make the waiting calls, or leave them to a thread that is making calls.
 
         If the outbox is full, wait for that thread. Raises what the calls raise.
         """

@@ -2,9 +2,9 @@
 
 """Standard output and standard error that never block the process.
 
-rclpy holds the interpreter's lock while it writes a log line. After ctrl-S, or with an unread pipe,
-this write would block even the watchdog. So output passes through a pipe. A full pipe loses lines.
-This module knows descriptors; it does not know what is printed.
+rclpy logs under the interpreter's lock. After ctrl-S, or with an unread pipe, a log line would
+block even the watchdog. So output passes through a pipe, which loses lines when it is full. This
+module knows descriptors; it does not know what is printed.
 """
 
 import contextlib
@@ -63,7 +63,7 @@ class UnblockedOutput:
 def _fill_gaps() -> None:
     """Open /dev/null on each of the descriptors 0 to 2 that is closed.
 
-    Otherwise the port might become standard output, and the board would receive the log.
+    Otherwise the port might become standard output and receive the log.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
         pass

@@ -9,7 +9,4 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 LATCHED: Final = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """Quality of service of a value that later subscribers also receive."""
 DEEP: Final = QoSProfile(depth=1000)
-"""Quality of service of messages and calls that must not be lost while the driver is busy.
-
-A queue of 10 would drop, for example, a pressed button after ten later messages.
-"""
+"""Quality of service of messages and calls that must not be lost while the driver is busy."""

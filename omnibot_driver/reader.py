@@ -2,9 +2,8 @@
 
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
-The reader delivers measurements on its own thread, so that nothing delays them. The reader stops
-the robot before it ends the use of a port, for any reason. A lost port is opened again, with a new
-guard.
+The reader delivers measurements itself, so that nothing delays them. Before the reader ends the use
+of a port, for any reason, it stops the robot. A lost port is opened again.
 """
 
 import math
@@ -32,7 +31,6 @@ class Reader:
     """The work of the reader thread, which runs ``serve``, and its counts.
 
     * ``trouble``: why the port, or one of its lines, is not open. Empty if all are open.
-    * ``opened``: how often the port was opened.
     * ``overruns``: the kernel's losses since the last opening. None if the kernel does not count.
     """
 

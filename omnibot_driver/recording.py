@@ -28,7 +28,7 @@ class Recording:
     * ``path``: the bag, which is a folder or a single file.
     * ``topics``: the topic of each channel.
     * ``speed``: factor of the playback speed. Infinity: as fast as possible.
-    * ``delay_s``: time until playback begins, in s.
+    * ``delay_s``: time until playback begins.
     """
 
     path: Path
@@ -37,7 +37,7 @@ class Recording:
     delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, Packet]]:
-        """Yield pairs of a time and a packet. The time is that of the recorder's clock, in ns.
+        """Yield packets, each with the time of the recorder's clock, in ns.
 
         Raises LinkError if the bag cannot be read to its end.
         """
@@ -63,7 +63,7 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that the URL names. The bag must have a topic for each channel.
+    """Return the recording that the URL names. The bag needs a topic for each channel.
 
     Raises ParameterError if the URL or the bag is wrong.
     """

@@ -2,8 +2,8 @@
 
 """One session and its open port, which several threads share under one lock.
 
-``settle`` must follow each input to the session: it writes the packets that are due, and queues the
-events in order. This module starts no thread and opens no port.
+``settle`` must follow each input to the session: it writes due packets, and queues events in order.
+This module starts no thread and opens no port.
 """
 
 import math
@@ -35,7 +35,7 @@ class SharedSession:
 
     * ``changed``: condition of this lock, on which the pacer and the shutdown wait.
     * ``port``, ``keeper``: None if the port is not open, or has no guard.
-    * ``write_error``: the error after which nothing more is written to the port, or None.
+    * ``write_error``: the error after which nothing more is written, or None.
     """
 
     def __init__(
@@ -58,8 +58,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the board is sent when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop, at the end of the link, was written to every line. After a loss
-        while driving, Stop waits until the port is open again."""
+        """Whether the last Stop, at the end of the link, was written to every line. If the port was
+        lost, this happens when it is open again."""
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
@@ -69,7 +69,7 @@ class SharedSession:
         self._pacing_until = self._beat_at = -math.inf
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Call ``action`` with the session and the time in s, and return the result of ``action``.
+        """Call ``action`` with the session and the time in s, and return its result.
 
         Packets are written before ``call`` returns. Another thread delivers the events.
         """
@@ -92,13 +92,13 @@ class SharedSession:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass ``wish``, the motion that a sender wants, to the session by calling ``action``.
+        """Call ``action`` with the session and ``wish``, the motion that a sender wants.
 
-        * ``sent_ns``: the possible times of day, in ns, at which the command was sent.
-        * ``moves_base``: whether a refusal of ``wish`` affects the motion interlock.
+        * ``sent_ns``: possible times of sending, time of day in ns.
+        * ``moves_base``: whether a refusal affects the motion interlock.
 
-        Raises CommandRefused for a command that waited while this process was stalled. ``refused``
-        receives each refusal, unless the outbox is full.
+        Raises CommandRefused for a command that waited during a stall. ``refused`` receives each
+        refusal, unless the outbox is full.
         """
         try:
             with self.lock:

@@ -2,8 +2,8 @@
 
 """Detection of stalls: times in which this process, or its watchdog, did not run.
 
-The driver must not obey commands that were sent during a stall. Every ``now`` is a time of
-``boot_time_s``. This module knows times; it does not know threads or commands.
+The driver must not obey commands from a stall. Every ``now`` is a time of ``boot_time_s``. This
+module knows times; it does not know threads or commands.
 """
 
 import math
@@ -35,8 +35,7 @@ class StallDetector:
     """Knows whether this process is stalled now, and when the last stall ended.
 
     The watchdog's thread calls ``passed`` ten times a second. Other threads call ``begun`` before
-    they act. All times are kept by the steady clock, so a step of the time of day does not change
-    them.
+    they act. A step of the time of day does not matter.
     """
 
     def __init__(self) -> None:

@@ -2,9 +2,9 @@
 
 """Transit time of a command without a stamp, from the time at which the middleware sent it.
 
-difference = arrival by our clock - sending by the sender's clock. A sender's smallest difference is
-the offset of the clocks; delay = difference - offset. docs/internals/stopping.md explains why. This
-module does not read a clock, and does not use ROS.
+difference = arrival by our clock - sending by the sender's clock; offset = the sender's smallest
+difference; delay = difference - offset. docs/internals/stopping.md explains why. This module does
+not read a clock, and does not use ROS.
 """
 
 import math
@@ -38,8 +38,7 @@ class Arrival:
     """One message and its times, in ns.
 
     * ``sent_ns``: time of day by the sender's clock.
-    * ``received_ns``: time of day by our clock.
-    * ``now_ns``: present time of day by our clock.
+    * ``received_ns``, ``now_ns``: time of day by our clock.
     * ``steady_ns``: present time of a steady clock.
     * ``number``: the message's number at its sender. None if the middleware does not count.
     """
@@ -55,9 +54,9 @@ class Arrival:
 class Delay:
     """The age of a message, and the time at which it was sent.
 
-    * ``total_s``: time since the message was sent, in s.
-    * ``waited_s``: part of this time, in s, in our own queue.
-    * ``sent_ns``: time of sending by our clock, in ns; two values until the sender is known.
+    * ``total_s``: time since the message was sent.
+    * ``waited_s``: part of this time in our own queue.
+    * ``sent_ns``: time of sending by our clock; two values until the sender's offset is known.
     """
 
     total_s: float
@@ -90,12 +89,12 @@ class Transit:
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
         """Return the delay of this message; a message is late above ``longest_s``.
 
-        The first message of each sender is assumed to have had no delay in transit.
+        A sender's first message is assumed to have no delay in transit.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
-        # A step of our time of day and the sender's clock together changes only the second difference.
-        # A step of our time of day alone changes only the first. So the smaller delay is right.
+        # A step of both times of day changes only the second difference.
+        # A step of our time of day alone changes only the first. So the smaller delay is used.
         differences_s = (
             (arrival.received_ns - arrival.sent_ns) / 1e9,
             (arrival.steady_ns - waited_ns - arrival.sent_ns) / 1e9,
@@ -109,6 +108,7 @@ class Transit:
     def _late_s(
         self, number: int | None, differences_s: Differences, at_s: float, longest_s: float
     ) -> float:
+        # The middleware reports the number of a message, but not its sender.
         possible = [sender for sender in self._senders if sender.may_send(number)]
         if not possible:
             self._senders = [*self._senders[1 - MOST_SENDERS :], _Sender(differences_s, at_s)]

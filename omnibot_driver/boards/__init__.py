@@ -55,7 +55,7 @@ class Profile(Protocol):
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
         """Create the board's own ROS interfaces; return how to publish ``Extra`` values, by type.
 
-        The driver calls this once, on the executor's thread, before bytes arrive.
+        The driver calls this once, on the executor's thread, before bytes come.
         """
 
 

@@ -253,9 +253,9 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if the command rate is too high for a terminal mode.
+    """Raise ParameterError if the command rate would delay Stop in a terminal mode.
 
-    The board forwards each Stop to a sensor at 4800 baud. A higher rate would delay Stop.
+    The board then forwards each Stop to a sensor at 4800 baud.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
@@ -268,7 +268,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_possible_periods(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the board cannot work with a period.
 
-    With a period near 0, the public firmware would send without pause and miss all commands.
+    With a period near 0, the public firmware always sends and misses all commands.
     """
     for name in PERIODS:
         period_s = values[name]

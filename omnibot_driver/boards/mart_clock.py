@@ -2,8 +2,8 @@
 
 """The numbers of the command TIME, and when they may be sent.
 
-TIME sets the server's clock to a full minute. If the clock is set back between two motions, the
-server computes a wrong heading. This module knows times only.
+TIME sets the server's clock to a full minute. A clock that is set back between two motions makes
+the heading wrong. This module knows times only.
 """
 
 import time
@@ -15,9 +15,9 @@ at most 4 s fast."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
-    """Return month, day, year, hour, minute and second for TIME (UTC), or None if TIME must wait.
+    """Return month, day, year, hour, minute and second (UTC) for TIME, or None if TIME must wait.
 
-    ``now_s``: time in s since 1970. ``may_set_back``: whether the server's clock may be set back.
+    ``now_s``: s since 1970. ``may_set_back``: concerns the server's clock.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

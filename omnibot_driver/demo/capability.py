@@ -20,8 +20,6 @@ class Capability:
 
     ``title``: name of the board, for the sentence "A simulated ... drives".
 
-    ``sideways``: whether the robot can drive along its y axis.
-
     ``ports``: the driver's parameter for each address that the simulator prints; empty if derived.
 
     ``real``: arguments of the driver for the real robot.

@@ -38,8 +38,6 @@ class Robot:
 
     ``driving``: whether this velocity drives the square. Otherwise it is zero.
 
-    ``sideways``: whether the robot can drive along its y axis.
-
     ``leg``: how many sides of the square are complete.
     """
 

@@ -29,7 +29,7 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
     """Return the present leg, and the robot's velocity in its own axes.
 
-    The robot drives and turns at the same time: 90° left on even legs, back on odd legs.
+    The robot also turns: 90° left on even legs, back on odd legs.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD

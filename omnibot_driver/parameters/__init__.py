@@ -2,11 +2,9 @@
 
 """Parameters: the rows that are common to boards, and the table of one board.
 
-With the table, the node declares and checks its parameters. ``make docs`` writes
-config/<board>.yaml and docs/parameters.md from the tables.
-
-A new common row belongs in ``operating`` or ``robot``, a board's own row beside the board's
-profile. This package uses plain Python types; it knows neither ROS nor a board.
+``make docs`` writes config/<board>.yaml and docs/parameters.md from the tables. New common rows
+belong in ``operating`` or ``robot``, a board's own rows beside the board's profile. This package
+knows neither ROS nor a board.
 """
 
 from omnibot_driver.parameters.parameter import RANGE_TYPES, Parameter, Value

@@ -144,7 +144,7 @@ def table(
 
     ``without``: names in ``DISPENSABLE`` that have no meaning for this board.
 
-    ``changed``: changed fields of common rows, e.g. ``{"port": {"default": "udp://"}}``.
+    ``changed``: fields of common rows, e.g. ``{"port": {"default": "udp://"}}``.
 
     ``checks``: this board's checks of several parameters together.
     """

@@ -49,10 +49,9 @@ class Transport(Protocol):
         """How often the kernel has lost bytes since the opening; None if it does not count this."""
 
     def read(self) -> Packet:
-        """Wait for a packet and return it; return an empty packet if none arrives for a while.
+        """Wait for a packet; return an empty packet if none arrives for a while.
 
-        Raises LinkError when the line is lost, LinesChanged when one of several is lost or open
-        again.
+        Raises LinkError if the line is lost, LinesChanged if one of several is lost or back.
         """
 
     def write(self, packets: Packets) -> None:

@@ -41,8 +41,7 @@ class SerialPort:
 
     ``parameter``: the parameter that names the port, for error messages.
 
-    Linux raises DTR and RTS at the first opening. Both must stay raised at ``close``: some boards
-    restart whenever a line is raised.
+    DTR and RTS must stay raised at ``close``: some boards restart whenever a line is raised.
     """
 
     ends_with_us = False

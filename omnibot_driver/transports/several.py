@@ -68,8 +68,7 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        The guard must not get a missing line's descriptor: the driver could not open the line
-        again.
+        With a copy in the guard, the driver could not open the line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -90,9 +89,9 @@ class Several:
         return None if None in counts else sum(filter(None, counts))
 
     def read(self) -> Packet:
-        """Return bytes that were received on one line. Lines that have bytes are read in turn.
+        """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged when a line is lost or open again, LinkError when all are missing.
+        Raises LinesChanged if a line is lost or back, LinkError if all are missing.
         """
         if not self._ready:
             self._open_missing()
@@ -257,7 +256,7 @@ class Line:
         self.trouble, self.waits, self.watched = "", b"", False
 
     def write(self, data: bytes, now: float) -> bool:
-        """Write the waiting bytes, then ``data``; return False if bytes have waited for too long.
+        """Write the waiting bytes, then ``data``; return False if bytes waited too long.
 
         A missing line gets only the bytes that it accepts at once.
         """

@@ -55,10 +55,9 @@ IMU_PARAMETER: Final = "imu_frame"
 class Feed:
     """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
 
-    ``dead_man``: with it, the monitor publishes ``cmd_vel`` while a key is held; otherwise never.
+    Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
 
-    Any thread may send requests, such as ``estop``. Their results appear in the view. Raises
-    ToolError for invalid names.
+    ``dead_man``: with it, the monitor publishes ``cmd_vel`` while a key is held; otherwise never.
     """
 
     def __init__(

@@ -30,9 +30,9 @@ STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: how far the pose may move between two messages, in m and in m/s.
+"""``JUMP_M``, ``JUMP_MPS``: the pose may move by JUMP_M + JUMP_MPS · time between two messages.
 
-Limit: JUMP_M + JUMP_MPS · time. Beyond it the odometry was reset, so a new path begins.
+Otherwise the odometry was reset, and a new path begins. Units: m and m/s.
 """
 
 
@@ -62,7 +62,7 @@ class View:
 
     ``said``: the reply to the user's last action.
 
-    ``lacks``: which of ``imu``, ``start`` and ``pause`` the robot's board does not have.
+    ``lacks``: ``imu``, ``start`` and ``pause``, if the board does not have them.
     """
 
     driver: str

@@ -36,7 +36,7 @@ def draw_path(
 ) -> Picture:
     """Draw a path from above, as large as possible; x is to the right, y is up.
 
-    An arrow shows the ``robot``. Points that cannot be drawn are left out.
+    An arrow shows the ``robot``.
     """
     columns, rows = max(1, columns), max(1, rows)
     seen = [point for point in points if _drawable(*point)]

@@ -63,7 +63,7 @@ def twists(log: Log) -> Pair:
 def _scales(log: Log) -> tuple[str, str]:
     """Return the names of the parameters that scale linear and angular speed.
 
-    The parameters scale the odometry on a robot with two wheels, the commands on other robots.
+    They scale the odometry if the robot has two wheels, otherwise the commands.
     """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"
@@ -122,7 +122,7 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    ``usable``: which measurements to use. The delay is the one that fits best.
+    ``usable``: which measurements to use. The best-fitting delay is used.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -185,9 +185,9 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
-    """Return the commanded and the measured speed of a wheel's rim in m/s, and their times in s.
+    """Return the commanded and the measured speed of a wheel's rim in m/s, and the times in s.
 
-    If several topics command the robot, the fastest command is used.
+    Of several commands, the fastest counts.
     """
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
@@ -204,8 +204,7 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 def _stopped(log: Log, at_s: Array) -> Mask:
     """Return at which of these times the driver did not carry out commands.
 
-    The latched e-stop and states that are not running count, each with the ``COMMAND_TIMEOUT_S``
-    after it.
+    An e-stop or pause counts, with the ``COMMAND_TIMEOUT_S`` after it.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [

@@ -44,9 +44,9 @@ class Series:
         return Series(self.arrived_s[rows], self.stamp_s[rows], self.values[rows])
 
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
-        """Return, for each time in ``at_s``, the last row that had arrived at this time.
+        """Return, for each time in ``at_s``, the last row that had arrived by then.
 
-        If the row is missing, or older than ``timeout_s``, the result is zeros.
+        A missing row, or one older than ``timeout_s``, is zeros.
         """
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):
@@ -97,7 +97,7 @@ class Log:
 
     ``odom``: x, y, yaw, and the twist, 6 columns.
 
-    ``joint_states``, ``wheel_cmd``: rates of the wheels, one column for each name in ``wheels``.
+    ``joint_states``, ``wheel_cmd``: rates, one column for each name in ``wheels``.
 
     ``cmd_vel``: the twist, 3 columns.
 

@@ -40,9 +40,9 @@ class Stream:
 
     ``running``: the driver's states in which it publishes the topic.
 
-    ``lost``: keys of the driver's counts of lost messages in its diagnostics.
+    ``lost``: keys of the counts of lost messages in the driver's diagnostics.
 
-    ``rates``: keys of the expected rate in the diagnostics. The first one with a value is used.
+    ``rates``: keys of the expected rate there. The first with a value is used.
     """
 
     name: str
@@ -91,12 +91,11 @@ class FrameSchedule:
 
     ``at_s``: the timestamp before each step.
 
-    ``gap_at_s``, ``gap_s``: beginning and length of each gap that the driver's state does not
-    explain.
+    ``gap_at_s``, ``gap_s``: begin and length of each gap that the driver's state does not explain.
 
     ``missing``: how many messages are missing in each gap.
 
-    ``leap_at_s``, ``leap_s``: each long step that short steps compensate. No message is missing.
+    ``leap_at_s``, ``leap_s``: each long step that short steps compensate.
 
     ``late_s``: time from the timestamp of each message to its arrival.
     """
@@ -152,7 +151,7 @@ def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
 def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
     """Return the gap from the last message to the end of the log.
 
-    Return None if the gap is short, or if the driver's state explains it.
+    None: the gap is short, or the driver's state explains it.
     """
     rest = Span(float(stamped.arrived_s[-1]), log.duration_s, "")
     if rest.length_s < LONG_GAP_S or log.interrupted(rest.begin_s, rest.end_s, stream.running):
@@ -163,7 +162,7 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
     """Return, for each long step, the end of the steps that may compensate it.
 
-    ``wide``: indices of the long steps. ``most``: largest number of compensating steps.
+    ``wide``: indices of long steps. ``most``: largest number of compensating steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])
@@ -307,7 +306,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    If a count becomes smaller, a driver has started again at zero.
+    A smaller count comes from a restarted driver.
     """
     if not log.alone:
         return None

@@ -38,8 +38,7 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """Return the roles that a topic's name allows: the namespace, and whether the topic fits.
 
-    A topic fits if ``kind`` is right. A topic below a node, such as ``state``, also needs this node
-    in ``drivers``.
+    ``kind`` must fit. A topic such as ``state`` also needs its node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -55,9 +54,8 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
     """Return the namespace and the topics of one robot.
 
-    ``wanted``: its namespace; None: the only robot. ``where``: place for the error's message.
-
-    Raises ToolError if no robot can be chosen.
+    ``wanted``: its namespace; None: the only robot. ``where``: for the error's message. Raises
+    ToolError.
     """
     names = ", ".join(robots)
     if not robots:

@@ -3,7 +3,7 @@
 """Repairs copies of bag files whose recording was not finished.
 
 An mcap file (mcap.dev/spec) is records and an index. A record is its kind (1 byte), its length (8
-bytes) and its content. An sqlite3 database has its latest changes in a separate journal.
+bytes) and its content. An sqlite3 database has a separate journal.
 """
 
 import shutil

@@ -206,9 +206,9 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Return the turns by gyro divided by those by odometry, and how far the robot turned, in rad.
+    """Return the turns by gyro / those by odometry, and how far the robot turned, in rad.
 
-    Turns to the left and to the right both count as positive.
+    Left and right turns both count as positive.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

@@ -15,17 +15,15 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: largest difference between a pose and where the twist leads, m and rad.
+"""``LEAP_M``, ``LEAP_RAD``: allowed difference between pose and twist in a step, in m and rad.
 
-A larger difference is a leap. fastest_linear_speed keeps the driver's corrections of odom smaller.
+fastest_linear_speed keeps the driver's corrections of odom smaller.
 """
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""A step between two messages that takes at least this time, in s, is a gap.
-
-The twist does not show the motion during a gap.
-"""
+"""Time in s from which a step between two messages is a gap. The twist does not show motion in a
+gap."""
 
 
 def moving(odom: Series) -> Mask:
@@ -41,9 +39,9 @@ class Steps:
 
     ``off_m``, ``off_rad``: difference between the pose and where the twist leads.
 
-    ``leap``: whether this difference is too large; for a gap, only if the pose after it is zero.
+    ``leap``: whether this difference is too large; for a gap, only if the next pose is zero.
 
-    ``reset``: whether the step is a leap to zero.
+    ``reset``: a leap to zero.
     """
 
     way_m: Array
