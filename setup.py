@@ -28,7 +28,8 @@ COMPILED_OF_OMNIBOT = (
 """``COMPILED``, ``COMPILED_OF_OMNIBOT``: the modules that mypyc compiles. Not compiled:
 
 * modules that decide whether a robot moves, so that they run as they were debugged
-* base classes, and frames: these are created faster without mypyc's dataclasses
+* base classes
+* frames, because plain dataclasses are created faster
 """
 
 

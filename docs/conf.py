@@ -2,7 +2,7 @@
 
 """Settings of Sphinx for `make docs`. rosdoc2 also executes this file, with its own defaults.
 
-Sphinx reads the whole repository. So links lead to the same places as on GitHub.
+Sphinx reads the whole repository, so that links work as on GitHub.
 """
 
 project = "omnibot_driver"

@@ -30,7 +30,7 @@ def obeying(
 
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: whether the message's time in transit does not matter.
-    * ``is_stop``: whether the message stops the robot, at any age and after any stall.
+    * ``is_stop``: whether the message stops the robot, even if it is old.
     """
     transit = Transit()
 

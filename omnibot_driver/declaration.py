@@ -51,7 +51,7 @@ def declare(node: Node) -> dict[str, Any]:
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
     """Return all values after a change; ``values`` are those before it.
 
-    ROS accepts 1 for the real parameter 1.0. The result is 1.0, because messages need it.
+    A 1 becomes 1.0 for a real parameter, because messages need this type.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})

@@ -2,8 +2,8 @@
 
 """Diagnostics: a report on the link, the board and the commands, once a second on ``/diagnostics``.
 
-Without diagnostic_updater, this module publishes an equal message itself. The timer uses the steady
-clock, so it does not stop with simulated time.
+Without diagnostic_updater, this module publishes an equal message. The timer must use the steady
+clock, not simulated time.
 """
 
 import time
@@ -27,9 +27,8 @@ Publish = Callable[[Sequence[Status]], None]
 class Diagnostics:
     """The publisher of the diagnostics of one link.
 
-    * ``refusals``: called for each report.
     * ``hardware_id``: text that distinguishes this robot from others.
-    * ``to_check``: what the user should check if the driver cannot decode the board's data.
+    * ``to_check``: advice for the user if the driver cannot decode the board's data.
     """
 
     def __init__(

@@ -38,7 +38,7 @@ SETUP: Final = (
 class Ending:
     """Lets the main thread wait until the driver must end: at a signal or a call of ``begin``.
 
-    Python writes each signal's number into a pipe, because signal handlers must not use locks.
+    Signals write to a pipe, because signal handlers must not use locks.
 
     ``defect``: the exception that ended the driver, or None.
     """

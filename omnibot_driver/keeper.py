@@ -41,7 +41,7 @@ guard process needs to start."""
 class Keeper:
     """The guard process for a set of open lines, from construction until ``end``.
 
-    * ``descriptors``: file descriptor of each line, by channel. None if the line is not open.
+    * ``descriptors``: of each line, by channel. None if the line is not open.
     * ``stop``, ``emergency_stop``: packets to send without and with a latched e-stop.
     """
 
@@ -92,7 +92,7 @@ class Keeper:
     def end(self, *, stopped: bool) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        If the robot may not be ``stopped``, the guard stops it first.
+        Unless ``stopped``, the guard first sends its stop command.
         """
         self._restart_at = math.inf
         if stopped:

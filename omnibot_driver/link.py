@@ -28,8 +28,8 @@ JOIN_TIMEOUT_S: Final = 3.0
 """Longest wait for a thread to end, in s. The reader may wait for the guard, which takes less
 time."""
 STANDS_WITHIN_S: Final = 0.5
-"""Longest wait at shutdown, in s, for a proof that the robot is at rest. If a board's proof takes
-longer, this time is longer."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest; longer for a slow
+board."""
 UNGUARDED_S: Final = 1.5
 """Longest wait at shutdown, in s, if no guard process can repeat Stop. In this case ``UNGUARDED_S``
 replaces ``STANDS_WITHIN_S``."""
@@ -46,11 +46,10 @@ class Link:
     * ``port``: name of the port in messages to the user.
     * ``guard``: whether a separate process stops the robot when this process cannot.
     * ``report``: receives a sentence when a line is missing, and None when all are open.
-    * ``refused``: receives the reason whenever a command is refused.
     * ``failed``: receives the exception, always a defect, that ended a thread.
 
-    The functions except ``opener`` and ``failed`` are called one at a time, in the order of the
-    events. Any thread may call them.
+    The functions except ``opener`` and ``failed`` are called one at a time, on any thread, in the
+    order of the events.
     """
 
     def __init__(

@@ -47,7 +47,7 @@ MOST_TILT_RAD: Final = 0.1
 NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
-"""State of the wheels, in three parts.
+"""State of the wheels:
 
 * Sum of the robot's displacements along its own axes, in m and rad.
 * Angle of each wheel, in rad.
@@ -59,8 +59,7 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 class MessageSettings:
     """What messages contain besides measurements: frames, standard deviations and wheels.
 
-    The frames include the prefix. Standard deviations are in SI units. Those of a missing IMU are
-    0.
+    Frames include the prefix. Standard deviations are in SI units, 0 without an IMU.
     """
 
     odom_frame: str

@@ -2,9 +2,8 @@
 
 """A queue of calls to listeners, which several threads fill and empty.
 
-A thread queues calls under the event's lock, and makes them after releasing this lock. So the order
-is kept, and a slow listener does not delay commands. This module knows threads; it does not know
-what is delivered.
+A thread queues calls under the event's lock, and makes them after releasing this lock. So a slow
+listener does not delay commands. This module knows threads; it does not know what is delivered.
 """
 
 import threading

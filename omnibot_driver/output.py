@@ -2,9 +2,9 @@
 
 """Standard output and standard error that never block the process.
 
-rclpy logs under the interpreter's lock. After ctrl-S, or with an unread pipe, a log line would
-block even the watchdog. So output passes through a pipe, which loses lines when it is full. This
-module knows descriptors; it does not know what is printed.
+rclpy logs under the interpreter's lock. After ctrl-S, a log line would block even the watchdog. So
+output passes through a pipe. A full pipe loses lines. This module knows descriptors; it does not
+know what is printed.
 """
 
 import contextlib

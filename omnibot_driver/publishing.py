@@ -2,8 +2,7 @@
 
 """Publication of the session's events: measurements and states on topics, notices in the log.
 
-`outbox.py` calls this module's methods one at a time, in the order of the events. Measurements are
-published on the reader's thread.
+`outbox.py` calls this module's methods one at a time, in the order of the events.
 """
 
 import contextlib

@@ -2,8 +2,8 @@
 
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
-The reader delivers measurements itself, so that nothing delays them. Before the reader ends the use
-of a port, for any reason, it stops the robot. A lost port is opened again.
+The reader delivers measurements itself, so that nothing delays them. The reader must stop the robot
+before it ends the use of a port.
 """
 
 import math
@@ -30,8 +30,8 @@ LONGEST_WAIT_S: Final = 2.0
 class Reader:
     """The work of the reader thread, which runs ``serve``, and its counts.
 
-    * ``trouble``: why the port, or one of its lines, is not open. Empty if all are open.
-    * ``overruns``: the kernel's losses since the last opening. None if the kernel does not count.
+    * ``trouble``: why the port, or one of its lines, is not open, or empty.
+    * ``overruns``: the kernel's losses since the last opening. None if unknown.
     """
 
     def __init__(

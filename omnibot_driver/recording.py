@@ -2,8 +2,7 @@
 
 """A recording in place of a port: the URL ``replay://bag?speed=10`` names a rosbag2.
 
-This module knows the URL and the library rosbags. It does not know when the bytes are needed, or
-what they mean.
+This module knows the URL and the library rosbags; it does not know what the bytes mean.
 """
 
 import math
@@ -28,7 +27,6 @@ class Recording:
     * ``path``: the bag, which is a folder or a single file.
     * ``topics``: the topic of each channel.
     * ``speed``: factor of the playback speed. Infinity: as fast as possible.
-    * ``delay_s``: time until playback begins.
     """
 
     path: Path

@@ -2,8 +2,8 @@
 
 """A session that is fed from a recording: the counterpart of `Link` for recorded bytes.
 
-The session's time is that of the recording. So its output is the same on every machine and at every
-speed. Packets that the session would send are discarded.
+The session's time is that of the recording. So the session's output is the same at every speed.
+Packets to the board are discarded.
 """
 
 import threading
@@ -31,7 +31,6 @@ class Replay:
     """One session on one recording, which is played once.
 
     * ``deliver``: also receives the time of day, in ns, of the session's time zero.
-    * ``report``: receives None when the recording begins.
     * ``failed``: receives the exception, always a defect, that ended the thread.
 
     The functions except ``failed`` are called one at a time, in the order of the events.

@@ -2,8 +2,7 @@
 
 """Advice on what disturbs the driver: settings of the computer, and other nodes.
 
-This module reads sysfs; it does not use pyserial, ROS or a board. ``transports`` reports why a port
-cannot be opened.
+This module reads sysfs; it does not use pyserial, ROS or a board.
 """
 
 from collections.abc import Iterable

@@ -30,7 +30,7 @@ from omnibot_driver.replay import Replay
 class Services:
     """The services of one node, except those that only one kind of board has.
 
-    ``calibration_file``: file in which a measured gyro bias is saved. If empty, it is not saved.
+    ``calibration_file``: where a measured gyro bias is saved, unless empty.
     """
 
     def __init__(

@@ -34,7 +34,7 @@ class SharedSession:
     Only ``call``, ``command`` and ``blocked`` may be used without holding ``lock``.
 
     * ``changed``: condition of this lock, on which the pacer and the shutdown wait.
-    * ``port``, ``keeper``: None if the port is not open, or has no guard.
+    * ``keeper``: None without a guard.
     * ``write_error``: the error after which nothing more is written, or None.
     """
 
@@ -58,8 +58,8 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the board is sent when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop, at the end of the link, was written to every line. If the port was
-        lost, this happens when it is open again."""
+        """Whether the last Stop was written to every line: at the link's end, or when a lost port
+        is open again."""
         self.stood = False
         """Whether the robot was seen at rest when the link ended."""
         self.closing = threading.Event()
@@ -97,8 +97,8 @@ class SharedSession:
         * ``sent_ns``: possible times of sending, time of day in ns.
         * ``moves_base``: whether a refusal affects the motion interlock.
 
-        Raises CommandRefused for a command that waited during a stall. ``refused`` receives each
-        refusal, unless the outbox is full.
+        Raises CommandRefused for a command from a stall. ``refused`` receives each refusal, unless
+        the outbox is full.
         """
         try:
             with self.lock:

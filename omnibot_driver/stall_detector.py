@@ -2,8 +2,8 @@
 
 """Detection of stalls: times in which this process, or its watchdog, did not run.
 
-The driver must not obey commands from a stall. Every ``now`` is a time of ``boot_time_s``. This
-module knows times; it does not know threads or commands.
+Commands from a stall must not be obeyed. Every ``now`` is a time of ``boot_time_s``. This module
+knows times; it does not know threads or commands.
 """
 
 import math
@@ -14,8 +14,8 @@ STANDSTILL_S: Final = 0.4
 """Time without a call of ``passed``, in s, from which the process is regarded as stalled. It must
 be shorter than the guard's limit."""
 SETTLE_S: Final = 0.25
-"""Time after a stall, in s. Commands that arrive or were sent within this time are refused, because
-a sender's clock is known only roughly."""
+"""Time in s after a stall. Commands that are sent or arrive meanwhile are refused, because a
+sender's clock is known only roughly."""
 LATEST_S: Final = 10.0
 """Longest assumed time in transit, in s, retransmissions included. A command that seems to be older
 comes from a sender whose clock is wrong."""

@@ -39,7 +39,6 @@ class Arrival:
 
     * ``sent_ns``: time of day by the sender's clock.
     * ``received_ns``, ``now_ns``: time of day by our clock.
-    * ``steady_ns``: present time of a steady clock.
     * ``number``: the message's number at its sender. None if the middleware does not count.
     """
 
@@ -56,7 +55,7 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: time of sending by our clock; two values until the sender's offset is known.
+    * ``sent_ns``: time by our clock; two values until the sender's offset is known.
     """
 
     total_s: float

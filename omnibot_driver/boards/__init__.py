@@ -2,8 +2,7 @@
 
 """The boards that the driver supports. Each has a profile, which is imported only if it is chosen.
 
-The profile makes the board's objects from the values of its parameters. Outside the core, only the
-profile knows its board.
+A profile makes its board's objects. Outside the core, only the profile knows its board.
 """
 
 from collections.abc import Callable, Mapping

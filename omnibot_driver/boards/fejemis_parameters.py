@@ -2,8 +2,8 @@
 
 """The parameters that only a Fejemis has. This module must not use ROS.
 
-The two Teensys store some values. Such a value is unset by default. The driver writes only values
-that the user sets (`fejemis_values.py`).
+Values that the Teensys store are unset by default. The driver writes only set values
+(`fejemis_values.py`).
 """
 
 import math

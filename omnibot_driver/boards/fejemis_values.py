@@ -2,7 +2,7 @@
 
 """Selects the values to write to a Fejemis' boards, and checks that they fit together.
 
-This module must not use ROS. It does not know what a parameter means to the boards.
+This module does not know ROS, or what a parameter means to the boards.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
-The board stores some values. Such a value is unset by default. The driver writes only values that
-the user sets.
+Values that the board stores are unset by default. The driver writes only set values.
 """
 
 from collections.abc import Mapping

@@ -2,6 +2,6 @@
 
 """The demo: a robot with a simulated board drives a square.
 
-Simulator and driver run as separate processes. The demo uses the driver's topics and the
-simulator's console. It must not know the board's protocol.
+The demo uses the driver's topics and the simulator's console. The demo must not know the board's
+protocol.
 """

@@ -20,11 +20,10 @@ class Capability:
 
     ``title``: name of the board, for the sentence "A simulated ... drives".
 
-    ``ports``: the driver's parameter for each address that the simulator prints; empty if derived.
+    ``ports``: the driver's parameter for each printed address; empty if the driver derives the
+    address.
 
     ``real``: arguments of the driver for the real robot.
-
-    ``page``: the board's document.
     """
 
     title: str

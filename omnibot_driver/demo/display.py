@@ -87,11 +87,7 @@ class Drive:
 
     ``pose``, ``true_pose``: the robot's pose at the end, by odometry and as simulated.
 
-    ``points``: the driven path.
-
     ``real``: arguments of the driver for the real robot.
-
-    ``page``: the document of the board.
     """
 
     seconds: float

@@ -26,15 +26,15 @@ class Parameter:
 
     ``default``: its type is the parameter's type. A list has at least one item.
 
-    ``low``, ``high``, ``choices``: what is allowed, for each item of a list.
+    ``low``, ``high``, ``choices``: limits and allowed values; for a list, those of each item.
 
     ``fixed``: whether the value is read-only after the start.
 
     ``calibrated``: whether a calibration file may contain the value.
 
-    ``length``: smallest and largest number of items of a list; None: as many as the default.
+    ``length``: limits of a list's length; None: as long as the default.
 
-    ``unset``: whether the value is None unless given, because the board stores its own value.
+    ``unset``: whether the value is None unless given; the default then only defines the type.
     """
 
     name: str

@@ -145,8 +145,6 @@ def table(
     ``without``: names in ``DISPENSABLE`` that have no meaning for this board.
 
     ``changed``: fields of common rows, e.g. ``{"port": {"default": "udp://"}}``.
-
-    ``checks``: this board's checks of several parameters together.
     """
     changes = {
         "on_exit": {

@@ -51,7 +51,7 @@ class Transport(Protocol):
     def read(self) -> Packet:
         """Wait for a packet; return an empty packet if none arrives for a while.
 
-        Raises LinkError if the line is lost, LinesChanged if one of several is lost or back.
+        Raises LinkError if the line is lost, LinesChanged if one of several is lost or open again.
         """
 
     def write(self, packets: Packets) -> None:

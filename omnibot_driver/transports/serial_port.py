@@ -39,9 +39,9 @@ PSEUDO_TERMINALS: Final = range(136, 144)
 class SerialPort:
     """A ``Transport`` of one channel of bytes: an open port, used by this process alone.
 
-    ``parameter``: the parameter that names the port, for error messages.
+    ``parameter``: the parameter that names the port, for messages.
 
-    DTR and RTS must stay raised at ``close``: some boards restart whenever a line is raised.
+    DTR and RTS must stay raised at ``close``: some boards restart whenever one is raised.
     """
 
     ends_with_us = False

@@ -2,8 +2,7 @@
 
 """Several lines of bytes as one transport; each line is one channel.
 
-If a line is missing or blocked, the others are still read and written. The transport opens missing
-lines again.
+If a line is missing or blocked, the others still work. Missing lines are opened again.
 """
 
 import select
@@ -91,7 +90,7 @@ class Several:
     def read(self) -> Packet:
         """Return bytes that were received on one line. Lines with bytes are read in turn.
 
-        Raises LinesChanged if a line is lost or back, LinkError if all are missing.
+        Raises LinesChanged if a line is lost or open again, LinkError if all are missing.
         """
         if not self._ready:
             self._open_missing()

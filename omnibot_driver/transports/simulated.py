@@ -26,7 +26,7 @@ UNREAD_DATAGRAMS: Final = 256
 class SimulatedTransport:
     """A simulated board in real time, whose channels are in memory.
 
-    ``simulator``: full name of the package of the simulated board.
+    ``simulator``: full name of the board's package.
 
     Raises LinkError if the URL is wrong, RuntimeError if the board's thread has died.
     """

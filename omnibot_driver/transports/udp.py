@@ -2,8 +2,7 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-Each socket receives only from the address to which it writes. An absent host is a silent board, not
-an error, because the host may answer later.
+An absent host is a silent board, not an error, because the host may answer later.
 """
 
 import contextlib

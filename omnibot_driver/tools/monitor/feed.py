@@ -57,7 +57,7 @@ class Feed:
 
     Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
 
-    ``dead_man``: with it, the monitor publishes ``cmd_vel`` while a key is held; otherwise never.
+    ``dead_man``: with it, the monitor publishes ``cmd_vel`` while a key is held.
     """
 
     def __init__(

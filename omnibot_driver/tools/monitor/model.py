@@ -2,8 +2,8 @@
 
 """The monitor's model of the robot: the latest values, their rates, and the robot's path.
 
-The model keeps NaN and infinity, because the user should see invalid values. The model must not
-know ROS, terminals or the clock.
+The model keeps NaN and infinity for the user to see. The model must not know ROS, terminals or the
+clock.
 """
 
 import math
@@ -40,9 +40,9 @@ Otherwise the odometry was reset, and a new path begins. Units: m and m/s.
 class Flow:
     """How often messages arrive on a topic.
 
-    ``age_s``: time in s since the last message; None if no message came recently.
+    ``age_s``: time since the last message; None if no message came recently.
 
-    ``history``: how many messages came in each second of the last minute.
+    ``history``: messages in each second of the last minute.
     """
 
     hz: float
@@ -56,13 +56,13 @@ class View:
 
     ``estop_asked``: the e-stop is requested, but the driver has not confirmed it.
 
-    ``silent_s``: time in s since the driver's last message.
+    ``silent_s``: time since the driver's last message.
 
     ``steers``: whether another node receives the monitor's commands.
 
     ``said``: the reply to the user's last action.
 
-    ``lacks``: ``imu``, ``start`` and ``pause``, if the board does not have them.
+    ``lacks``: those of ``imu``, ``start`` and ``pause`` that the board lacks.
     """
 
     driver: str

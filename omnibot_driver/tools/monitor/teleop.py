@@ -2,8 +2,8 @@
 
 """Steers the robot by keys, with a dead man's switch.
 
-A terminal repeats a held key, but does not report its release. So each report moves the robot only
-briefly. The module knows keys and times; it does not know ROS or terminals.
+A terminal does not report the release of a key. So each report of a pressed key moves the robot
+only briefly. The module knows keys and times; it does not know ROS or terminals.
 """
 
 import math

@@ -24,11 +24,11 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """The topic ``cmd_vel``, with the driver's message type, as a topic has one type in a process.
+    """The topic ``cmd_vel``. A process must use one message type for a topic: here the driver's.
 
     ``heard``: receives each command on the topic.
 
-    ``dead_man``: the dead man's switch; without one, nothing is published.
+    ``dead_man``: without it, nothing is published.
     """
 
     def __init__(

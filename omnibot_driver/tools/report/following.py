@@ -63,7 +63,7 @@ def twists(log: Log) -> Pair:
 def _scales(log: Log) -> tuple[str, str]:
     """Return the names of the parameters that scale linear and angular speed.
 
-    They scale the odometry if the robot has two wheels, otherwise the commands.
+    With two wheels, the parameters scale the odometry, otherwise the commands.
     """
     if len(log.wheels) == 2:
         return "odom_linear_scale", "odom_angular_scale"

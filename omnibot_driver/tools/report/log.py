@@ -22,8 +22,6 @@ SETTLING_S: Final = 0.2
 class Series:
     """The messages of one topic in the order of arrival, one row for each message.
 
-    ``arrived_s``: when each message arrived.
-
     ``stamp_s``: the timestamp in each message.
     """
 
@@ -102,8 +100,6 @@ class Log:
     ``cmd_vel``: the twist, 3 columns.
 
     ``absent``: topics without a message.
-
-    ``troubles``: what could not be read.
 
     ``alone``: whether everything in /diagnostics belongs to this robot.
     """

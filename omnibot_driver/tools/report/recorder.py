@@ -52,7 +52,7 @@ class Role:
 
     ``width``: how many values a row has. None: one for each wheel.
 
-    ``read``: for each message type, the function that returns the row.
+    ``read``: by message type, the function that returns the row.
     """
 
     width: int | None

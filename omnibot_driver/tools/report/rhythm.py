@@ -42,7 +42,7 @@ class Stream:
 
     ``lost``: keys of the counts of lost messages in the driver's diagnostics.
 
-    ``rates``: keys of the expected rate there. The first with a value is used.
+    ``rates``: keys of the rate in the diagnostics; the first with a value is used.
     """
 
     name: str
@@ -87,11 +87,11 @@ If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 class FrameSchedule:
     """The measured timing of a topic.
 
-    ``steps_s``, ``period_s``: steps between successive timestamps, and their median.
-
     ``at_s``: the timestamp before each step.
 
-    ``gap_at_s``, ``gap_s``: begin and length of each gap that the driver's state does not explain.
+    ``period_s``: the median step.
+
+    ``gap_at_s``, ``gap_s``: start and length of each gap that the driver's state does not explain.
 
     ``missing``: how many messages are missing in each gap.
 

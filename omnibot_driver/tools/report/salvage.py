@@ -2,8 +2,8 @@
 
 """Repairs copies of bag files whose recording was not finished.
 
-An mcap file (mcap.dev/spec) is records and an index. A record is its kind (1 byte), its length (8
-bytes) and its content. An sqlite3 database has a separate journal.
+An mcap file (mcap.dev/spec) is records and an index. A record is kind (1 byte), length (8 bytes)
+and content. An sqlite3 database has a separate journal.
 """
 
 import shutil
