@@ -93,7 +93,7 @@ def _arrow(before: Mode, after: Mode) -> list[str]:
 def _label(before: Mode, after: Mode) -> list[str]:
     """Return the label of an arrow.
 
-    In the middle of sloping arrows, labels would overlap. So these labels are near the start.
+    The labels of sloping arrows are near the start, because they would overlap in the middle.
     """
     lying = PLACES[before][1] == PLACES[after][1]
     x, y = _at(_curve(before, after), 0.5 if lying else 0.3)

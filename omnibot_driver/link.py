@@ -141,8 +141,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether Stop was sent and the threads ended. After a lost port, the reader tries
-        Stop again.
+        Returns whether this call sent Stop and ended the threads. After a lost port, the reader
+        tries Stop again.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:

@@ -1,9 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A queue of calls to listeners, which several threads fill and empty.
+"""A queue of calls to listeners, in the order of the events; several threads fill and empty it.
 
 A thread queues calls under the event's lock, and makes them after releasing this lock. So a slow
-listener does not delay commands. This module knows threads; it does not know what is delivered.
+listener does not delay commands. Only one thread makes calls at a time. This module knows threads;
+it does not know what is delivered.
 """
 
 import threading

@@ -17,7 +17,7 @@ at most 4 s fast."""
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second (UTC) for TIME, or None if TIME must wait.
 
-    ``now_s``: s since 1970. ``may_set_back``: concerns the server's clock.
+    ``now_s``: s since 1970. ``may_set_back``: whether TIME may set back the server's clock.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

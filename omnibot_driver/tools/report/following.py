@@ -204,7 +204,7 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 def _stopped(log: Log, at_s: Array) -> Mask:
     """Return at which of these times the driver did not carry out commands.
 
-    An e-stop or pause counts, with the ``COMMAND_TIMEOUT_S`` after it.
+    An e-stop counts, and a state that is not running, each with the ``COMMAND_TIMEOUT_S`` after it.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
