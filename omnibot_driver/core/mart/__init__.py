@@ -2,8 +2,8 @@
 
 """The MART motion controller, a server that the driver commands by UDP datagrams.
 
-The driver sends one request at a time. The server replies when the request is complete. This
-package knows bytes and times; it does not know sockets or ROS.
+The server answers one request at a time. This package knows bytes and times; it does not know
+sockets or ROS.
 """
 
 from omnibot_driver.core.mart.replies import Fail, MartDecoder, Ok, Other, parse

@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the two motors while the robot drives.
+"""The adjustment of the two motors while the robot drives, and the learning from its results.
 
-The driver compares the measured speed with the command, and changes the motors' units. It also
-learns from the measurements how fast each motor turns with its units. This module knows the present
-motion and its measured speed; it does not know how a motion begins or ends. The caller passes the
-time.
+This module knows the present motion and its measured speed; it does not know how a motion begins or
+ends. The caller passes the time.
 """
 
 import math
@@ -19,14 +17,11 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A small turn of the robot, which tests whether the IMU works.
+"""A small turn that tests the IMU: a dead IMU and a straight drive both give a constant heading.
 
-If the reported heading is constant, the IMU is dead or the robot drives exactly straight. To find
-out which is true, the driver makes a small turn. If the heading then changes, the IMU works.
+``WAG_S``: time in s of constant heading before the turn.
 
-``WAG_S``: time in s for which the heading must be constant before the driver makes the turn.
-
-``WAG_UNITS``: units that the driver adds to the left motor and subtracts from the right motor.
+``WAG_UNITS``: added to the left motor, subtracted from the right motor.
 """
 
 STARTED_M: Final = 0.01

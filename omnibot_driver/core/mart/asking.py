@@ -2,11 +2,7 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-After the command SL on the stop port has ended a drive (RM or B), a later SM or SRM hangs the
-server permanently. So the driver sends SM and SRM only after one of these two signs:
-
-- The server accepts RST IMU, the check of the IMU. During a motion, it refuses this check.
-- The encoder shows that the robot moves.
+A later SM or SRM may hang the server permanently; docs/boards/mart.md explains why.
 
 This module knows commands and replies; it does not know why the stop port was used. The caller
 passes the time.

@@ -2,8 +2,7 @@
 
 """The MART controller as a ``Board`` of the driver. The pilot does the work.
 
-The controller sends nothing by itself, so every measurement is the reply to a query of the pilot.
-During a controlled move the controller does not answer, so silence is normal then.
+The controller only answers queries. It is silent during a controlled move.
 """
 
 import math
@@ -154,10 +153,9 @@ class MartBoard(Board):
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that are due without a datagram.
+        """Return the readings that are due without a datagram: jobs, odometry, expected silence.
 
-        These are the results of jobs and the odometry. NOTHING_MEASURED is added while the server
-        is busy and its silence is expected.
+        During expected silence, NOTHING_MEASURED is added.
         """
         readings = self._pilot.take()
         pilot = self._pilot
@@ -220,8 +218,7 @@ class MartBoard(Board):
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
         """Begin a job; a JobDone with this ``token`` reports its result later.
 
-        Raises RequestRefused while another job is in progress. A download of the log is also
-        refused if no log was started, or if the server may have lost it.
+        Raises RequestRefused during another job, or if there may be no log to download.
         """
         self._pilot.jobs.ask(job, token, now, *arguments)
 
@@ -234,9 +231,7 @@ class MartBoard(Board):
     def is_fresh(self) -> bool:
         """Whether the server has not run RM since it was started.
 
-        RM integrates the heading over the time since the previous RM. If the server's clock is set
-        back between two RM commands, the heading is useless. So the driver must set the clock back
-        only before the first RM.
+        Only then may the clock be set back: RM integrates the heading since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero
 

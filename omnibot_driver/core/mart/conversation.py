@@ -2,18 +2,8 @@
 
 """The exchange with the server: send one request, and find the reply to it.
 
-Replies carry no sequence number. The network can lose, duplicate or delay datagrams. So the driver
-checks whether the form of a reply and its failure text fit the pending request. It also checks that
-the reply does not come sooner than the command allows. A reply that does not fit is regarded as
-late and discarded.
-
-The missing reply to a query may still come late. Until it can no longer come, the driver sends no
-query with the same form of reply. There is one exception: the queries for driving cannot wait that
-long. The driver marks their replies as doubtful, and the receiver of a doubtful reply compares it
-with the expected value.
-
-This module knows requests and replies; it does not know what the requests are for. The caller
-passes the time.
+Replies carry no sequence number; their form, failure text and time show the request. This module
+knows requests and replies; it does not know what the requests are for. The caller passes the time.
 """
 
 import math
@@ -41,21 +31,16 @@ QUICKEST_S: Final = 0.1
 """Shortest time in s to wait for the reply to a query, in addition to the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
-"""Increase of ``trip_s``, the average duration of a query, after an unanswered query.
+"""After an unanswered query, ``trip_s`` becomes ``LOSS * trip_s + LOSS_S`` (s).
 
-The driver multiplies ``trip_s`` by LOSS, then adds LOSS_S (s). Maybe the driver has stopped waiting
-too soon, so it waits longer for the reply to the next query.
+The reply may only be late, so the next query waits longer.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""Times in s that decide whether the network is regarded as disturbed.
+"""Times in s that decide whether the network is disturbed: a reply may answer an earlier query.
 
-``SLOW_S``: an exchange that takes longer shows a disturbed network.
+``SLOW_S``: an exchange that takes longer is a sign of a disturbance.
 
-``DISTURBED_S``: after each sign of a disturbance, the network is regarded as disturbed for this
-time.
-
-A network that has delayed, lost or duplicated one datagram may do so again. While the network is
-disturbed, each reply may belong to an earlier query.
+``DISTURBED_S``: duration of a disturbance after its last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
@@ -63,8 +48,7 @@ PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
-With these texts, the server refuses the check, or reports that it finds no IMU. All other replies
-to a check take at least ``least_s``.
+All other replies to a check take at least ``least_s``.
 """
 
 
@@ -110,13 +94,13 @@ class Conversation:
 
     ``delay_s``: longest time that a datagram may be on its way, in s.
 
-    ``discarded``: number of replies so far that were late, duplicate or foreign.
+    ``discarded``: number of late, duplicate or foreign replies.
 
-    ``trip_s``: average duration of a query, in s. Each unanswered query increases it.
+    ``trip_s``: average duration of a query, in s; each unanswered query increases it.
 
-    ``answered_trip_s``: average duration of the answered queries, in s.
+    ``answered_trip_s``: the same for answered queries alone.
 
-    ``missed_s``: time at which the driver last stopped waiting for an overdue reply.
+    ``missed_s``: time at which a reply was last overdue.
     """
 
     def __init__(self, delay_s: float) -> None:
@@ -134,10 +118,9 @@ class Conversation:
         self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
-        """Return whether ``word`` may be sent now.
+        """Return whether ``word`` may be sent now: no request is pending.
 
-        No command may be sent while a request is pending. A query that is not in PRESSING must also
-        wait while a late reply could be mistaken for its reply.
+        Queries outside PRESSING also wait until a late reply can no longer be mistaken for theirs.
         """
         if self.pending is not None:
             return False
@@ -201,9 +184,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The missing reply is recorded, because it may still come late. There is one exception: the
-        reply to a controlled move is not recorded, because the code that stops the move waits for
-        it.
+        The missing reply may still come, so it is recorded. Exception: ``Stopping`` waits for a
+        controlled move's reply.
         """
         if self.pending is None:
             return None
@@ -226,8 +208,7 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        Replies to HELLO are not passed to this method, because HELLO may be sent while a request is
-        pending.
+        Do not pass replies to HELLO: HELLO may be sent during another request.
         """
         pending = self.pending
         if isinstance(reply, Ok):
@@ -261,9 +242,7 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether the reply is a duplicate of the reply to another query.
 
-        It is regarded as a duplicate if two conditions are met. An identical reply to another query
-        has just come, and the previous reply to ``word`` was different. The true reply to ``word``
-        is then still to come.
+        Another query has just had this reply, and the previous reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA

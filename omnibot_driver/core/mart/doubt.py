@@ -2,14 +2,7 @@
 
 """The uncertainty of the odometry of a MART robot.
 
-The uncertainty has these sources:
-
-- a wheel that slips, or whose size is not exactly known
-- a gyro that drifts
-- motors with unequal speeds, while the heading is unknown
-- the beginning and the end of each motion
-- replies whose time is known only within the network's delay
-
+Its sources: the wheel's size and slip, gyro drift, unequal motors, starts and stops, late replies.
 This module knows metres, rad and seconds; it does not know how they are measured.
 """
 
@@ -32,38 +25,31 @@ The standard deviation grows with the square root of the time (random walk).
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Standard deviations of the errors that one motion adds at its start and while it rolls out.
+"""Standard deviations of the errors of one motion's start and coasting.
 
-``END_M``: error of the position, in m.
-
-``END_RAD``: error of the heading, in rad.
+``END_M``: position, in m. ``END_RAD``: heading, in rad.
 """
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of the angle that the server reports for a turn on the spot.
 
-``TOLD_TURN_RAD``: error in rad, because the server reports whole degrees.
-
-``TOLD_TURN``: further error, as a fraction of the angle.
+``TOLD_TURN_RAD``: in rad; the server reports whole degrees. ``TOLD_TURN``: fraction of the angle.
 """
 PIVOT: Final = 0.01
-"""Error of the position in a turn on the spot, as a fraction of the track width.
+"""Distance from the robot's centre to the point about which it turns on the spot.
 
-The robot does not turn exactly about its centre. The error is the standard deviation of the
-distance from the centre to the point about which the robot turns.
+It is a standard deviation, as a fraction of the track width.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Standard deviation of a turn's random error, divided by that of its constant error.
+"""Random error of a turn known only from the commands, divided by its constant error.
 
-The two errors are those of a turn whose angle is known only from the commands. The constant error
-has the same direction in all steps of the turn. The random error is independent in each step.
+Both are standard deviations. The random error is independent in each step.
 """
 ASTRAY: Final = 0.7
-"""Factor that converts the variance of the heading (rad²) to a relative error of a driven distance.
+"""Relative error of a driven distance, per variance of the heading (rad²).
 
-An uncertain heading causes this error. The error is equally large along and across the direction of
-motion. It is at most the distance itself.
+The error has the same size along and across the motion: at most the distance.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval of length 1.
@@ -101,11 +87,10 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the ratio of left to right wheel speed. Pass this value only
-        if the turn is computed from the ratio. If the turn is measured, pass 0.
+        ``bend``: standard deviation of the left-to-right speed ratio; 0 for a measured turn.
 
-        ``aside_m``: standard deviation in m of the position across the direction of motion. This
-        error arises because the heading was not measured at the time of the count.
+        ``aside_m``: standard deviation across the motion, in m, from a heading measured at another
+        time.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -142,10 +127,9 @@ class Doubt:
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the heading error of a turn that is known only from the commands.
+        """Remove the heading error of an unmeasured turn, because the server reports the heading.
 
-        Call this when the server reports the heading. The position error that the wrong heading has
-        caused remains.
+        The resulting position error remains.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -174,19 +158,16 @@ class Doubt:
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
         """Replace the heading error of the turn that has ended, because its angle is known now.
 
-        The position must not have changed since ``end_turn``. ``spun_rad``: the turn that the wheel
-        has measured; ``told_rad``: the turn that the gyro has measured.
+        Call this before the position changes. ``spun_rad``: the wheel's turn; ``told_rad``: the
+        gyro's.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
-        """Return the errors of a turn on the spot, from its beginning until now.
+        """Return the errors of a turn on the spot so far.
 
-        ``spun_rad``: the turn that the wheel has measured.
-
-        ``told_rad``: the turn that the server has reported, or None.
-
-        The errors include a small sideways motion, which unequal motors cause.
+        ``spun_rad``: the turn that the wheel has measured; ``told_rad``: by the server, or None.
+        Unequal motors add a small sideways motion.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))

@@ -2,9 +2,8 @@
 
 """The plan of moves to a goal pose: turn towards it, drive straight, turn to its heading.
 
-Each move is a whole number of degrees or inches, and ends a little beside its target. So the driver
-plans the remaining moves anew after each move. This module knows poses and the commands for moves;
-it does not know when they are sent.
+Moves are inexact, so each is planned anew. This module knows poses and the commands for moves; it
+does not know when they are sent.
 """
 
 import math
@@ -51,10 +50,9 @@ MOST_MOVES: Final = 9
 LEAST_LIKE: Final = 0.35
 """If a move differs from its request by more than this fraction, it may have run twice."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
-"""Usual duration of a move in s: SETTLES_S, plus a time for each degree or inch.
+"""Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
-The time for a degree of a turn is S_PER_DEG. The time for an inch of a straight move is S_PER_IN.
-SLOW doubles both.
+SLOW doubles the times per degree and inch.
 """
 LONGER: Final = 1.4
 
@@ -63,12 +61,9 @@ LONGER: Final = 1.4
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder since the move began.
+    ``way_m``, ``turned_rad``: distance and turn by the encoder.
 
-    ``lasted_s``: duration of the move.
-
-    ``quiet_s``: longest possible time from the start of a duplicate of the move to the reading of
-    the encoder.
+    ``quiet_s``: longest possible time from the start of a duplicate move to the encoder's count.
     """
 
     request: Request
@@ -106,8 +101,7 @@ class Done:
 class Surplus:
     """How far controlled moves go beyond the requested distances and turns, as measured so far.
 
-    The excess of a turn is a number of degrees. The excess of a straight move is a ratio, because
-    the server ends such a move after a computed time.
+    The excess of a turn is in degrees; the excess of a straight move is a ratio.
     """
 
     def __init__(self) -> None:
@@ -153,8 +147,7 @@ class Move:
 
     ``turns``: number of turns since the last straight move.
 
-    ``given_up``: whether the driver sends no further move to this goal. The robot has arrived, or a
-    move has failed, or MOST_MOVES moves were sent.
+    ``given_up``: no further move is sent: arrived, failed, or MOST_MOVES sent.
 
     ``failed``: whether a move has failed.
     """
@@ -172,8 +165,8 @@ class Move:
     def repeated(self) -> "Move":
         """Return the progress to continue with when ``place`` is commanded again.
 
-        A goal in progress continues, and a failed goal begins anew. If the goal is finished, the
-        robot needs further moves only if it is farther from the goal than ENOUGH_M.
+        A goal in progress continues, and a failed goal begins anew. A finished goal needs moves
+        only beyond ENOUGH_M.
         """
         if not self.given_up:
             return self

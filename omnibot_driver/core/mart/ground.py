@@ -39,10 +39,9 @@ from omnibot_driver.core.packets import Packets
 from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryReading, Reading
 
 STARTS_UP_S: Final = 1.5
-"""Time in s from the server's first reply after an absence until the driver starts a motion.
+"""Time in s from a server's first reply after an absence until the driver starts a motion.
 
-The server opens its ports before it has started up completely. VOLTS and most motions crash a
-server that has just started. If RM crashes the server, the motors stay on.
+Earlier, VOLTS and most motions crash a new server. A crash by RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Silence after which the server is regarded as absent.
@@ -57,7 +56,7 @@ A stop, for example, keeps the server busy.
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
-The server answers HELLO only after the move. A restarted server answers at once.
+Only a restarted server answers HELLO during the move.
 """
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
@@ -75,7 +74,7 @@ class Ground:
 
     ``appeared_s``: time of the server's first reply after an absence.
 
-    ``greeted``: whether the server has answered the first stop of this connection.
+    ``greeted``: whether the first stop of this connection was answered.
 
     ``settings`` may be replaced.
     """
@@ -227,8 +226,8 @@ class Ground:
     def _heading_first(self) -> bool:
         """Whether the heading must be read before the encoder.
 
-        The first count after a motion ends this motion in the odometry. So after RM, the last
-        heading must come before that count.
+        The first count after a motion ends the motion in the odometry. RM's last heading must
+        precede it.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

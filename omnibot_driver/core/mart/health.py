@@ -2,8 +2,8 @@
 
 """Reasons not to drive: faults of the motor board, a dead IMU, an obstacle, or a wrong server.
 
-This module knows the less frequent measurements and their limits; it does not know how to stop the
-robot. The caller passes the time.
+This module knows infrequent measurements and their limits; it does not know how to stop the robot.
+The caller passes the time.
 """
 
 import math
@@ -58,22 +58,17 @@ as the cause."""
 class Health:
     """The health of robot and server.
 
-    ``imu``: the results of the checks of the IMU.
-
     ``stranger``: name of a server that is not a motion controller, else empty.
 
-    ``heading_told``: motions besides RM in which the server reports changes of the heading (RMRA).
+    ``heading_told``: motions besides RM in which the server's heading (RMRA) changes.
 
     ``heading_changes``: number of these changes in the present motion.
 
     ``reference_fails``: number of bare ``fail`` replies to RM in a row.
 
-    ``outlived``: whether the server has reported the end of a motion only after the driver had used
-    the stop port. If so, a stop of its next motion can fail.
+    ``outlived``: a stop was answered only after the stop port. The next stop can fail.
 
-    ``status``: the bits of the last accepted MCSTAT, or None.
-
-    ``volts``: last battery voltage, in V, or None.
+    ``status``: the bits of the last accepted MCSTAT.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -103,8 +98,7 @@ class Health:
     ) -> list[Reading]:
         """Return the readings from a reply to one of the less frequent queries.
 
-        ``uncertain``: whether the reply may belong to another query. If so, the reading is returned
-        only after several equal readings in a row.
+        ``uncertain``: the reply may answer another query, so several equal readings are required.
         """
         if word is VOLTS:
             self._voltages.append(reply.number)

@@ -2,8 +2,7 @@
 
 """What the pilot does when a reply comes, and when a reply does not come in time.
 
-This module knows states and replies; it does not know which request is sent next. The caller passes
-the time.
+This module knows states and replies; it does not know the next request. The caller passes the time.
 """
 
 import math
@@ -19,10 +18,9 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest change of the motors' units that the server need not answer while the heading is unknown.
+"""Largest ``part`` (see ``SpeedLoop``) that may stay unanswered while the heading is unknown.
 
-Without an answer to a larger change, the driver does not know whether the robot turns. So the
-driver stops the robot. The size of a change is the ``part`` of ``SpeedLoop``.
+Above it, the driver stops the robot: the robot may turn unnoticed.
 """
 
 
@@ -66,9 +64,7 @@ class Hearing(Measuring):
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
 
-        A bare ``ok`` may answer the start of the motion or the check of the IMU. A number may be
-        the reply to the stop of a turn on the spot. It may also be an encoder count that was
-        queried before the stop.
+        For example, ``ok`` may answer the start or the IMU check, and a number may be the count.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -99,9 +95,8 @@ class Hearing(Measuring):
     def _is_behind_copies(self, now: float) -> bool:
         """Return whether this answer to HELLO shows that no duplicate of the last move runs.
 
-        The server works through its requests in turn. A duplicate of the move reaches it within
-        ``network_delay``. Each HELLO since the start of the move reaches it later: the driver sends
-        HELLO GREET_S after that start, or after the end of the move.
+        The server works in turn. A duplicate arrives within ``network_delay``; this HELLO came
+        later.
         """
         since_start = now >= self._started_s + 2 * self._delay_s
         return since_start and self._rested_s >= self._started_s + self._delay_s
@@ -109,8 +104,7 @@ class Hearing(Measuring):
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion, because the server gives its name although a move should keep it busy.
 
-        Either the reply that ended the move was lost, or the server was restarted while the motors
-        turned.
+        The move's reply was lost, or the server was restarted with turning motors.
         """
         self._appears(now)
         self._moved_by = None

@@ -1,10 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The check that the IMU works, and the results of the last checks.
+"""The check that the IMU works (RST IMU, or MCR SLOW 0), and the results of the last checks.
 
-The command RST IMU checks the IMU without a motion. If the server does not have this command, the
-driver sends MCR SLOW 0 instead. If RST IMU fails, the server closes the IMU. So the driver repeats
-RST IMU several times before it regards the IMU as dead. This module knows replies and times; it
+A failed RST IMU closes the IMU, so the driver repeats it. This module knows replies and times; it
 does not know which motion is started. The caller passes the time.
 """
 

@@ -2,11 +2,8 @@
 
 """Jobs: requests to the controller besides motion, one at a time.
 
-The jobs are gyro calibration, docking, setting the clock, and starting and downloading logs. For a
-download, the server first sends the name and the size of the file. Then it sends the file in pieces
-of 512 bytes. The pieces are not numbered. The driver detects a lost or duplicated piece by the
-total size, or by two identical pieces. This module knows commands and replies; it does not know
-when the command port is free. The caller passes the time.
+A file arrives as name and size, then in unnumbered pieces of 512 bytes. This module knows commands
+and replies; it does not know when the command port is free. The caller passes the time.
 """
 
 import math
@@ -24,11 +21,9 @@ PIECE: Final = 512
 QUIET_S: Final = 1.0
 """Time in s without a piece after which the driver does not expect further pieces of a file."""
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
-"""Times in s for which the driver waits for the record of a turn, because it drives on after that.
+"""Times in s to wait for the record of a turn; the robot stands meanwhile.
 
-``RECORD_S``: for the reply, in addition to the average duration of three queries.
-
-``RECORD_QUIET_S``: for each piece.
+``RECORD_S``: for the reply, plus three average queries. ``RECORD_QUIET_S``: for each piece.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a job in REPEATED."""
@@ -78,14 +73,13 @@ class Jobs:
 
     ``logging``: whether LOG was answered with ``ok`` in this connection.
 
-    ``log_may_be_lost``: whether the server may have been restarted since that reply.
+    ``log_may_be_lost``: whether the server may have been restarted since.
 
-    ``ended``: whether the driver has sent EXIT, which ends the server.
+    ``ended``: whether EXIT was sent, which ends the server.
 
-    ``moving``: whether the driver has sent the controlled move of the docking job.
+    ``moving``: whether the docking move was sent.
 
-    ``turn_record``: name and pieces of the file of the last TURN_RECORD; None if the job was
-    cancelled.
+    ``turn_record``: name and pieces of the last TURN_RECORD; None if cancelled.
     """
 
     def __init__(self) -> None:
@@ -134,11 +128,9 @@ class Jobs:
         return f"{since}, {sum(map(len, self._pieces))} of {self._size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job.
+        """Begin a job, in place of an unsent job of the driver itself.
 
-        The new job replaces a job of the driver itself whose request was not sent yet. Raises
-        RequestRefused while another job is in progress. A download of the log is also refused if no
-        log was started, or if the server may have lost it.
+        Raises RequestRefused during another job, or if there may be no log to download.
         """
         if self.job in OWN and not self._waiting:
             self._clear()
@@ -164,8 +156,8 @@ class Jobs:
     def next(self, now: float, *, stands: bool) -> Request | None:
         """Return the job's request if it must be sent now, else None.
 
-        ``stands``: whether measurements have shown that the robot is at rest. A TURN_RECORD does
-        not wait for that, because the server has already reported the end of the turn.
+        ``stands``: whether measurements show rest. TURN_RECORD does not need this: its turn has
+        ended.
         """
         ready = stands or self.job is Job.TURN_RECORD
         return self._request if ready and not self._waiting else None
@@ -195,7 +187,7 @@ class Jobs:
     def missed(self, word: Word, now: float) -> None:
         """Repeat or end the job if the reply to its request did not come in time.
 
-        ``word``: the command whose reply did not come. Another command than the job's is ignored.
+        Another ``word`` than the job's is ignored.
         """
         if not self._waiting or self._request is None or word is not self._request.word:
             return

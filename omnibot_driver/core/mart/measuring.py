@@ -2,8 +2,8 @@
 
 """The evaluation of replies to queries: encoder counts, headings, and motion without a command.
 
-This module knows replies and which part of the driver uses them; it does not know when a query is
-sent. The caller passes the time.
+This module knows replies and their use; it does not know when a query is sent. The caller passes
+the time.
 """
 
 import math
@@ -24,8 +24,7 @@ ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 
 ``ROLLS_S``: after a stop.
 
-``ROLLS_AFTER_MOVE_S``: after a controlled move. This time is longer, because the server reports the
-failure of a move before the robot is at rest.
+``ROLLS_AFTER_MOVE_S``: after a controlled move, whose failure is reported before rest.
 """
 
 
@@ -61,14 +60,10 @@ class Measuring(Starts):
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
 
     def _shows_restart(self, before_rad: float | None) -> bool:
-        """Return whether the present heading shows that the server was restarted.
+        """Return whether the present heading shows a restart: exactly zero, as before the first RM.
 
-        A server reports a heading of exactly zero before its first RM. But the heading is also zero
-        at the start of each RM, and whenever it changes its sign. So a zero shows a restart only if
-        the previous heading was not near zero.
-
-        ``before_rad``: the previous heading, or None if it is unknown. Without it, a zero shows a
-        restart only if the server has been absent since the last motion was started.
+        The heading is also zero when RM begins and when its sign changes. So ``before_rad`` must
+        not be near zero. If it is None, the server must have been absent since the last start.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False

@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A straight line, learned by the driver, that gives the speed of a motor for its command units.
+"""A line, learned by the driver, that gives the speed of a motor for its command units.
 
-A motor without a regulator needs some units before it turns, so its speed is not proportional to
-its units. If the driver used a single factor, learned at a high speed, slow wheels would turn too
-slowly. A speed is given in nominal units. For example, a speed of 10 is that of an ideal motor with
-10 units. This module knows units; it does not know wheels or time.
+Without a regulator, a motor needs some units before it turns. Speeds are in nominal units: an ideal
+motor has speed 10 at 10 units. This module knows units; it does not know wheels or time.
 """
 
 import math
@@ -30,8 +28,7 @@ It is NOISE, plus NOISE_PART times the commanded units.
 class MotorLine:
     """A line that a Kalman filter learns: the speed is ``slope * units + offset``.
 
-    The speed and the offset are in nominal units. The argument ``slope`` is the slope before
-    anything is learned.
+    Speed and offset are in nominal units. The argument ``slope`` is the initial slope.
     """
 
     def __init__(self, slope: float = 1.0) -> None:
@@ -40,13 +37,9 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Learn from a measured speed.
+        """Learn from a measured ``speed`` (in nominal units) at ``units``.
 
-        ``units``: command units with which the speed was measured.
-
-        ``speed``: the measured speed, in nominal units.
-
-        ``doubt``: factor that multiplies the assumed standard deviation of the speed.
+        ``doubt``: factor for the assumed standard deviation of the speed.
         """
         self._learned = True
         if self._ss < SLOPE_SD**2:

@@ -2,9 +2,8 @@
 
 """What the driver knows about the two motors: the speed of each for its command units.
 
-Each motor has a ``MotorLine``, whose speeds are in nominal units. For example, a speed of 10
-nominal units is that of an ideal motor with 10 units. This module knows units, m/s and rad/s; it
-does not know what is commanded.
+Each motor has a ``MotorLine``. This module knows units, m/s and rad/s; it does not know what is
+commanded.
 """
 
 import copy
@@ -24,8 +23,7 @@ Lines = tuple[MotorLine, MotorLine]
 BALANCE_UNITS: Final = 20
 """Fewest units at which the speeds of the two motors are compared.
 
-At fewer units the motors are slow. An error of a ``MotorLine`` would then change the ratio of
-speeds too much.
+For slow motors, an error of a ``MotorLine`` would change the ratio too much.
 """
 
 
@@ -63,10 +61,9 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the motor units for a turn on the spot at ``rate_radps``.
+        """Return the motor units for a turn on the spot at ``rate_radps``, without learning.
 
-        ``seen_radps``: the measured rate of the present turn, with ``units``. This call does not
-        change what the driver has learned.
+        ``seen_radps``: the measured rate of the present turn, with ``units``.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
@@ -97,8 +94,8 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of the left motor's speed to the right motor's, both with ``units``.
 
-        The result differs from ``motor_balance`` by MOST_UNEQUAL at most. The limit is needed
-        because a lost or duplicated change of units can make the learned lines wrong.
+        A lost or duplicated change can spoil the lines: ``motor_balance`` ± MOST_UNEQUAL limits the
+        ratio.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))

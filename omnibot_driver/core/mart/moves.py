@@ -77,8 +77,7 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn by how much a move that has ended goes beyond its target.
 
-        The wheel does not measure a turn exactly, so the driver may first download the record of
-        the turn. On a network that has just lost or delayed datagrams, it skips this download.
+        A turn's record is downloaded first, except on a disturbed network: the wheel is not exact.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):

@@ -62,14 +62,9 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the errors of a prediction from the last count.
+        """Return the errors of the motion since the last count, and of that count's uncertain time.
 
-        These errors come from the motion since that count, and from the uncertain time of that
-        count.
-
-        ``ahead_s``: time since the last count.
-
-        ``blind_since_s``: as in ``told``.
+        ``ahead_s``: time since the last count. ``blind_since_s``: as in ``told``.
         """
         if blind_since_s is not None:
             blind_s = max(0.0, now - blind_since_s)

@@ -2,14 +2,9 @@
 
 """The choice of the next request to the server.
 
-The pilot takes the first of these steps that is necessary:
-
-1. Stop a motion that must not continue.
-2. Carry out the wanted command.
-3. Send a query.
-
-This module knows states, commands and measurements; it does not know where the commands come from.
-The caller passes the time.
+The order is: stop a motion that must not continue, carry out the command, send a query. This module
+knows states, commands and measurements; it does not know where the commands come from. The caller
+passes the time.
 """
 
 import math
@@ -43,17 +38,14 @@ STOPS_S: Final = 1.0
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 """Time in s from the server's first reply after an absence to the first VOLTS query.
 
-This time is a little shorter than STARTS_UP_S, so that the voltage is known before the first
-motion.
+The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
 """Unanswered requests delay VOLTS at most until this time in s after the previous VOLTS."""
 SILENT_S, GREET_AGAIN_S = 0.15, 0.1
 """Times in s after which the driver sends HELLO to a silent server.
 
-``SILENT_S``: from the last reply to the first HELLO. The duration of two exchanges is added.
-
-``GREET_AGAIN_S``: between two HELLOs.
+``SILENT_S``: from the last reply, plus two exchanges. ``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
 """Time in s after a move within which the server must answer ENC, the encoder query.
@@ -68,8 +60,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``.
 
-        A motion command or a stop also cancels the present job. There is one exception: if the
-        command repeats the present goal, the job that reads the angle of a turn continues.
+        A motion command or a stop cancels the present job. Exception: a repeated goal keeps
+        TURN_RECORD.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -207,10 +199,7 @@ class Pilot(Hearing):
     def _copy_stop_s(self) -> float:
         """The time at which to stop a suspected duplicate of a move; infinite if none is suspected.
 
-        A duplicate of a controlled move runs after the move. It blocks the command port, so the
-        server does not answer ENC. The duplicate is stopped by SL and SS. These commands would hang
-        a server that drives by RM or B. They are safe here, because the last motion was a
-        controlled move.
+        SL and SS stop it. They are safe only after a controlled move: they would hang RM and B.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected or self._port_is_free:
@@ -222,11 +211,9 @@ class Pilot(Hearing):
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def _may_ask_volts(self, now: float) -> bool:
-        """Return whether VOLTS may be sent now.
+        """Return whether VOLTS may be sent now: it crashes a server that is starting up.
 
-        VOLTS crashes a server that has not started up completely. If a restart takes less than
-        ABSENT_S, its only sign may be an unanswered request. So VOLTS also waits after each
-        unanswered request.
+        An unanswered request may be the only sign of a restart shorter than ABSENT_S.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

@@ -2,10 +2,8 @@
 
 """The times at which queries are due, in each state of the robot's motion.
 
-Queries are sent while no request is pending. The queries for encoder and heading are the most
-frequent, and alternate. The query of a sonar takes 55 ms, so it is sent only while the robot is at
-rest. This module knows queries and states; it does not know the replies. The caller passes the
-time.
+A query of a sonar takes 55 ms, so it waits for rest. This module knows queries and states; it does
+not know the replies. The caller passes the time.
 """
 
 import math
@@ -33,15 +31,14 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
     State.REVERSING: DRIVING,
     State.TURNING: TURNING,
 }
-"""Period in s of each query, by state. The most urgent query of a state comes first.
+"""Period in s of each query, by state, the most urgent query first.
 
-In the other states the command port is busy, so the driver sends no queries.
+In the other states the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
 """The two sonars, and the least time in s between a query of one and a query of the other.
 
-Both sonars report the same value where nothing is near. So a late copy of one sonar's reply could
-be mistaken for the reply of the other sonar.
+Both report the same if nothing is near, so a late copy could be mistaken.
 """
 
 
@@ -58,8 +55,7 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        The queries are sorted by due time plus period. So each query gets its turn, even if an
-        exchange takes longer than a period.
+        Sorting by due time plus period gives each query its turn in slow exchanges.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]
@@ -84,7 +80,7 @@ class Polls:
     def wake_at(self, state: State) -> float:
         """Return when the next query for encoder or heading is due; infinite without such a query.
 
-        The less frequent queries have no wake-ups of their own: they are sent at these times too.
+        The less frequent queries are sent at these times too.
         """
         frequent = (word for word in (ENC, RMRA) if word in PERIODS.get(state, {}))
         return min((self._at(word, state) for word in frequent), default=math.inf)

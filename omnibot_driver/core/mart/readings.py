@@ -39,7 +39,7 @@ class JobDone:
 
     ``token``: the object by which the caller recognizes the job.
 
-    ``name``, ``content``: name and bytes of the file; empty if the job has no file.
+    ``name``, ``content``: of the file; empty without a file.
     """
 
     token: object

@@ -2,10 +2,9 @@
 
 """Dead reckoning: the robot's pose at the last encoder count.
 
-The pose is computed from the distance of the right wheel and from the relative heading. The server
-reports the heading while RM drives. In a turn on the spot, the wheel measures the turn until the
-reply to SM reports the angle. A controlled move is measured only after its end. This module knows
-counts, degrees and metres; it does not know commands. The caller passes the time.
+The right wheel and the relative heading give the pose. On the spot, the wheel measures the turn
+until SM reports it. This module knows counts, degrees and metres; it does not know commands. The
+caller passes the time.
 """
 
 import math
@@ -50,14 +49,13 @@ class Reckoning:
 
     ``stands``: whether the robot was stopped; it may still coast.
 
-    ``slowing_since_s``: time of the first stop command in this motion, or None.
+    ``slowing_since_s``: time of this motion's first stop command, or None.
 
     ``moved_m``: distance since this motion began.
 
-    ``turn``: angle of this motion if it is a turn on the spot, else of the last such turn.
+    ``turn``: angle of the present or last turn on the spot.
 
-    ``left_over_right``: expected ratio of left to right wheel speed while the heading is unknown,
-    else None.
+    ``left_over_right``: expected ratio of wheel speeds while the heading is unknown.
 
     ``bend``: standard deviation of that ratio.
     """
@@ -166,9 +164,7 @@ class Reckoning:
         return changed
 
     def guess_changed(self, part: float, late_s: float) -> None:
-        """Add the heading error that a change of the wheels' speed ratio causes.
-
-        The error arises because the time of the change is not exactly known.
+        """Add the heading error of a change of the wheel speed ratio at an uncertain time.
 
         ``part``: relative change of the ratio.
 
@@ -180,8 +176,8 @@ class Reckoning:
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
         """Process a count of the right wheel; return the displacement since the last count.
 
-        Return None if the count is implausible or may belong to an earlier motion. Return
-        NOTHING_MEASURED if the displacement is unknown, for example at the first count.
+        Return None for an implausible or too old count, NOTHING_MEASURED for an unknown
+        displacement.
         """
         if when.from_s < self._began_s:
             return None
@@ -213,8 +209,7 @@ class Reckoning:
     def maybe(self) -> tuple[float, float]:
         """Distance of the right wheel in m, and turn in rad, that the pose may lack.
 
-        Some counts do not show whether the last motion has begun. If it has begun, the pose lacks
-        these two values. Both are zero if the counts show whether it has begun.
+        Not zero if the counts do not show whether the last motion has begun.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -270,8 +265,7 @@ class Reckoning:
     def turn_recorded(self, degrees: float) -> bool:
         """Correct the heading after a controlled turn by the angle that the server has recorded.
 
-        ``degrees``: this angle, with the server's sign. Return whether the angle was used; if not,
-        nothing is changed.
+        ``degrees``: this angle, with the server's sign. Return whether the angle was used.
         """
         told_rad = math.radians(degrees) * self._settings.heading_sign
         spun_rad = self.turn.spun_rad
@@ -315,8 +309,7 @@ class Reckoning:
     def stale(self, now: float) -> tuple[float, float]:
         """Return how much older than FRESH_S the last heading is, in s, and the error that results.
 
-        The error is the standard deviation of the robot's turn within this time, in rad. Both
-        values are 0 in every motion except RM.
+        The error: standard deviation of the turn, in rad. Both are 0 except in RM.
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

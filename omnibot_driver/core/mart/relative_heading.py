@@ -2,8 +2,8 @@
 
 """The turn of the robot within a motion, from the relative heading that the server reports.
 
-RM resets this heading to zero. Some servers update the heading only in RM. This module knows rad
-and times; it does not know commands. The caller passes the time.
+RM resets this heading; some servers update it only in RM. This module knows rad and times; it does
+not know commands. The caller passes the time.
 """
 
 import math
@@ -19,14 +19,12 @@ ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 OLD_RAD: Final = 0.01
 """If the first heading after an RM command differs by less than this (rad), it may be the old one.
 
-The old heading is the last one before the command. The server resets the heading only when RM
-begins.
+The server resets the heading only when RM begins.
 """
 MOST_RAD: Final = 1e7
-"""Size in rad from which a heading is rejected, because such a number cannot show small turns.
+"""Size in rad from which a heading is rejected, e.g. 1e15 degrees after a clock set back.
 
-The server integrates the turn rate over unsigned milliseconds of its clock. If that clock was set
-back, the heading is about 1e15 degrees.
+The server integrates the turn rate over unsigned milliseconds.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s by which a heading is predicted beyond the time of its report.
@@ -44,12 +42,9 @@ class RelativeHeading:
 
     ``told_s``: time of the last accepted heading.
 
-    ``from_s``: earliest possible time of the last heading that is certainly the reply to its query
-    (RMRA).
+    ``from_s``: earliest time of the last heading that certainly answers RMRA.
 
     ``changed_s``: time of the last change of heading.
-
-    ``rate_radps``: turn rate in rad/s.
     """
 
     def __init__(self) -> None:

@@ -20,8 +20,7 @@ SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 RAMP_LEFT: Final = 0.2
 """A turn on the spot begins only when its yaw rate is this near to the final value.
 
-The number is a fraction of the final value. An acceleration limit changes the yaw rate in a ramp,
-so the yaw rate does not have its final value at once.
+It is a fraction of the final value, because an acceleration limit ramps the yaw rate.
 """
 
 

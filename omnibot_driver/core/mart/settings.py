@@ -12,23 +12,20 @@ class MartSettings:
 
     ``track_m``: distance between the two wheels, in m.
 
-    ``metres_per_count``: distance in m that the right wheel rolls per encoder count. It is negative
-    if the encoder counts down when the robot drives forward.
+    ``metres_per_count``: m that the right wheel rolls; negative if forward counts down.
 
     ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at ``nominal_volts``.
 
-    ``motor_balance``: speed of the left motor divided by that of the right motor, at equal units.
+    ``motor_balance``: speed of the left motor divided by the right's, at equal units.
 
-    ``heading_sign``: 1 if the server's relative angle increases when the robot turns left, else -1.
+    ``heading_sign``: 1 if the server's relative angle increases to the left, else -1.
 
-    ``network_delay_s``: longest time that a datagram may be on its way, in s.
+    ``network_delay_s``: longest time of a datagram on its way, in s.
 
-    ``spin_speed``: "custom" if R and L turn at the commanded speed, which the driver sets by SSP.
-    "fixed" if they turn at the server's own speed SLOW.
+    ``spin_speed``: of R and L: "custom" (the commanded speed, by SSP) or "fixed" (SLOW).
 
-    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for the motions to a goal. The server has a
-    normal and a slow motion. The driver uses the slow motion if the normal motion would exceed the
-    limit.
+    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for motions to a goal; if the normal motion
+    exceeds them, SLOW is used.
 
     ``wheel_scale``: standard deviation of the wheel's size, as a fraction.
 

@@ -2,11 +2,8 @@
 
 """The control of both motors: which command units give the wanted speed and turn rate.
 
-The driver sends changes of the motors' command units. The server does not control the speed, so the
-effect of a unit depends on voltage, motor and floor. For each side the driver learns a
-``MotorLine``, from windows of steady driving and from turns on the spot. It holds the heading by
-the integral of the turn rate's error. This module knows units, m/s and rad; it does not know
-commands. The caller passes the time.
+The server has no speed control. The integral of the turn rate's error holds the heading. This
+module knows units, m/s and rad; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -25,24 +22,20 @@ It is small, because the network may duplicate a command, which then acts twice.
 MOST_BACKWARD: Final = 5
 """Limit that replaces MOST_CHANGE while the robot drives backward on a slow network.
 
-On a slow network a command may arrive twice. While the robot drives backward, the driver does not
-notice that.
+Backward, the driver does not notice a command that arrives twice.
 """
 SETTLE_S, LEARN_S = 0.45, 0.35
 """Times in s for learning from steady driving.
 
-``SETTLE_S``: pause in learning after a large change of units.
-
-``LEARN_S``: shortest window of learning. A window is the time over which a speed is averaged.
+``SETTLE_S``: pause after a large change of units. ``LEARN_S``: shortest averaging window.
 """
 LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """Effect of slow exchanges with the server on learning.
 
-``LEARN_TRIPS``: number of exchange durations that are added to the window of learning.
+``LEARN_TRIPS``: exchange durations that are added to the averaging window.
 
-``LESS_PER_S``: increase of the standard deviation of a measured speed, for each s that an exchange
-takes. The standard deviation is multiplied by 1 + LESS_PER_S * duration.
+``LESS_PER_S``: a speed's standard deviation is multiplied by 1 + LESS_PER_S * duration (s).
 """
 SLOWEST_MPS: Final = 0.015
 """A wheel whose measured speed in m/s is above this is regarded as turning."""
@@ -56,16 +49,15 @@ HOLD_AFTER_S: Final = 1.0
 """The heading error is not integrated for this time in s after a new commanded turn rate."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Effect of an uncertain change of units on the variance of the wheels' speed ratio.
+"""Growth of the wheel speed ratio's variance per ``part`` squared, by an uncertain change.
 
-``COPIED``: the variance grows by this factor times ``part`` squared if the change may arrive twice.
+``COPIED``: if the change may arrive twice.
 
-``MISSED``: the same, if the change was not answered.
+``MISSED``: if the change was not answered.
 
-``SLOW_TRIP_S``: a change may arrive twice if exchanges take longer than this time in s.
+``SLOW_TRIP_S``: a change may arrive twice if exchanges take longer, in s.
 
-The factors are deliberately large, because a wrong ratio of speeds lasts for the whole motion.
-``part`` is an attribute of ``SpeedLoop``.
+The factors are large: a wrong ratio lasts for the whole motion.
 """
 
 
@@ -75,13 +67,11 @@ class _Side:
 
     ``line``: the learned speed for each number of units.
 
-    ``units``: commanded units.
+    ``stood_s``: time in s without motion, although the units suffice.
 
-    ``stood_s``: time in s for which the wheel has stood although it has enough units to turn.
+    ``window_units_s``: sum of units times seconds in the present averaging window.
 
-    ``window_units_s``: sum of units times seconds in the present window of learning.
-
-    ``window_m``: distance in m that the wheel has rolled in this window.
+    ``window_m``: distance in m in this window.
     """
 
     line: MotorLine
@@ -98,11 +88,9 @@ class _Side:
 class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
-    ``trip_s``: average duration of an exchange with the server, in s. The times of measurements are
-    uncertain by this duration.
+    ``trip_s``: average duration of an exchange, in s: the uncertainty of measurement times.
 
-    ``part``: size of the last change of units. The change of each side is divided by that side's
-    units, and both results are added without sign.
+    ``part``: size of the last change, e.g. 0.2 + 0.3 for 2 and 3 of 10 units.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -141,10 +129,8 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        A motor that has MOST_DEAD units or more and does not turn is blocked, so nothing is learned
-        from it. With fewer units, the next start uses more units, and the line of the motor is
-        changed. There is one exception: the line stays unchanged if it shows that the motor
-        certainly turns with its present units.
+        From MOST_DEAD units on, the motor is blocked: nothing is learned. Below, the next start
+        uses more.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -204,8 +190,7 @@ class SpeedLoop(Motors):
     ) -> None:
         """Learn from a displacement measured over ``seconds``, and update the heading error.
 
-        ``right_only``: whether only the right wheel was measured. If so, the left motor's line is
-        changed by as much as the right motor's line.
+        ``right_only``: the left wheel was not measured; its line follows the right motor's.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
@@ -244,11 +229,8 @@ class SpeedLoop(Motors):
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
         """Return the changes of the right and the left motor's units, or None if both are zero.
 
-        A positive change makes the wheel turn faster in the direction of the motion.
-
-        ``speed_mps``: wanted speed along the motion, not negative.
-
-        ``rate_radps``: wanted turn rate, positive to the left.
+        Positive: faster in the direction of motion. ``speed_mps``: not negative. ``rate_radps``:
+            positive to the left.
         """
         if abs(rate_radps - self._rate_radps) > NEW_RADPS:
             self._rate_changed_s, self._error_rad = now, 0.0

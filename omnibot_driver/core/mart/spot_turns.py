@@ -2,8 +2,8 @@
 
 """Turns on the spot: how the driver sets their speed, and what it learns from them.
 
-The server cannot change the rate of a turn, so another rate needs another turn. This module knows
-rates and motor units; it does not know when a turn begins or ends. The caller passes the time.
+Another rate needs another turn. This module knows rates and motor units; it does not know when a
+turn begins or ends. The caller passes the time.
 """
 
 import math
@@ -22,53 +22,44 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative error of a turn's rate above which the driver begins the turn anew, with other units.
 
-``OFF``: limit until a turn has shown how fast the motors turn.
+``OFF``: until a turn has shown the motors' speed.
 
-``OFF_AGAIN``: limit after that. To stop and start again would often disturb the motion more than a
-smaller error does.
+``OFF_AGAIN``: after that. A new start would disturb the motion more than a small error.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
-"""Limits for turns that are slow because something holds the robot.
+"""Limits for turns that something slows down, as fractions of the commanded rate.
 
-Both are fractions of the commanded rate.
+``HELD``: once the motors are known, a lower rate is not learned.
 
-``HELD``: if the motors are known, the driver does not learn from a lower rate.
-
-``LEAST_LESSON``: if the motors are not known, the driver learns this rate in place of a lower rate.
-So the next turn has at most 1.7 times the units.
+``LEAST_LESSON``: before, a lower rate is learned as this one.
 """
 EVEN: Final = 0.15
 """Relative change of a turn's rate below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Rates of two turns, as fractions of the commanded rate, which show that the first was hindered.
+"""Rates of two turns which show that something held the robot in the first turn.
 
-The first turn is slower than HINDERED, and the next turn is faster than TOO_FAST. So something held
-the robot in the first turn. The driver forgets what it learned from that turn.
+As fractions of the commanded rate: the first is below HINDERED, the next above TOO_FAST.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
 
-``SAME``: largest relative difference of two commanded rates that are regarded as equal.
-
-``CORRECTIONS``: largest number of corrections while the commanded rate stays equal.
+``SAME``: relative difference of commanded rates regarded as equal. ``CORRECTIONS``: most per rate.
 """
 STEADY: Final = 0.03
 """Relative change of the commanded rate above which it is regarded as a new rate."""
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-``SPINS_UP_S``: the turn takes at least this time in s, plus the averaging time of speeds.
+``SPINS_UP_S``: least time in s, plus the averaging time of speeds.
 
-``SEEN_RAD``: the turn exceeds this angle in rad.
+``SEEN_RAD``: least angle.
 
-``TOLD_RAD``: above this angle in rad, the driver uses the angle that the server reports. The server
-reports whole degrees. For large angles, they are more precise than the wheel.
+``TOLD_RAD``: beyond it, the server's whole degrees are more precise than the wheel.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
 
-It is UNSURE_RAD (rad), plus UNSURE_PART of the expected turn, plus the turn during two exchanges.
-The expected turn comes from the encoder count and the commanded rate.
+UNSURE_RAD + UNSURE_PART * expected turn + turn during two exchanges.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after SSP in which the server certainly still knows the speed of R and L."""
@@ -120,12 +111,9 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
 
-        The driver must send SSP before it checks the IMU.
+        SSP must be sent before the check of the IMU.
 
-        ``rate_radps``: the rate of the turn.
-
-        ``delay_s``: longest delay of a datagram, in s. The next setting waits for this time, so
-        that a copy of the older setting cannot arrive after it.
+        ``delay_s``: longest delay of a datagram, in s. A new SSP waits for copies of the older one.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -180,8 +168,7 @@ class SpotTurns:
     def _is_off(self, rate_radps: float, steady_s: float, *, disturbed: bool) -> bool:
         """Return whether the turn's rate is so wrong that the driver must begin the turn anew.
 
-        The stop of the turn shows how fast the motors turn with their units, so the next turn is
-        better. While the commanded rate changes, the result is False.
+        False while the commanded rate changes.
         """
         if disturbed or not self._is_seen(steady_s):
             return False
@@ -217,9 +204,6 @@ class SpotTurns:
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        The result is True if the number differs too much from the expected angle of the turn that
-        was stopped. The reply then answers an earlier query, for example that of the encoder.
-
         ``unseen_s``: time from the last count to the stop, in s.
 
         ``trip_s``: average duration of a query, in s.
@@ -238,14 +222,9 @@ class SpotTurns:
     ) -> None:
         """Evaluate the angle in the reply to the stop of a turn.
 
-        ``degrees``: this angle.
+        ``uncounted_s``: time from the last count to the stop. ``turned_s``: duration of the turn.
 
-        ``uncounted_s``: time from the last count to the stop.
-
-        ``turned_s``: time since the turn began.
-
-        ``disturbed``: whether the reply to SSP may have belonged to another command. If so, nothing
-        is learned.
+        ``disturbed``: the reply to SSP may be another command's; nothing is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -269,10 +248,7 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Forget what was learned from a slow turn, if the next turn shows that it was hindered.
 
-        ``part``: rate of the next turn, as a fraction of the commanded rate.
-
-        From the slow and the fast turn together, the driver would learn a dead zone that the motors
-        do not have.
+        ``part``: the next turn's rate / commanded rate. Both turns would teach a false dead zone.
         """
         if self._before_slow is not None and part > TOO_FAST:
             self._loop.restore(self._before_slow)

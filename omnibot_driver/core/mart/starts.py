@@ -39,16 +39,11 @@ TIMED_OUT_S: Final = 0.5
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Longest duration of a controlled move: 3 s, plus a time for each inch or degree.
-
-``STRAIGHT_S_PER_IN``: time in s for each inch of a straight move.
-
-``TURN_S_PER_DEG``: time in s for each degree of a turn.
-"""
+"""Longest duration of a controlled move: 3 s, plus these s for each inch or degree."""
 REFERENCE_FAILS: Final = 2
 """Number of bare ``fail`` replies to RM in a row after which the driver does not try RM again.
 
-An intact server also gives a single bare ``fail``, after a stop that took long.
+A single one is normal after a long stop.
 """
 
 
@@ -107,7 +102,7 @@ class Starts(Adjusting):
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
 
-        A copy of a move would block the command port. A copy of a stop would end the next motion.
+        A move would block the command port; a stop would end the motion.
         """
         moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
         return moves or now < self._halted_s + self._delay_s
@@ -250,11 +245,10 @@ class Starts(Adjusting):
         self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure text of RM may be about another motion.
+        """Return whether the failure text of RM may be about another motion, e.g. the last B.
 
-        On some servers the text belongs to the last B. The driver believes a reported obstacle in
-        two cases: the front sonar sees an obstacle too, or RM has reported an obstacle twice in a
-        row. The driver does not rely on any other text.
+        Only an obstacle is believed: if the front sonar sees it too, or at the second report in a
+        row.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -2,9 +2,8 @@
 
 """The commands that the driver may send to the MART controller in each state of motion.
 
-Some commands, sent in the wrong state, hang the real server permanently while the motors turn. So
-the driver looks up each command here before it sends the command. This module knows commands and
-states; it does not know times or measurements.
+A wrong command can hang the server with the motors turning. This module knows commands and states;
+it does not know times or measurements.
 """
 
 from collections.abc import Mapping
@@ -147,16 +146,14 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server does one of two things. It starts the motors but never answers, or it
-carries out the command only when the IMU works again. MCR and MCL are exceptions: they notice the
-dead IMU. But some servers turn the robot for half a second before that.
+With a dead IMU, the server starts the motors and never answers, or waits for the IMU. MCR and MCL
+notice it, on some servers after a turn of 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
 """Commands whose duplicate does harm if it arrives after another motion has begun.
 
-After one of these commands, the driver waits until a duplicate can no longer come. Only then does
-it start another motion, or check the IMU for a start.
+The driver waits for possible duplicates before the next start and its check of the IMU.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

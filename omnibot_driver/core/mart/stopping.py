@@ -2,17 +2,8 @@
 
 """The stop of one motion: the commands to send until the server has acknowledged the stop.
 
-The driver sends the stop command at once, even if another request is pending. It repeats the
-command until the server answers. The network may deliver a stop before a start that was sent
-earlier. So the driver accepts a reply only under these conditions:
-
-- The reply certainly answers a stop. A bare ``ok`` is accepted only if it cannot be the reply to
-  the start.
-- A duplicate of the start can no longer arrive after that stop.
-
-The stop port is the last resort. The driver does not use it right after SM or SRM, because both
-commands would run at the same time, and a port could hang. This module knows commands, replies and
-times; it does not know why the robot is stopped.
+A reply counts only if it certainly answers a stop that was not overtaken by the start. This module
+knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
@@ -47,10 +38,9 @@ class Stopping:
 
     ``started_s``: time at which the start of the motion was sent.
 
-    ``owed``: number of other requests whose reply is still to come and looks like a reply to the
-    stop.
+    ``owed``: number of missing replies that look like a reply to the stop.
 
-    ``move``: the controlled move to stop, or None. The reply to the move itself ends the stop.
+    ``move``: the controlled move to stop, or None. Its own reply ends the stop.
     """
 
     def __init__(
@@ -90,6 +80,7 @@ class Stopping:
         if now < self.wake_at:
             return ()
         silent = self._rounds >= ROUNDS and now >= self._silent_from_s
+        # SL or SS would run at the same time as an SM or SRM just sent, and could hang a port
         if silent and now <= self._said_s + self._delay_s:
             self.wake_at = self._said_s + self._delay_s + 0.01
             return ()
@@ -99,7 +90,7 @@ class Stopping:
             return LAST_HALTS[self.motion]
         self._rounds += 1
         self._said_s = now
-        if now < self._sure_from_s:
+        if now < self._sure_from_s:  # the start may still come, after this stop
             self._unsure_until_s = now + 2 * self._delay_s
         return HALTS[self.motion]
 
@@ -150,8 +141,7 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The last doubtful reply, if it is probably the reply to the stop; else None.
 
-        It probably is the reply to the stop if more replies came than were missing when the stop
-        began. This is certain only on a network that neither delays nor duplicates datagrams.
+        Probable if more replies came than were missing. Certain only on a good network.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

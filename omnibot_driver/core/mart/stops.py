@@ -2,9 +2,8 @@
 
 """The reasons to stop a motion, and the stop itself.
 
-The driver also stops a motion if the behaviour of the robot is uncertain. This module knows the
-wanted command, measurements and the stop commands; it does not know how a motion begins. The caller
-passes the time.
+Uncertain behaviour is a reason too. This module knows the wanted command, measurements and the stop
+commands; it does not know how a motion begins. The caller passes the time.
 """
 
 import math
@@ -133,12 +132,10 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: the reason to report to the user, or empty. With a reason, the driver also discards
-        the user's command. There is one exception: if the direction of the present motion is
-        already refused (see ``_block``), the driver keeps the command.
+        ``why``: reported to the user. It discards the command, unless ``_block`` refuses the
+        direction.
 
-        ``arrived``: whether the start has certainly arrived. If so, a stop cannot overtake the
-        start.
+        ``arrived``: whether the start has certainly arrived, so a stop cannot overtake it.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
@@ -221,11 +218,7 @@ class Stops(Ground, ABC):
         self._rest(now)
 
     def _may_be_count(self, reply: Reply) -> bool:
-        """Return whether a number in a reply may be an encoder count instead of a turn's angle.
-
-        The result is True if the number differs too much from the expected angle of the turn that
-        was stopped.
-        """
+        """Return whether a number in a reply may be an encoder count instead of a turn's angle."""
         stopping = self._stopping
         assert stopping is not None
         if stopping.motion is not Motion.SPIN:
@@ -256,9 +249,7 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply) -> None:
         """Record that the server answers a stop only after the driver has used the stop port.
 
-        So the server was not restarted, and its stop port may still wait for the end of the motion.
-        The stop port would mistake the start of the next RM for that end. The server would then
-        never answer that RM, and nothing could stop it.
+        Its stop port may still wait for an end. It would hang the next RM; see docs/boards/mart.md.
         """
         ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
         if ends and self.motion is not Motion.SPIN:

@@ -2,9 +2,8 @@
 
 """The angle of a turn on the spot: as the wheel measures it, and as the server reports it.
 
-The reply to SM reports the angle of R and L. The record of a controlled turn contains the angle of
-MCR and MCL. Both come from the gyro, so they replace the angle of the wheel. This module knows
-angles in rad; it does not know the pose.
+The server's angles (the reply to SM, the record of MCR or MCL) come from the gyro and are
+preferred. This module knows angles in rad; it does not know the pose.
 """
 
 from typing import Final
@@ -12,8 +11,7 @@ from typing import Final
 TOLD_RAD, TOLD_PART = 0.05, 0.3
 """Largest accepted difference between a reported turn and the turn measured at the wheel.
 
-It is TOLD_RAD (rad), plus TOLD_PART of the wheel's turn. A reported number that differs by more is
-regarded as the answer to another query.
+TOLD_RAD (rad) + TOLD_PART * the wheel's turn; beyond it, another query was answered.
 """
 NO_CORRECTION: Final = 0.0
 
@@ -21,11 +19,11 @@ NO_CORRECTION: Final = 0.0
 class TurnAngle:
     """The angle of the present turn on the spot, or of the last one.
 
-    Each correction is the angle in rad by which the heading of the pose must be changed.
+    A returned correction is the change in rad of the pose's heading.
 
-    ``spun_rad``: the turn that the wheel has measured; after ``record`` the recorded turn.
+    ``spun_rad``: the wheel's turn; after ``record`` the recorded turn.
 
-    ``told_rad``: the turn that the server has reported in its reply to the stop, or None.
+    ``told_rad``: the turn in the server's reply to the stop.
     """
 
     def __init__(self) -> None:
@@ -57,10 +55,8 @@ class TurnAngle:
     def end(self, *, may_be_recorded: bool) -> float:
         """End the turn after its last count; return the correction.
 
-        If the reported angle differs too much from the turn measured at the wheel, the correction
-        replaces it by the measured turn, and ``told_rad`` becomes None.
-
-        ``may_be_recorded``: whether the server may have recorded this turn.
+        An implausible ``told_rad`` is replaced by the wheel's turn. ``may_be_recorded``: by the
+        server.
         """
         self._may_be_recorded = may_be_recorded
         if self.told_rad is None:
@@ -74,8 +70,7 @@ class TurnAngle:
     def record(self, told_rad: float) -> float | None:
         """Process the recorded angle of a turn that has ended; return the correction.
 
-        Return None in two cases: the angle differs too much from the turn measured at the wheel, or
-        the turn was not the last motion in this odometry frame.
+        Return None if the angle is implausible, or the turn not the last motion in this frame.
         """
         wrong_rad = told_rad - self.spun_rad
         if not self._may_be_recorded or is_of_another(wrong_rad, self.spun_rad):

@@ -2,13 +2,8 @@
 
 """The angle of a controlled turn, as the server has recorded it (LAST TURN).
 
-The reply to MCR and MCL does not contain the angle. The public server writes the angle at the
-beginning of a file, as the integral of the gyro until the robot was at rest. The manual does not
-describe this file, so the driver also works without it.
-
-The public server does not close a file that it has sent, and cannot open many more than 1,000. So
-the driver downloads records only until they have shown the ratio of the motors' speeds. This module
-knows the form of the file; it does not know when the file is downloaded.
+The public server leaves each sent file open and can open about 1,000, so downloads are limited.
+This module knows the form of the file; it does not know when the file is downloaded.
 """
 
 import re
@@ -74,8 +69,7 @@ class TurnRecords:
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
         """Return the recorded angle as ``recorded_deg`` does, from the file called ``name``.
 
-        If the server cannot write a new file, it sends that of an earlier turn again. Then the name
-        is the same as before, and the result is None.
+        None if ``name`` repeats: the server could not write a new file.
         """
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)
@@ -83,10 +77,8 @@ class TurnRecords:
     def used(self, told_rad: float, wheel_rad: float) -> None:
         """Learn from a record that the odometry has used.
 
-        ``told_rad``: the recorded turn.
-
-        ``wheel_rad``: the part of the turn that comes from the right wheel. If both motors are
-        equal, this is half the turn.
+        ``told_rad``: the recorded turn. ``wheel_rad``: the right wheel's part, e.g. half the turn
+        for equal motors.
         """
         self._failures = 0
         self._told_rad += abs(told_rad)
@@ -100,11 +92,9 @@ class TurnRecords:
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
     """Return the angle of a turn in degrees, with the server's sign, from the pieces of its file.
 
-    ``request``: the command of the turn. Returns None if the pieces are not from a record of this
-    turn, or have no angle. The angle is in the first piece, so the loss of a later piece does no
-    harm.
+    ``request``: the turn's command. None if the record is of another turn or has no angle.
     """
-    for piece in pieces:
+    for piece in pieces:  # the angle is in the first piece, so a later piece may be lost
         if head := _HEAD.match(piece):
             asked = float(request.data.split()[-1])
             if abs(float(head["asked"]) - asked) > SAME_DEG:

@@ -2,11 +2,8 @@
 
 """The distance rolled by the right wheel, from an encoder count that begins anew in each motion.
 
-A reply may answer an earlier query, or contain another number than the count. So the driver
-discards an implausible count. After several implausible counts in a row, it accepts the last of
-them. If the step to this count is impossibly large, the step adds no distance. This module knows
-counts and times; it does not know the robot's motion. The caller passes the time and the metres per
-count.
+A reply may answer another query, so an implausible count needs repetition. This module knows counts
+and times; it does not know the robot's motion. The caller passes the time and the metres per count.
 """
 
 import math
@@ -18,17 +15,10 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Largest accepted error of a count that may answer another query.
 
-``DOUBT_M``: fixed part of the error, in m.
-
-``DOUBT_MPS``: further error in m for each s. The time is the driving time since the last count plus
-the time uncertainty of the reply.
+DOUBT_M (m) + DOUBT_MPS * (driving time since the last count + the reply's time uncertainty).
 """
 MOST_M, MOST_MPS = 0.3, 2.0
-"""Largest plausible distance between two counts.
-
-It is MOST_M (m), plus MOST_MPS (m/s) times the time between the counts. A larger distance shows
-that one of the two counts is wrong.
-"""
+"""Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time."""
 STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
@@ -40,13 +30,11 @@ SAME_TIMES: Final = 2
 class Step:
     """The distance that the wheel has rolled between two counts.
 
-    ``wheel_m``: distance in m.
-
     ``seconds``: time between the counts.
 
     ``lost``: whether the robot has also moved by an unknown amount.
 
-    ``unsure``: whether the true distance may be zero, because the start may have been lost.
+    ``unsure``: the true distance may be zero, as the start may be lost.
     """
 
     wheel_m: float
@@ -58,16 +46,12 @@ class Step:
 class WheelCount:
     """The count of the right wheel's encoder.
 
-    ``last``: last accepted count, or None before the first.
-
-    ``told_s``: time of that count.
-
-    ``from_s``: earliest possible time of that count.
+    ``last``: last accepted count. ``told_s``, ``from_s``: its probable and earliest time.
 
     ``certain``: whether the last reply cannot be the answer to another query.
 
-    ``maybe``: the last count, if it equals the last count before the start, else 0. Such a count
-    does not show whether the motion has begun.
+    ``maybe``: the last count, if it equals the one before the start, else 0. The motion may not
+    have begun.
     """
 
     def __init__(self) -> None:
@@ -121,8 +105,6 @@ class WheelCount:
         rests: bool,
     ) -> Step | None:
         """Process a count; return the step since the last count, or None for an implausible count.
-
-        ``expected_mps``: expected speed of the wheel.
 
         ``stood_s``: time at which the robot was stopped, infinite while it is driven.
 

@@ -2,10 +2,9 @@
 
 """The table of all commands of the MART controller: port, replies and times of each.
 
-A command is one ASCII datagram without a terminator, and it is case-sensitive. The most important
-commands are:
+A command is one case-sensitive ASCII datagram without a terminator.
 
-- motions: RM drives forward, B drives backward, R and L turn on the spot
+- motions: RM drives forward, B backward, R and L turn on the spot
 - controlled moves of a given length: TF and TB drive, MCR and MCL turn
 - changes of a motion: RMCS for RM, CS for B
 - stops: SRM stops RM, SM stops B, R and L, SL and SS use the stop port
@@ -56,13 +55,9 @@ class Word:
 
     ``forms``: the forms of a successful reply.
 
-    ``takes_s``: longest time in s that the server needs.
+    ``takes_s``, ``least_s``: longest and shortest time in s; an earlier reply is another command's.
 
-    ``least_s``: shortest time in s that the server needs. A reply that comes earlier belongs to
-    another command.
-
-    ``fails``: the texts after ``fail`` that this command can return. A text that no command lists
-    is accepted with every command.
+    ``fails``: this command's texts after ``fail``; an unlisted text is accepted for every command.
     """
 
     text: str
@@ -142,8 +137,7 @@ NO_IMU: Final = "could not init"
 RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
 """The check of the IMU without a motion.
 
-If the check fails, the server closes the IMU. So the driver repeats a failed check several times
-before it regards the IMU as dead.
+A failure closes the IMU on the server, so the driver repeats the check.
 """
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
 """The check of the IMU for servers without RST IMU: a turn by 0 degrees.
