@@ -2,12 +2,8 @@
 
 """Simulated motor boards for tests of the driver, each written from the manual of the real board.
 
-Each board has its own package; ``common`` contains what the boards share. The simulator shares no
-code with the driver, so that tests can reveal a misread manual. ``python -m
-omnibot_driver.simulator`` runs one board in real time.
-
-In this release, the names of ``simulator.omnibot`` can also be imported from here. The next release
-removes them.
+The simulator shares no code with the driver, so that tests can reveal a misread manual. The names
+of ``simulator.omnibot`` can be imported from here until the next release.
 """
 
 import warnings

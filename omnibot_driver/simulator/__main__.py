@@ -2,8 +2,8 @@
 
 """Command line that runs a simulated board in real time, with its ports and a console on stdin.
 
-This module knows arguments, signals and the console. It must not know the byte protocol or the
-internals of any board.
+This module knows arguments, signals and the console. It must not know any board's protocol or
+internals.
 """
 
 import argparse

@@ -19,9 +19,8 @@ datagram."""
 class Channel:
     """One connection between a board and the computer.
 
-    name: name of the channel on its board; empty if the board has only one channel.
-    parameter: the driver's parameter that names the port of the channel. It is empty if the channel
-        uses the UDP port after that of the channel before.
+    name: empty if the board has only one channel.
+    parameter: the driver's port parameter; empty for the UDP port after the channel before.
     datagrams: True for UDP, False for a serial line.
     """
 
@@ -45,12 +44,10 @@ class SimulatedBoard(Protocol):
         """Board time that passes with each ``advance``, in s."""
 
     def receive(self, data: bytes, now: float, channel: int, /) -> None:
-        """Receive data that was sent to the board.
+        """Receive data that was sent to the board; the next ``advance`` returns the reply.
 
         data: one datagram, or bytes of a serial line, in chunks of any size.
         now: arrival time in s, by any monotonic clock.
-
-        The next ``advance`` returns the board's reply.
         """
 
     def advance(self) -> list[Packet]:
@@ -63,8 +60,7 @@ class SimulatedBoard(Protocol):
     def facts(self) -> Mapping[str, object]:
         """State of the robot and the board, as values that JSON can represent.
 
-        It always contains ``x_m``, ``y_m`` and ``yaw_rad``. They are the true pose relative to the
-        pose at construction, with the yaw unwrapped.
+        ``x_m``, ``y_m``, ``yaw_rad``: true pose since construction, yaw unwrapped.
         """
 
 
@@ -77,11 +73,7 @@ class SimulatorModule(Protocol):
     """Channels of each board of this kind."""
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
-        """Add the options of this board to the parser.
-
-        Options that all boards have, such as ``--seed`` and the faults of the line, are added
-        elsewhere.
-        """
+        """Add the options of this board to the parser, but not those of all boards (``--seed``)."""
 
     def from_arguments(self, arguments: argparse.Namespace) -> SimulatedBoard:
         """Return the board that the options describe.

@@ -30,9 +30,7 @@ _GOOD = LineFaults()
 
 
 class FaultyLine:
-    """A serial line with random faults.
-
-    The same bytes and seed always give the same faults, however the bytes are split into chunks.
+    """A serial line with random faults, the same for the same bytes and seed, however split.
 
     lost, flipped: numbers of bytes lost and changed so far.
     """

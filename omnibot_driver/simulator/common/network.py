@@ -15,10 +15,9 @@ from random import Random
 class NetworkFaults:
     """Faults of a network, per datagram and in both directions.
 
-    lose: probability that a datagram is lost.
-    duplicate: probability that a datagram arrives twice.
-    delay_s: longest delay in s. The delay of each copy is random and uniformly distributed, so
-        datagrams may arrive in another order.
+    lose, duplicate: probabilities that a datagram is lost, or arrives twice.
+    delay_s: longest delay in s; each copy's delay is uniformly distributed, so copies may be
+        reordered.
     """
 
     lose: float = 0.0
@@ -30,9 +29,7 @@ _GOOD = NetworkFaults()
 
 
 class NetworkPath:
-    """One direction of a network.
-
-    The same datagrams, times and seed always give the same faults.
+    """One direction of a network; the same datagrams, times and seed give the same faults.
 
     lost, duplicated: numbers of datagrams lost and duplicated so far.
     """

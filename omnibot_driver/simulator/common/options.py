@@ -2,9 +2,8 @@
 
 """Options common to all simulated boards, on the command line and in a sim:// URL.
 
-Each option is declared once, for both uses. A board's own options come from its package. This
-module knows the names, values and effects of options. It must not know what runs the board, nor any
-particular board.
+This module knows the names, values and effects of options. It must not know what runs the board,
+nor any particular board.
 """
 
 import argparse

@@ -2,8 +2,8 @@
 
 """A simulated board in real time: the thread that advances it tick by tick.
 
-This module knows the clock and the board's ``receive`` and ``advance``. It must not know how
-packets are transported, nor what they mean.
+This module knows the clock and the board's ``receive`` and ``advance``. It must not know packets'
+transport or meaning.
 """
 
 import threading
@@ -33,9 +33,9 @@ class RunningBoard(ABC, Generic[B]):
 
     ``dropped``: number of bytes that the driver did not read in time.
 
-    ``board``: other threads may access it only while they hold ``lock``.
+    ``board``: other threads must hold ``lock``.
 
-    ``stop``, ``check`` and ``wait_for`` raise RuntimeError if the board's thread has died.
+    Raises RuntimeError from ``stop``, ``check`` and ``wait_for`` if the thread has died.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:
@@ -130,8 +130,7 @@ class RunningBoard(ABC, Generic[B]):
     def _due(self, due_s: float) -> tuple[int, float]:
         """Return the number of overdue ticks, and the time in s at which the next tick is due.
 
-        A real serial line continues while the computer that reads it is busy. So the output of all
-        overdue ticks is sent at once.
+        Their output is sent at once, as a real line continues during delays.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

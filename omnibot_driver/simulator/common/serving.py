@@ -2,8 +2,7 @@
 
 """A simulated board in real time for other programs: each channel has its own port.
 
-This module knows the ports that carry the channels, and waits for all of them at once. It must not
-know what packets mean.
+This module knows the ports of the channels. It must not know what packets mean.
 """
 
 import os
@@ -44,13 +43,11 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    Each serial channel has a pseudo-terminal, and each datagram channel has a UDP port.
+    links: symbolic links: one for each pseudo-terminal, or one path for all, to which "-CHANNEL" is
+        appended.
+    udp_port: first UDP port, 0 for any free port; the next channels' ports follow.
 
-    links: paths of symbolic links: one path for each pseudo-terminal, or one path for all. In the
-        second case, a hyphen and the channel's name are appended to the path.
-    udp_port: number of the first UDP port, 0 for any free port. The others follow it.
-
-    Entering the context raises OSError if a link or a port is unavailable. The text explains why.
+    Raises OSError on entry if a link or a port is unavailable.
     """
 
     def __init__(

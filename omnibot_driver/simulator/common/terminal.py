@@ -18,12 +18,10 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal. The driver opens ``address``, the simulator uses ``descriptor``.
 
-    The terminal stays open when the driver closes the port. If more than ``UNREAD_LIMIT`` bytes are
-    unread, further bytes are lost, as on a UART whose kernel buffer is full.
+    The driver may close and reopen it. Beyond ``UNREAD_LIMIT`` unread bytes, bytes are lost.
 
-    ``link``: path of a symbolic link to the terminal. It is made here and removed by ``close``. A
-    dead link, or a link to a pseudo-terminal, is replaced. Raises FileExistsError if the path
-    exists and is anything else.
+    ``link``: path of a symbolic link, removed by ``close``. It replaces a dead link or a link to a
+    pseudo-terminal. Raises FileExistsError for anything else.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

@@ -39,7 +39,7 @@ class UdpSocket:
     def send(self, data: bytes) -> int:
         """Send a datagram to the driver, and return the number of bytes that were sent.
 
-        The result is 0 if the driver's address is not known yet, or if an error occurs.
+        0: the driver's address is unknown, or an error occurred.
         """
         if self._peer is None:
             return 0

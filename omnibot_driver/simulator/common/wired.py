@@ -2,8 +2,8 @@
 
 """A board with its lines, in board time: each packet passes through a line, which may be faulty.
 
-Like the board, this module is pure: the same settings and input give the same output. It knows
-channels and lines. It must not know real time, nor what packets mean.
+The same settings and input give the same output. This module knows channels and lines. It must not
+know real time or packets' meaning.
 """
 
 from collections.abc import Sequence

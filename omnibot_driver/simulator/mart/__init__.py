@@ -2,12 +2,8 @@
 
 """A simulated MART motion controller that follows its manual or its public server.
 
-The package shares no code with the driver. Otherwise, a misreading of the manual would affect both,
-and tests would not find it.
-
-``MartServer`` uses no sockets or clocks. Its interface is ``receive(datagram, port, sender, now)``,
-``advance(now)`` and ``copy()``. ``SimulatedMart`` wraps ``MartServer`` for real ports, ``sim://``
-and simulated bad networks.
+It shares no code with the driver, so that tests can reveal a misread manual. ``MartServer`` uses no
+sockets or clocks; ``SimulatedMart`` wraps it for real ports and ``sim://``.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

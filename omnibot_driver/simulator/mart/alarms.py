@@ -2,13 +2,8 @@
 
 """Supervision of a motion in progress, 100 times a second, as the server does it.
 
-The supervision uses the encoder of the right wheel to detect when the motion starts and stops. It
-also detects obstacles, and it ends controlled moves.
-
-While samples of the IMU are missing, it detects only obstacles and the dock, and only in controlled
-linear moves.
-
-This module knows motions; it does not know commands.
+It detects start, stop and obstacles, and ends controlled moves. This module knows motions; it does
+not know commands.
 """
 
 from typing import TYPE_CHECKING
@@ -154,8 +149,7 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    The server wrongly adds the distance of the ramps in feet to a sum in inches. This function does
-    the same.
+    Like the server, it wrongly adds the ramps' feet to inches.
     """
     if motion.kind not in _TIMED:
         return 0.0
@@ -190,10 +184,8 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels.
 
-    ``right``, ``left``: changes of the speeds in register units, forward positive.
-
-    Each speed is kept between stop and full speed. If a wheel would exceed full speed, the other
-    wheel is slowed by the excess.
+    ``right``, ``left``: changes in register units, forward positive. Excess over full speed slows
+    the other wheel.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

@@ -2,8 +2,7 @@
 
 """The simulated controller as a simulated board: two channels of datagrams, and time in ticks.
 
-This module knows the server and the common interface of simulated boards; it does not know
-commands.
+This module knows the server and the boards' interface; it does not know commands.
 """
 
 from collections.abc import Mapping

@@ -2,9 +2,8 @@
 
 """The motor board, its two motors, and the robot that they move.
 
-A motor register is 0 for full speed forward, 128 for stop, and 255 for full speed backward.
-
-This module knows registers, volts and metres; it does not know commands or why the robot moves.
+Motor registers: 0 full forward, 128 stop, 255 full backward. This module knows registers, volts and
+metres; it does not know commands or why the robot moves.
 """
 
 from math import cos, exp, inf, pi, sin
@@ -26,11 +25,10 @@ class Chassis:
     """The motor board with its motors, its encoder and the body of the robot.
 
     right, left: registers of the two motors.
-    right_mps, left_mps: speeds of the two wheels in m/s.
-    x_m, y_m, yaw_rad: the true pose. The yaw is not wrapped.
+    x_m, y_m, yaw_rad: the true pose, yaw unwrapped.
     counts: encoder counts of the right wheel since the last reset.
-    way_m: total distance; distances forward and backward are added.
-    volts, stuck, motor_status, silent: properties of the motor board. Set them only by ``change``.
+    way_m: total distance, forward and backward added.
+    volts, stuck, motor_status, silent: set them only by ``change``.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -183,11 +181,9 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """Return the distance in m from a sonar to the wall that it faces, or infinity.
+    """Return the distance in m from the front (or ``backward``: rear) sonar to its wall, or inf.
 
-    ``backward``: whether the sonar is the rear one.
-
-    The walls lie across the x axis, ``front_m`` in front of the start and ``rear_m`` behind it.
+    The walls lie across the x axis, at ``front_m`` and ``-rear_m``.
     """
     along = cos(chassis.yaw_rad + (pi if backward else 0.0))
     if along > 0.3:

@@ -2,10 +2,8 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The server compares the beginning of a request with its commands, in a fixed order. So the command F
-matches every request that begins with F, unless an earlier command matches it.
-
-This module knows command words and numbers; it does not know how a motion proceeds.
+The first matching row wins: F matches any request that begins with F and fits no earlier row. This
+module knows command words and numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -36,8 +34,8 @@ BAD_DISTANCE = "fail bad distance value"
 class Row(NamedTuple):
     """A command and its handler.
 
-    word: the complete command, or its beginning if ``begins`` is true.
-    moves: whether the server refuses the command while a motion, a recording or MCS is in progress.
+    word: the complete command, or its beginning if ``begins``.
+    moves: whether a motion, a recording or MCS makes the server refuse the command.
     """
 
     word: str

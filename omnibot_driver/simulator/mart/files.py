@@ -29,10 +29,9 @@ _NAMES = {
 class FileNote:
     """The data from which the file of a motion is made.
 
-    is_turn: whether the motion was a spin.
     head: first lines of the file.
     rows: number of samples in the file.
-    angle_deg, encoder: angle and encoder count at the end of the motion.
+    angle_deg, encoder: values at the end of the motion.
     """
 
     name: str

@@ -11,11 +11,9 @@ from omnibot_driver.simulator.mart.settings import MartSettings
 class Imu:
     """The gyro, and the values that the server computes from it.
 
-    alive: whether the IMU is plugged in. The caller can set ``alive`` at any time. During a failure
-        that the settings have planned, the IMU does not work even if ``alive`` is true.
-    closed: whether the server has stopped using the IMU. After a successful RST IMU or SB, the
-        server uses the IMU again.
-    rate_dps: turn rate of the last sample in deg/s, minus the bias that the server knows.
+    alive: whether the IMU is plugged in; may be set. The settings may plan further failures.
+    closed: whether the server has stopped using the IMU, until RST IMU or SB succeeds.
+    rate_dps: last sample in deg/s, minus the bias that the server knows.
     heading_deg: the relative heading in degrees, left positive.
     """
 

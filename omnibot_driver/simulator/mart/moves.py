@@ -2,10 +2,8 @@
 
 """The start of each kind of motion, and its end by a command.
 
-Each step of a motion is a function that the server calls later. So a copy of the server can
-continue the motion too.
-
-This module knows motions; it does not know the words of commands.
+Each step is a function that the server, or its copy, calls later. This module knows motions; it
+does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING
@@ -85,13 +83,10 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """Take a sample of the gyro bias, and schedule the next sample while some are left to take.
+    """Take a sample of the gyro bias, with ``left`` to take; schedule the next one.
 
-    After the last sample, start the motion ``kind``. If ``kind`` is None, answer SB.
-
-    ``left``: number of samples that are left to take.
-
-    ``missed``: number of samples in a row that did not arrive.
+    After the last, start the motion ``kind``, or answer SB if ``kind`` is None. ``missed``: missing
+    samples in a row.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
@@ -140,6 +135,8 @@ def _go_reference(server: "MartServer", speed: int) -> None:
     samples = motion.samples
     motion.begin(server.now_s)
     if server.quirks.reference_start_counts_on:
+        # RM fails at once if its last stop took 0.56 s to 0.6 s. If that stop took longer, RM waits
+        # endlessly for a stuck motor.
         motion.samples = samples
     server.zero_heading()
     server.sampling_since_s = server.now_s

@@ -2,8 +2,7 @@
 
 """Command line options of a simulated MART controller, except its seed and its network.
 
-This module knows the names, values and effects of options; it does not know which program runs the
-board.
+This module knows options and their effects; it does not know which program runs the board.
 """
 
 import argparse

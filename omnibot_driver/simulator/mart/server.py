@@ -2,10 +2,8 @@
 
 """The server: two ports with a thread each, a timer while something moves, and simulated time.
 
-The input is datagrams and times, and the output is replies. The same settings and input give the
-same output. Time advances from event to event, so a robot at rest takes no computing time.
-
-This module does not know sockets, real time or the set of commands.
+The same settings and input give the same output. Time jumps from event to event. This module does
+not know sockets, real time or the set of commands.
 """
 
 from collections import deque
@@ -23,7 +21,7 @@ QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
 """``BOOT_S``: time in s from a restart of the program until it opens its ports.
 
-``START_UP_S``: time in s from the opening of the ports until the program has started up completely.
+``START_UP_S``: time in s from then until it has started up completely.
 """
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
@@ -48,10 +46,8 @@ class _Later(NamedTuple):
 class MartServer(ServerState):
     """The controller with its robot. ``receive`` and ``advance`` let time pass.
 
-    ``ServerState`` describes its state.
-
     received: the last datagrams at both ports, each with its time and port.
-    executed: the last commands that the server began, in order.
+    executed: the last commands that the server began.
     """
 
     def __init__(self, settings: MartSettings | None = None) -> None:

@@ -2,8 +2,7 @@
 
 """State of a simulated server and its robot: true values, and the values that the server assumes.
 
-This module holds values, and computes others from them; it does not know commands, or how time
-passes.
+This module holds and computes values; it does not know commands, or how time passes.
 """
 
 import time
@@ -41,17 +40,15 @@ class Waiter(NamedTuple):
 class ServerState:
     """The state of the server, its robot and its surroundings.
 
-    now_s: simulated time since construction.
-    crashed: why the server ended. Empty while it runs.
-    busy: whether a command is in progress.
-    motions: state of each kind of motion.
+    crashed: why the server ended; empty while it runs.
     alarm: the kind of motion that is supervised.
     starting: the kind of motion whose command is not answered yet.
     custom: parameters that SLMP and SSP have set.
-    sampling_since_s: time since which a motion uses a sonar, or -1 if none does.
-    front_m, rear_m, dock_m: distances from the start. They can be changed at any time.
+    sampling_since_s: time since which a motion uses a sonar, or -1.
+    front_m, rear_m, dock_m: distances from the start.
 
-    The attributes of the chassis and the IMU can also be changed at any time.
+    ``front_m``, ``rear_m``, ``dock_m`` and the attributes of chassis and IMU may be changed at any
+    time.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -170,9 +167,8 @@ class ServerState:
     def sample_reference(self, *, first: bool) -> None:
         """Record the time of a sample of RM.
 
-        With the quirk ``heading_starts_off``, the first sample of RM changes the heading. The
-        change is half the turn rate times the time since the last sample of the previous RM. This
-        time is huge if the clock was set back between the two samples.
+        With ``heading_starts_off``, the first sample changes the heading: hugely if the clock was
+        set back.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s

@@ -2,9 +2,8 @@
 
 """Codec of the datagrams as the server reads and writes them. Its only source is the manual.
 
-A request is one line of text without a terminator. Numbers are parsed as C's ``atoi`` parses them.
-
-This module does not know the meaning of a command.
+A request is a line without a terminator, with numbers as in C's ``atoi``. This module does not know
+the meaning of a command.
 """
 
 import re
