@@ -2,8 +2,8 @@
 
 """Simulated motor boards for tests of the driver, each written from the manual of the real board.
 
-The simulator shares no code with the driver, so that tests can reveal a misread manual. The names
-of ``simulator.omnibot`` can be imported from here until the next release.
+The simulator shares no code with the driver: tests reveal a misread manual. The next release
+removes ``simulator.omnibot``'s names here.
 """
 
 import warnings

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the two motors while the robot drives, and the learning from its results.
+"""The adjustment of the motors during a drive, and the learning from its results.
 
 This module knows the present motion and its measured speed; it does not know how a motion begins or
 ends. The caller passes the time.
@@ -17,11 +17,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A small turn that tests the IMU: a dead IMU and a straight drive both give a constant heading.
+"""A small turn that shows whether a constant heading means a dead IMU or a straight drive.
 
-``WAG_S``: time in s of constant heading before the turn.
-
-``WAG_UNITS``: added to the left motor, subtracted from the right motor.
+``WAG_S``: time in s of constant heading. ``WAG_UNITS``: added left, subtracted right.
 """
 
 STARTED_M: Final = 0.01
@@ -69,9 +67,9 @@ class Adjusting(Moves):
         self._predict_turn()
 
     def _predict_turn(self) -> None:
-        """Pass the expected ratio of left to right wheel speed to the odometry.
+        """Pass the expected ratio of wheel speeds (left / right) to the odometry.
 
-        The odometry computes the turn from this ratio if the server does not report the heading.
+        The ratio gives the turn if the server does not report the heading.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
@@ -85,10 +83,7 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty to the pose, because the left wheel may have turned for ``seconds``.
-
-        The encoder is on the right wheel, so it does not show a turning left wheel.
-        """
+        """Add uncertainty: the left wheel has no encoder and may have turned for ``seconds``."""
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
         turn_rad = min(math.pi, most_m / self._settings.track_m)
@@ -97,8 +92,7 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Record that the present motor units are too small to turn the motors.
 
-        If the robot has already moved in this motion, something blocks it now, so nothing is
-        learned.
+        Ignored if the robot has moved in this motion: something blocks it.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.turn.spun_rad) * self._settings.track_m / 2

@@ -2,10 +2,8 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-A later SM or SRM may hang the server permanently; docs/boards/mart.md explains why.
-
-This module knows commands and replies; it does not know why the stop port was used. The caller
-passes the time.
+SM or SRM may then hang the server (docs/boards/mart.md). This module knows commands and replies; it
+does not know why the stop port was used. The caller passes the time.
 """
 
 import math
@@ -24,7 +22,7 @@ from omnibot_driver.core.packets import Packets
 STOP_AGAIN_S: Final = 3.0
 """Interval in s at which SL and SS are repeated while the server is silent.
 
-During a controlled move the server is silent until SL or SS ends the move.
+In a controlled move it is silent until SL or SS.
 """
 APART_S: Final = 0.4
 """Least time in s between two encoder counts that are compared to see whether the robot moves."""

@@ -124,8 +124,7 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that a datagram from this channel brings.
 
-        If a reply brings no reading, and the last reading is older than UNREAD_S, the result is
-        NOTHING_MEASURED.
+        The result is at least NOTHING_MEASURED after UNREAD_S without a reading.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -199,8 +198,7 @@ class MartBoard(Board):
     def wake(self) -> Packets:
         """Return the commands that stop the robot at the beginning of a connection.
 
-        The pilot repeats these commands until the server answers. Only then does the pilot send
-        other requests.
+        The pilot repeats them until the server answers, before other requests.
         """
         return self.stop()
 

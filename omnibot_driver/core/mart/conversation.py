@@ -2,8 +2,8 @@
 
 """The exchange with the server: send one request, and find the reply to it.
 
-Replies carry no sequence number; their form, failure text and time show the request. This module
-knows requests and replies; it does not know what the requests are for. The caller passes the time.
+Replies carry no number, so their form and time are checked. This module knows requests and replies;
+it does not know what the requests are for. The caller passes the time.
 """
 
 import math
@@ -36,11 +36,9 @@ LOSS, LOSS_S = 1.5, 0.02
 The reply may only be late, so the next query waits longer.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""Times in s that decide whether the network is disturbed: a reply may answer an earlier query.
+"""Times in s. While the network is disturbed, a reply may answer an earlier query.
 
-``SLOW_S``: an exchange that takes longer is a sign of a disturbance.
-
-``DISTURBED_S``: duration of a disturbance after its last sign.
+``SLOW_S``: a longer exchange is a disturbance. ``DISTURBED_S``: duration after its last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
@@ -94,11 +92,9 @@ class Conversation:
 
     ``delay_s``: longest time that a datagram may be on its way, in s.
 
-    ``discarded``: number of late, duplicate or foreign replies.
-
     ``trip_s``: average duration of a query, in s; each unanswered query increases it.
 
-    ``answered_trip_s``: the same for answered queries alone.
+    ``answered_trip_s``: average duration of answered queries.
 
     ``missed_s``: time at which a reply was last overdue.
     """
@@ -131,9 +127,9 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record that ``reply`` is a late reply; no other late reply of its form is expected then.
+        """Record that ``reply`` was late. No other late reply of its form is expected then.
 
-        Do nothing if ``reply`` is a copy of an earlier reply.
+        Ignored if ``reply`` is a copy.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)
@@ -184,8 +180,7 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The missing reply may still come, so it is recorded. Exception: ``Stopping`` waits for a
-        controlled move's reply.
+        The missing reply is recorded, except a controlled move's: ``Stopping`` waits for that.
         """
         if self.pending is None:
             return None
@@ -208,7 +203,7 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        Do not pass replies to HELLO: HELLO may be sent during another request.
+        Not for replies to HELLO: it may be sent during another request.
         """
         pending = self.pending
         if isinstance(reply, Ok):
@@ -240,9 +235,9 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether the reply is a duplicate of the reply to another query.
+        """Return whether the reply copies another query's reply.
 
-        Another query has just had this reply, and the previous reply to ``word`` was different.
+        Another query has just had this reply, and ``word`` last had a different one.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA
@@ -254,9 +249,8 @@ class Conversation:
     ) -> bool:
         """Return whether an identical reply came within the last ``delay_s``.
 
-        ``but``: replies to this command are ignored.
-
-        ``kind``: if given, only replies to commands of this kind are compared.
+        ``but``: this command's replies are ignored. ``kind``: only this kind's replies are
+        compared.
         """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and kind in (None, word.kind)
@@ -272,7 +266,7 @@ class Conversation:
     def _patience_s(self, word: Word) -> float:
         """Return how long the driver waits for the reply to ``word``, in s.
 
-        The time is short for queries and changes, so that a moving robot is soon measured again.
+        It is short for queries and changes: a moving robot must be measured.
         """
         longest_s = 2 * self.delay_s
         if word.kind in (Kind.QUERY, Kind.CHANGE):

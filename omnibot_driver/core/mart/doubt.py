@@ -18,9 +18,9 @@ WAY_STDDEV: Final = 0.004
 The standard deviation grows with the square root of the distance.
 """
 GYRO_WALK: Final = 0.002
-"""Standard deviation in rad of the heading after 1 s of motion, because motion shakes the gyro.
+"""Standard deviation in rad of the heading after 1 s of motion, which shakes the gyro.
 
-The standard deviation grows with the square root of the time (random walk).
+It grows with the square root of the time (random walk).
 """
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
@@ -32,7 +32,7 @@ END_M, END_RAD = 0.004, math.radians(0.4)
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of the angle that the server reports for a turn on the spot.
 
-``TOLD_TURN_RAD``: in rad; the server reports whole degrees. ``TOLD_TURN``: fraction of the angle.
+``TOLD_TURN_RAD``: in rad, as it reports whole degrees. ``TOLD_TURN``: as a fraction.
 """
 PIVOT: Final = 0.01
 """Distance from the robot's centre to the point about which it turns on the spot.
@@ -87,10 +87,9 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the left-to-right speed ratio; 0 for a measured turn.
+        ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn.
 
-        ``aside_m``: standard deviation across the motion, in m, from a heading measured at another
-        time.
+        ``aside_m``: standard deviation across the motion, in m.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -156,18 +155,17 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the heading error of the turn that has ended, because its angle is known now.
+        """Replace the heading error of a turn that has ended, because its angle is known now.
 
-        Call this before the position changes. ``spun_rad``: the wheel's turn; ``told_rad``: the
-        gyro's.
+        Call this before the position changes. ``spun_rad``: by the wheel; ``told_rad``: by the
+        gyro.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
-        """Return the errors of a turn on the spot so far.
+        """Return the errors of a turn on the spot so far, including a small sideways motion.
 
-        ``spun_rad``: the turn that the wheel has measured; ``told_rad``: by the server, or None.
-        Unequal motors add a small sideways motion.
+        ``spun_rad``: the turn by the wheel. ``told_rad``: the turn by the server, or None.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))

@@ -2,8 +2,8 @@
 
 """The plan of moves to a goal pose: turn towards it, drive straight, turn to its heading.
 
-Moves are inexact, so each is planned anew. This module knows poses and the commands for moves; it
-does not know when they are sent.
+Moves are inexact: each is planned anew. This module knows poses and commands for moves; it does not
+know when they are sent.
 """
 
 import math
@@ -41,7 +41,7 @@ WORTH_DEG: Final = 1.0
 WIDER: Final = 0.5
 """Each turn since the last straight move adds WIDER * NEAR_RAD to the allowed heading error.
 
-Turns overshoot, so a larger error is allowed after each of them.
+Turns overshoot.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. After them, the driver gives the goal up."""
@@ -84,10 +84,9 @@ class Done:
         return number * INCH_M if self.is_straight else math.radians(number)
 
     def may_have_run_twice(self, delay_s: float) -> bool:
-        """Return whether the server may have run the move twice.
+        """Return whether the server may have run the move twice, from a duplicated datagram.
 
-        This happens if the network duplicates the move's datagram. The encoder count then covers
-        only the second run.
+        The encoder count then covers only the second run.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         number = float(self.request.data.split()[-1])
@@ -121,9 +120,9 @@ class Surplus:
         self._degrees[slow] = min(MOST_SURPLUS_DEG, max(0.0, before + (beyond - before) / 2))
 
     def degrees(self, wanted: float, *, slow: bool) -> int:
-        """Return the number of degrees to request for a turn by ``wanted`` degrees.
+        """Return the degrees to request for a turn by ``wanted`` degrees.
 
-        The result is 0 if the turn would not reduce the heading error by at least WORTH_DEG.
+        0 if the turn would reduce the heading error by less than WORTH_DEG.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
@@ -148,8 +147,6 @@ class Move:
     ``turns``: number of turns since the last straight move.
 
     ``given_up``: no further move is sent: arrived, failed, or MOST_MOVES sent.
-
-    ``failed``: whether a move has failed.
     """
 
     place: Pose
@@ -165,8 +162,7 @@ class Move:
     def repeated(self) -> "Move":
         """Return the progress to continue with when ``place`` is commanded again.
 
-        A goal in progress continues, and a failed goal begins anew. A finished goal needs moves
-        only beyond ENOUGH_M.
+        A failed goal begins anew. A finished goal needs moves only beyond ENOUGH_M.
         """
         if not self.given_up:
             return self

@@ -41,7 +41,7 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 STARTS_UP_S: Final = 1.5
 """Time in s from a server's first reply after an absence until the driver starts a motion.
 
-Earlier, VOLTS and most motions crash a new server. A crash by RM leaves the motors on.
+Earlier, VOLTS and most motions crash a new server; RM leaves the motors on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Silence after which the server is regarded as absent.
@@ -61,7 +61,7 @@ Only a restarted server answers HELLO during the move.
 ESTOP_REPEAT_S: Final = 0.1
 """Interval in s at which the driver sends stops while the e-stop is latched.
 
-A server whose robot is at rest answers each stop with ``fail`` and does nothing.
+At rest, the server answers ``fail`` and does nothing.
 """
 
 
@@ -70,9 +70,7 @@ class Ground:
 
     ``readings``: readings that the caller has not taken yet.
 
-    ``heard_s``: time of the server's last reply.
-
-    ``appeared_s``: time of the server's first reply after an absence.
+    ``heard_s``: time of the last reply. ``appeared_s``: time of the first reply after an absence.
 
     ``greeted``: whether the first stop of this connection was answered.
 

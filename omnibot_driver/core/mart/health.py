@@ -67,8 +67,6 @@ class Health:
     ``reference_fails``: number of bare ``fail`` replies to RM in a row.
 
     ``outlived``: a stop was answered only after the stop port. The next stop can fail.
-
-    ``status``: the bits of the last accepted MCSTAT.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -141,8 +139,7 @@ class Health:
     def _status(self, bits: int) -> None:
         """Record the status of the motor board.
 
-        A status other than 0 must come twice in a row, because a late reply to ENC can look like a
-        status.
+        A status other than 0 must come twice: a late encoder count looks alike.
         """
         if not 0 <= bits <= NO_READ:
             return

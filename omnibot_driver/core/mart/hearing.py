@@ -64,7 +64,7 @@ class Hearing(Measuring):
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
 
-        For example, ``ok`` may answer the start or the IMU check, and a number may be the count.
+        For example, ``ok`` to the start or the IMU check, or an encoder count.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -95,8 +95,7 @@ class Hearing(Measuring):
     def _is_behind_copies(self, now: float) -> bool:
         """Return whether this answer to HELLO shows that no duplicate of the last move runs.
 
-        The server works in turn. A duplicate arrives within ``network_delay``; this HELLO came
-        later.
+        The server works in turn: a duplicate would run before this HELLO.
         """
         since_start = now >= self._started_s + 2 * self._delay_s
         return since_start and self._rested_s >= self._started_s + self._delay_s
@@ -104,7 +103,7 @@ class Hearing(Measuring):
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion, because the server gives its name although a move should keep it busy.
 
-        The move's reply was lost, or the server was restarted with turning motors.
+        The move's reply was lost, or the server was restarted.
         """
         self._appears(now)
         self._moved_by = None

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The check that the IMU works (RST IMU, or MCR SLOW 0), and the results of the last checks.
+"""The check that the IMU works (RST IMU, or MCR SLOW 0), and its last results.
 
-A failed RST IMU closes the IMU, so the driver repeats it. This module knows replies and times; it
-does not know which motion is started. The caller passes the time.
+A failed RST IMU closes the IMU. This module knows replies and times; it does not know which motion
+is started. The caller passes the time.
 """
 
 import math
@@ -38,8 +38,6 @@ class ImuProof:
     ``word``: the command that checks the IMU of this server.
 
     ``dead``: whether the last checks found no working IMU.
-
-    ``again_s``: earliest time of the next check.
     """
 
     def __init__(self) -> None:
@@ -74,11 +72,9 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check.
+        """Evaluate the reply to a check; return False if it failed for another reason than the IMU.
 
-        ``took_s``: time from the check to the reply, in s.
-
-        Return False if the check failed, but not because of the IMU.
+        ``took_s``: time from the check to the reply.
         """
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0

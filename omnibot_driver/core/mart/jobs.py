@@ -2,8 +2,8 @@
 
 """Jobs: requests to the controller besides motion, one at a time.
 
-A file arrives as name and size, then in unnumbered pieces of 512 bytes. This module knows commands
-and replies; it does not know when the command port is free. The caller passes the time.
+A file arrives in unnumbered pieces of 512 bytes. This module knows commands and replies; it does
+not know when the command port is free. The caller passes the time.
 """
 
 import math
@@ -72,8 +72,6 @@ class Jobs:
     ``done``: results that the caller has not taken yet.
 
     ``logging``: whether LOG was answered with ``ok`` in this connection.
-
-    ``log_may_be_lost``: whether the server may have been restarted since.
 
     ``ended``: whether EXIT was sent, which ends the server.
 

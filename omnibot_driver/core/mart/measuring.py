@@ -22,9 +22,7 @@ STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 """Times in s for which a robot may coast after the end of a motion.
 
-``ROLLS_S``: after a stop.
-
-``ROLLS_AFTER_MOVE_S``: after a controlled move, whose failure is reported before rest.
+``ROLLS_S``: after a stop. ``ROLLS_AFTER_MOVE_S``: after a move, as failures are reported early.
 """
 
 
@@ -62,8 +60,8 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the present heading shows a restart: exactly zero, as before the first RM.
 
-        The heading is also zero when RM begins and when its sign changes. So ``before_rad`` must
-        not be near zero. If it is None, the server must have been absent since the last start.
+        The heading is also zero when RM begins or its sign changes: ``before_rad`` is then near
+        zero.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False

@@ -20,7 +20,7 @@ class Moment:
 
     ``from_s``, ``until_s``: the earliest and the latest possible time.
 
-    ``doubtful``: whether the reply may answer an earlier query.
+    ``doubtful``: the reply may answer an earlier query.
     """
 
     at_s: float

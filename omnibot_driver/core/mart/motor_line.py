@@ -2,8 +2,8 @@
 
 """A line, learned by the driver, that gives the speed of a motor for its command units.
 
-Without a regulator, a motor needs some units before it turns. Speeds are in nominal units: an ideal
-motor has speed 10 at 10 units. This module knows units; it does not know wheels or time.
+Nominal units are those of an ideal motor, e.g. speed 10 at 10 units. This module knows units; it
+does not know wheels or time.
 """
 
 import math

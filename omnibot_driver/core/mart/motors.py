@@ -92,10 +92,9 @@ class Motors:
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
-        """Return the ratio of the left motor's speed to the right motor's, both with ``units``.
+        """Return the ratio of both motors' speeds (left / right), each with ``units``.
 
-        A lost or duplicated change can spoil the lines: ``motor_balance`` ± MOST_UNEQUAL limits the
-        ratio.
+        It is ``motor_balance`` ± MOST_UNEQUAL at most: lost changes can spoil the lines.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))

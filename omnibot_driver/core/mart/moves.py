@@ -77,7 +77,7 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn by how much a move that has ended goes beyond its target.
 
-        A turn's record is downloaded first, except on a disturbed network: the wheel is not exact.
+        On a good network, a turn's record is downloaded first: it is more exact.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -110,7 +110,7 @@ class Moves(Asking):
     def _doubt_a_copy(self, now: float) -> None:
         """Add uncertainty if the server may have run the last controlled move twice.
 
-        A second run resets the encoder count, so the count then covers only the second run.
+        The encoder count then covers only the second run.
         """
         move, self._last_move = self._last_move, None
         if move is None or not self.conversation.disturbed(now):

@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The choice of the next request to the server.
+"""The choice of the next request to the server: first a stop, then the command, then a query.
 
-The order is: stop a motion that must not continue, carry out the command, send a query. This module
-knows states, commands and measurements; it does not know where the commands come from. The caller
-passes the time.
+This module knows states, commands and measurements; it does not know where the commands come from.
+The caller passes the time.
 """
 
 import math
@@ -48,7 +47,7 @@ SILENT_S, GREET_AGAIN_S = 0.15, 0.1
 ``SILENT_S``: from the last reply, plus two exchanges. ``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
-"""Time in s after a move within which the server must answer ENC, the encoder query.
+"""Time in s after a move within which the server must answer ENC.
 
 If it does not, a duplicate of the move may be running.
 """
@@ -197,9 +196,9 @@ class Pilot(Hearing):
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time at which to stop a suspected duplicate of a move; infinite if none is suspected.
+        """The time at which to stop a suspected duplicate of a move, or infinity.
 
-        SL and SS stop it. They are safe only after a controlled move: they would hang RM and B.
+        The stop is SL and SS. After RM or B, they would hang the server.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
         if self.state is not State.STILL or not suspected or self._port_is_free:
@@ -213,7 +212,7 @@ class Pilot(Hearing):
     def _may_ask_volts(self, now: float) -> bool:
         """Return whether VOLTS may be sent now: it crashes a server that is starting up.
 
-        An unanswered request may be the only sign of a restart shorter than ABSENT_S.
+        An unanswered request may be the only sign of a short restart.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

@@ -2,8 +2,8 @@
 
 """The times at which queries are due, in each state of the robot's motion.
 
-A query of a sonar takes 55 ms, so it waits for rest. This module knows queries and states; it does
-not know the replies. The caller passes the time.
+A sonar query takes 55 ms, so it waits for rest. This module knows queries and states; it does not
+know the replies. The caller passes the time.
 """
 
 import math
@@ -36,9 +36,9 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 In the other states the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between a query of one and a query of the other.
+"""The two sonars, and the least time in s between queries of both.
 
-Both report the same if nothing is near, so a late copy could be mistaken.
+If nothing is near, both report the same: a late copy could be mistaken.
 """
 
 

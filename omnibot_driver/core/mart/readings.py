@@ -39,7 +39,7 @@ class JobDone:
 
     ``token``: the object by which the caller recognizes the job.
 
-    ``name``, ``content``: of the file; empty without a file.
+    ``name``, ``content``: empty without a file.
     """
 
     token: object

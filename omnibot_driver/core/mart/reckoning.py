@@ -2,9 +2,8 @@
 
 """Dead reckoning: the robot's pose at the last encoder count.
 
-The right wheel and the relative heading give the pose. On the spot, the wheel measures the turn
-until SM reports it. This module knows counts, degrees and metres; it does not know commands. The
-caller passes the time.
+On the spot, the wheel measures the turn until SM reports it. This module knows counts, degrees and
+metres; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -25,7 +24,7 @@ from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 BEGIN_RADPS: Final = 0.03
 """Standard deviation in rad/s of the turn rate in RM before the server reports a heading.
 
-The robot may turn, because the two motors have different speeds at equal units.
+The cause: unequal motors.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
@@ -50,8 +49,6 @@ class Reckoning:
     ``stands``: whether the robot was stopped; it may still coast.
 
     ``slowing_since_s``: time of this motion's first stop command, or None.
-
-    ``moved_m``: distance since this motion began.
 
     ``turn``: angle of the present or last turn on the spot.
 
@@ -166,9 +163,7 @@ class Reckoning:
     def guess_changed(self, part: float, late_s: float) -> None:
         """Add the heading error of a change of the wheel speed ratio at an uncertain time.
 
-        ``part``: relative change of the ratio.
-
-        ``late_s``: length in s of the interval in which the change takes effect.
+        ``part``: relative change. ``late_s``: interval in s of the change.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -176,8 +171,7 @@ class Reckoning:
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
         """Process a count of the right wheel; return the displacement since the last count.
 
-        Return None for an implausible or too old count, NOTHING_MEASURED for an unknown
-        displacement.
+        None: implausible or too old. NOTHING_MEASURED: unknown displacement.
         """
         if when.from_s < self._began_s:
             return None
@@ -209,7 +203,7 @@ class Reckoning:
     def maybe(self) -> tuple[float, float]:
         """Distance of the right wheel in m, and turn in rad, that the pose may lack.
 
-        Not zero if the counts do not show whether the last motion has begun.
+        Zero if the counts show whether the last motion has begun.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -241,9 +235,9 @@ class Reckoning:
         return self.turn.add(turn_rad)
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct a heading that was computed from commands, once the server reports the turn.
+        """Correct a heading computed from commands, once the server reports the turn.
 
-        Return the correction in rad. The correction is not a motion of the robot.
+        Return the correction in rad; it is not a motion.
         """
         if not self._guessed:
             return 0.0
@@ -307,7 +301,7 @@ class Reckoning:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return how much older than FRESH_S the last heading is, in s, and the error that results.
+        """Return how much older than FRESH_S the last heading is, in s, and the resulting error.
 
         The error: standard deviation of the turn, in rad. Both are 0 except in RM.
         """

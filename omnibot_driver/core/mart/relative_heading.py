@@ -2,8 +2,8 @@
 
 """The turn of the robot within a motion, from the relative heading that the server reports.
 
-RM resets this heading; some servers update it only in RM. This module knows rad and times; it does
-not know commands. The caller passes the time.
+Some servers update it only in RM. This module knows rad and times; it does not know commands. The
+caller passes the time.
 """
 
 import math
@@ -17,7 +17,7 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""If the first heading after an RM command differs by less than this (rad), it may be the old one.
+"""If the first heading after RM differs by less than this (rad), it may be the old one.
 
 The server resets the heading only when RM begins.
 """
@@ -27,10 +27,7 @@ MOST_RAD: Final = 1e7
 The server integrates the turn rate over unsigned milliseconds.
 """
 AHEAD_S: Final = 0.3
-"""Longest time in s by which a heading is predicted beyond the time of its report.
-
-The prediction gives the heading at the time of an encoder count.
-"""
+"""Longest time in s by which a heading is predicted beyond its report, to an encoder count."""
 ODD_TIMES: Final = 3
 """After this number of implausible headings in a row, the last of them is accepted."""
 SPREADS: Final = 4

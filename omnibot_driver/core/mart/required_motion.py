@@ -18,9 +18,9 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""A turn on the spot begins only when its yaw rate is this near to the final value.
+"""A turn on the spot begins only when its ramped yaw rate is this near to the final value.
 
-It is a fraction of the final value, because an acceleration limit ramps the yaw rate.
+A fraction of the final value.
 """
 
 

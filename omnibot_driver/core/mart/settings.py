@@ -10,9 +10,7 @@ from typing import Literal
 class MartSettings:
     """The settings of one robot with a MART controller.
 
-    ``track_m``: distance between the two wheels, in m.
-
-    ``metres_per_count``: m that the right wheel rolls; negative if forward counts down.
+    ``metres_per_count``: distance per count of the right wheel; negative if forward counts down.
 
     ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at ``nominal_volts``.
 
@@ -20,16 +18,16 @@ class MartSettings:
 
     ``heading_sign``: 1 if the server's relative angle increases to the left, else -1.
 
-    ``network_delay_s``: longest time of a datagram on its way, in s.
+    ``network_delay_s``: longest time of a datagram on its way.
 
     ``spin_speed``: of R and L: "custom" (the commanded speed, by SSP) or "fixed" (SLOW).
 
-    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for motions to a goal; if the normal motion
-    exceeds them, SLOW is used.
+    ``max_speed_mps``, ``max_yaw_rate_radps``: limits for moves to a goal; SLOW is used if normal
+    moves exceed them.
 
     ``wheel_scale``: standard deviation of the wheel's size, as a fraction.
 
-    ``gyro_drift_radps``: standard deviation of the gyro's drift, in rad/s.
+    ``gyro_drift_radps``: standard deviation of the gyro's drift.
     """
 
     wheel_radius_m: float = 0.0625

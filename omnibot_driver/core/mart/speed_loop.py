@@ -2,8 +2,8 @@
 
 """The control of both motors: which command units give the wanted speed and turn rate.
 
-The server has no speed control. The integral of the turn rate's error holds the heading. This
-module knows units, m/s and rad; it does not know commands. The caller passes the time.
+The integral of the turn rate's error holds the heading. This module knows units, m/s and rad; it
+does not know commands. The caller passes the time.
 """
 
 import math
@@ -33,9 +33,8 @@ LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """Effect of slow exchanges with the server on learning.
 
-``LEARN_TRIPS``: exchange durations that are added to the averaging window.
-
-``LESS_PER_S``: a speed's standard deviation is multiplied by 1 + LESS_PER_S * duration (s).
+``LEARN_TRIPS``: exchanges added to the averaging window. ``LESS_PER_S``: standard deviation * (1 +
+LESS_PER_S * duration in s).
 """
 SLOWEST_MPS: Final = 0.015
 """A wheel whose measured speed in m/s is above this is regarded as turning."""
@@ -51,13 +50,11 @@ NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Growth of the wheel speed ratio's variance per ``part`` squared, by an uncertain change.
 
-``COPIED``: if the change may arrive twice.
+``COPIED``: if the change may arrive twice, as exchanges take longer than ``SLOW_TRIP_S`` (s).
 
 ``MISSED``: if the change was not answered.
 
-``SLOW_TRIP_S``: a change may arrive twice if exchanges take longer, in s.
-
-The factors are large: a wrong ratio lasts for the whole motion.
+Both are large: a wrong ratio lasts for the whole motion.
 """
 
 
@@ -65,13 +62,9 @@ The factors are large: a wrong ratio lasts for the whole motion.
 class _Side:
     """One motor, and the wheel that it turns.
 
-    ``line``: the learned speed for each number of units.
-
     ``stood_s``: time in s without motion, although the units suffice.
 
-    ``window_units_s``: sum of units times seconds in the present averaging window.
-
-    ``window_m``: distance in m in this window.
+    ``window_units_s``, ``window_m``: sum of units * seconds, and distance, in the averaging window.
     """
 
     line: MotorLine
@@ -88,7 +81,7 @@ class _Side:
 class SpeedLoop(Motors):
     """The controller of both motors' speeds in one motion.
 
-    ``trip_s``: average duration of an exchange, in s: the uncertainty of measurement times.
+    ``trip_s``: average duration of an exchange, in s.
 
     ``part``: size of the last change, e.g. 0.2 + 0.3 for 2 and 3 of 10 units.
     """
@@ -113,10 +106,7 @@ class SpeedLoop(Motors):
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
-        """Return the units with which both sides start a motion of this speed and turn rate.
-
-        Both sides get the same number, which is what the slower side needs.
-        """
+        """Return the units with which both sides start a motion: those of the slower side."""
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
         units = min(60, self._right.wanted_units(slower_mps / self.per_unit_mps))
@@ -129,8 +119,7 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        From MOST_DEAD units on, the motor is blocked: nothing is learned. Below, the next start
-        uses more.
+        From MOST_DEAD units on, a motor is blocked: nothing is learned.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -229,8 +218,7 @@ class SpeedLoop(Motors):
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
         """Return the changes of the right and the left motor's units, or None if both are zero.
 
-        Positive: faster in the direction of motion. ``speed_mps``: not negative. ``rate_radps``:
-            positive to the left.
+        Positive is faster. ``speed_mps`` is not negative; ``rate_radps`` is positive to the left.
         """
         if abs(rate_radps - self._rate_radps) > NEW_RADPS:
             self._rate_changed_s, self._error_rad = now, 0.0

@@ -2,8 +2,8 @@
 
 """Turns on the spot: how the driver sets their speed, and what it learns from them.
 
-Another rate needs another turn. This module knows rates and motor units; it does not know when a
-turn begins or ends. The caller passes the time.
+This module knows rates and motor units; it does not know when a turn begins or ends. The caller
+passes the time.
 """
 
 import math
@@ -20,25 +20,23 @@ from omnibot_driver.core.mart.words import Form, Request
 RATIO: Final = 0.35
 """Relative change of the commanded rate above which the driver begins a new turn."""
 OFF, OFF_AGAIN = 0.05, 0.12
-"""Relative error of a turn's rate above which the driver begins the turn anew, with other units.
+"""Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: until a turn has shown the motors' speed.
-
-``OFF_AGAIN``: after that. A new start would disturb the motion more than a small error.
+``OFF``: until the motors' speed is known. ``OFF_AGAIN``: after that, as a new start disturbs more.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for turns that something slows down, as fractions of the commanded rate.
 
-``HELD``: once the motors are known, a lower rate is not learned.
+``HELD``: a lower rate is not learned, once the motors are known.
 
-``LEAST_LESSON``: before, a lower rate is learned as this one.
+``LEAST_LESSON``: before that, this rate is learned instead.
 """
 EVEN: Final = 0.15
 """Relative change of a turn's rate below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Rates of two turns which show that something held the robot in the first turn.
+"""Two turns' rates, as fractions of the commanded rate, if something held the robot at first.
 
-As fractions of the commanded rate: the first is below HINDERED, the next above TOO_FAST.
+The first is below HINDERED, the next above TOO_FAST.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
@@ -50,11 +48,8 @@ STEADY: Final = 0.03
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-``SPINS_UP_S``: least time in s, plus the averaging time of speeds.
-
-``SEEN_RAD``: least angle.
-
-``TOLD_RAD``: beyond it, the server's whole degrees are more precise than the wheel.
+``SPINS_UP_S``: least time in s, plus the averaging time. ``SEEN_RAD``: least angle. ``TOLD_RAD``:
+above it, the server's angle is used.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
@@ -111,9 +106,8 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
 
-        SSP must be sent before the check of the IMU.
-
-        ``delay_s``: longest delay of a datagram, in s. A new SSP waits for copies of the older one.
+        SSP must be sent before the check of the IMU. ``delay_s``: time for copies of the older SSP,
+        in s.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -204,9 +198,7 @@ class SpotTurns:
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle.
 
-        ``unseen_s``: time from the last count to the stop, in s.
-
-        ``trip_s``: average duration of a query, in s.
+        ``unseen_s``: time from the last count to the stop. ``trip_s``: duration of a query.
         """
         if not isinstance(reply, Ok) or reply.form is not Form.INTEGER:
             return False
@@ -222,9 +214,8 @@ class SpotTurns:
     ) -> None:
         """Evaluate the angle in the reply to the stop of a turn.
 
-        ``uncounted_s``: time from the last count to the stop. ``turned_s``: duration of the turn.
-
-        ``disturbed``: the reply to SSP may be another command's; nothing is learned.
+        ``uncounted_s``: time from the last count to the stop. ``disturbed``: the reply to SSP is
+        uncertain, so nothing is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
@@ -248,7 +239,7 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Forget what was learned from a slow turn, if the next turn shows that it was hindered.
 
-        ``part``: the next turn's rate / commanded rate. Both turns would teach a false dead zone.
+        ``part``: the next turn's rate / commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
             self._loop.restore(self._before_slow)

@@ -41,7 +41,7 @@ AGAIN_S: Final = 1.0
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 """Longest duration of a controlled move: 3 s, plus these s for each inch or degree."""
 REFERENCE_FAILS: Final = 2
-"""Number of bare ``fail`` replies to RM in a row after which the driver does not try RM again.
+"""After this number of bare ``fail`` replies to RM in a row, the driver stops trying.
 
 A single one is normal after a long stop.
 """
@@ -213,8 +213,7 @@ class Starts(Adjusting):
     def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
         """Stop the robot after a failed start, because it may move nevertheless.
 
-        ``arrived``: whether the reply certainly belongs to this start, and a copy of the start is
-        unlikely.
+        ``arrived``: the reply certainly belongs to this start, and a copy is unlikely.
         """
         word = self._start
         assert word is not None
@@ -247,8 +246,7 @@ class Starts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure text of RM may be about another motion, e.g. the last B.
 
-        Only an obstacle is believed: if the front sonar sees it too, or at the second report in a
-        row.
+        An obstacle is believed if the front sonar sees it, or RM repeats it.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -146,14 +146,14 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server starts the motors and never answers, or waits for the IMU. MCR and MCL
-notice it, on some servers after a turn of 0.5 s.
+With a dead IMU, the server drives and never answers, or waits. MCR and MCL notice it, on some
+servers after a turn of 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
 """Commands whose duplicate does harm if it arrives after another motion has begun.
 
-The driver waits for possible duplicates before the next start and its check of the IMU.
+The driver waits for duplicates before the next start's IMU check.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

@@ -2,8 +2,8 @@
 
 """The stop of one motion: the commands to send until the server has acknowledged the stop.
 
-A reply counts only if it certainly answers a stop that was not overtaken by the start. This module
-knows commands, replies and times; it does not know why the robot is stopped.
+A stop may overtake the start. This module knows commands, replies and times; it does not know why
+the robot is stopped.
 """
 
 import math
@@ -25,9 +25,9 @@ ANSWERS: Final = {
 }
 """For each motion, the forms of an ``ok`` reply that reports the end of the motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s from the first stop of a controlled move until the driver asks for the server's name.
+"""Time in s from the first stop of a controlled move until the driver asks for the name.
 
-By then, the move is expected to have ended.
+The move has then usually ended.
 """
 
 
@@ -35,8 +35,6 @@ class Stopping:
     """The stop of one motion.
 
     ``began_s``: time of the first stop command.
-
-    ``started_s``: time at which the start of the motion was sent.
 
     ``owed``: number of missing replies that look like a reply to the stop.
 
@@ -141,7 +139,7 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The last doubtful reply, if it is probably the reply to the stop; else None.
 
-        Probable if more replies came than were missing. Certain only on a good network.
+        It is, on a good network, if more replies came than were missing.
         """
         return self._doubtful[-1] if len(self._doubtful) > self._owed else None
 

@@ -29,9 +29,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 BLIND_S, TRIPS = 0.8, 3
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
 FROZEN_S: Final = 0.5
-"""If the heading is constant for this time in s plus two exchange durations, the robot is stopped.
+"""The robot is stopped if the heading is constant for this time in s plus two exchanges.
 
-The IMU is then dead, or the robot is stuck.
+The IMU is dead, or the robot is stuck.
 """
 NO_START_S: Final = 1.5
 """Time in s after a start within which the robot must begin to move."""
@@ -88,7 +88,7 @@ class Stops(Ground, ABC):
     def _why_stop(self, now: float) -> str:
         """Return why the present motion must not continue, as a sentence for the user.
 
-        The result is "wanted" if another motion is wanted, and empty if the motion may continue.
+        "wanted": another motion is wanted. Empty: the motion may continue.
         """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""
@@ -132,10 +132,9 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: reported to the user. It discards the command, unless ``_block`` refuses the
-        direction.
+        ``why``: for the user. It discards the command, unless the direction is already refused.
 
-        ``arrived``: whether the start has certainly arrived, so a stop cannot overtake it.
+        ``arrived``: the start has certainly arrived.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)
@@ -249,7 +248,7 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply) -> None:
         """Record that the server answers a stop only after the driver has used the stop port.
 
-        Its stop port may still wait for an end. It would hang the next RM; see docs/boards/mart.md.
+        Its stop port could hang the next RM; see docs/boards/mart.md.
         """
         ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
         if ends and self.motion is not Motion.SPIN:

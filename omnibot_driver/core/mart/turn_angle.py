@@ -2,16 +2,16 @@
 
 """The angle of a turn on the spot: as the wheel measures it, and as the server reports it.
 
-The server's angles (the reply to SM, the record of MCR or MCL) come from the gyro and are
-preferred. This module knows angles in rad; it does not know the pose.
+The server's angle comes from the gyro and is preferred. This module knows angles in rad; it does
+not know the pose.
 """
 
 from typing import Final
 
 TOLD_RAD, TOLD_PART = 0.05, 0.3
-"""Largest accepted difference between a reported turn and the turn measured at the wheel.
+"""Largest accepted difference of a reported turn from the wheel's turn.
 
-TOLD_RAD (rad) + TOLD_PART * the wheel's turn; beyond it, another query was answered.
+TOLD_RAD (rad) + TOLD_PART * the wheel's turn.
 """
 NO_CORRECTION: Final = 0.0
 
@@ -19,11 +19,9 @@ NO_CORRECTION: Final = 0.0
 class TurnAngle:
     """The angle of the present turn on the spot, or of the last one.
 
-    A returned correction is the change in rad of the pose's heading.
+    A returned correction changes the pose's heading, in rad.
 
     ``spun_rad``: the wheel's turn; after ``record`` the recorded turn.
-
-    ``told_rad``: the turn in the server's reply to the stop.
     """
 
     def __init__(self) -> None:
@@ -42,7 +40,7 @@ class TurnAngle:
     def add(self, turn_rad: float) -> float:
         """Add a turn measured at the wheel; return the part of it that the pose lacks.
 
-        The pose lacks no part if the server has already reported the whole turn.
+        That is nothing if the server has already reported the turn.
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0
@@ -70,7 +68,7 @@ class TurnAngle:
     def record(self, told_rad: float) -> float | None:
         """Process the recorded angle of a turn that has ended; return the correction.
 
-        Return None if the angle is implausible, or the turn not the last motion in this frame.
+        None: implausible, or not the last motion in this frame.
         """
         wrong_rad = told_rad - self.spun_rad
         if not self._may_be_recorded or is_of_another(wrong_rad, self.spun_rad):

@@ -2,8 +2,8 @@
 
 """The angle of a controlled turn, as the server has recorded it (LAST TURN).
 
-The public server leaves each sent file open and can open about 1,000, so downloads are limited.
-This module knows the form of the file; it does not know when the file is downloaded.
+The public server can send about 1,000 files only. This module knows the form of the file; it does
+not know when the file is downloaded.
 """
 
 import re
@@ -90,9 +90,9 @@ class TurnRecords:
 
 
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
-    """Return the angle of a turn in degrees, with the server's sign, from the pieces of its file.
+    """Return the angle of a turn in degrees, with the server's sign, from its file's pieces.
 
-    ``request``: the turn's command. None if the record is of another turn or has no angle.
+    ``request``: the turn's command. None for another turn, or without an angle.
     """
     for piece in pieces:  # the angle is in the first piece, so a later piece may be lost
         if head := _HEAD.match(piece):

@@ -2,8 +2,8 @@
 
 """The distance rolled by the right wheel, from an encoder count that begins anew in each motion.
 
-A reply may answer another query, so an implausible count needs repetition. This module knows counts
-and times; it does not know the robot's motion. The caller passes the time and the metres per count.
+Implausible counts must repeat. This module knows counts and times; it does not know the robot's
+motion. The caller passes the time.
 """
 
 import math
@@ -30,8 +30,6 @@ SAME_TIMES: Final = 2
 class Step:
     """The distance that the wheel has rolled between two counts.
 
-    ``seconds``: time between the counts.
-
     ``lost``: whether the robot has also moved by an unknown amount.
 
     ``unsure``: the true distance may be zero, as the start may be lost.
@@ -48,10 +46,9 @@ class WheelCount:
 
     ``last``: last accepted count. ``told_s``, ``from_s``: its probable and earliest time.
 
-    ``certain``: whether the last reply cannot be the answer to another query.
+    ``certain``: the last reply answers no other query.
 
-    ``maybe``: the last count, if it equals the one before the start, else 0. The motion may not
-    have begun.
+    ``maybe``: the last count, if it equals the one before the start, else 0.
     """
 
     def __init__(self) -> None:
@@ -106,9 +103,7 @@ class WheelCount:
     ) -> Step | None:
         """Process a count; return the step since the last count, or None for an implausible count.
 
-        ``stood_s``: time at which the robot was stopped, infinite while it is driven.
-
-        ``rests``: whether the last motion is over.
+        ``stood_s``: time of the stop, else infinite. ``rests``: the last motion is over.
         """
         before, before_s = self.last, self.told_s
         self.certain = count == before or not when.doubtful

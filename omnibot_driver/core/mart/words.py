@@ -2,16 +2,8 @@
 
 """The table of all commands of the MART controller: port, replies and times of each.
 
-A command is one case-sensitive ASCII datagram without a terminator.
-
-- motions: RM drives forward, B backward, R and L turn on the spot
-- controlled moves of a given length: TF and TB drive, MCR and MCL turn
-- changes of a motion: RMCS for RM, CS for B
-- stops: SRM stops RM, SM stops B, R and L, SL and SS use the stop port
-- queries: ENC for the encoder, RMRA for the relative heading
-
-This module knows the commands; it does not know in which state a command is allowed (see
-``states``) or when it is sent (see ``conversation``).
+A command is a case-sensitive ASCII datagram without a terminator. This module knows the commands;
+it does not know their permitted states (see ``states``) or times (see ``conversation``).
 """
 
 from dataclasses import dataclass, field
@@ -55,9 +47,9 @@ class Word:
 
     ``forms``: the forms of a successful reply.
 
-    ``takes_s``, ``least_s``: longest and shortest time in s; an earlier reply is another command's.
+    ``takes_s``, ``least_s``: longest and shortest time until the reply.
 
-    ``fails``: this command's texts after ``fail``; an unlisted text is accepted for every command.
+    ``fails``: its texts after ``fail``; a text that no command lists is accepted too.
     """
 
     text: str
@@ -123,6 +115,7 @@ def _word(
     return Word(text, kind, frozenset(forms), takes_s, least_s, channel, frozenset(fails))
 
 
+# ENC: the encoder count; RMRA: the relative heading; SFC, SRC: the front and rear sonar
 HELLO = _word("HELLO", Kind.QUERY, {Form.NAME}, 0.05)
 ENC = _word("ENC", Kind.QUERY, _INTEGER, 0.25, {""})
 RMRA = _word("RMRA", Kind.QUERY, _DECIMAL, 0.05)
@@ -146,19 +139,23 @@ Some servers start the motors on this command.
 """
 SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
 
+# RM drives forward, B backward; R and L turn on the spot
 RM = _word("RM", Kind.START, _OK, 1.2, STARTING | OBSTACLES | {"improper command format"})
 B = _word("B", Kind.START, _OK, 1.5, STARTING | OBSTACLES)
 R = _word("R", Kind.START, _OK, 1.2, STARTING)
 L = _word("L", Kind.START, _OK, 1.2, STARTING)
 
+# RMCS changes RM, CS changes B
 RMCS = _word("RMCS", Kind.CHANGE, _DECIMAL, 0.05, {NOT_IN_MOTION, ""} | OBSTACLES)
 CS = _word("CS", Kind.CHANGE, _OK, 0.05, {"", NOT_IN_MOTION})
 
+# SRM stops RM; SM stops B, R and L; SL and SS use the stop port
 SRM = _word("SRM", Kind.HALT, _OK, 2.2, STOPPING | OBSTACLES | {NOT_IN_MOTION})
 SM = _word("SM", Kind.HALT, _OK | _INTEGER, 2.2, STOPPING | OBSTACLES | {NO_MOTION, GYRO})
 SL = _word("SL", Kind.HALT, set(), 0.0, channel=STOP)
 SS = _word("SS", Kind.HALT, set(), 0.0, channel=STOP)
 
+# controlled moves of a given length: TF and TB drive, MCR and MCL turn
 TF = _word("TF", Kind.MOVE, _INTEGER, 80.0, MOVING | {"bad distance value"}, least_s=0.32)
 TB = _word("TB", Kind.MOVE, _INTEGER, 80.0, MOVING | {"bad distance value"}, least_s=0.32)
 MCR = _word("MCR", Kind.MOVE, _OK, 30.0, MOVING, least_s=0.32)

@@ -21,7 +21,7 @@ class Channel:
 
     name: empty if the board has only one channel.
     parameter: the driver's port parameter; empty for the UDP port after the channel before.
-    datagrams: True for UDP, False for a serial line.
+    datagrams: whether UDP, not serial.
     """
 
     name: str = ""
@@ -46,7 +46,7 @@ class SimulatedBoard(Protocol):
     def receive(self, data: bytes, now: float, channel: int, /) -> None:
         """Receive data that was sent to the board; the next ``advance`` returns the reply.
 
-        data: one datagram, or bytes of a serial line, in chunks of any size.
+        data: one datagram, or any chunk of serial bytes.
         now: arrival time in s, by any monotonic clock.
         """
 

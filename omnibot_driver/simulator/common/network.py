@@ -15,9 +15,8 @@ from random import Random
 class NetworkFaults:
     """Faults of a network, per datagram and in both directions.
 
-    lose, duplicate: probabilities that a datagram is lost, or arrives twice.
-    delay_s: longest delay in s; each copy's delay is uniformly distributed, so copies may be
-        reordered.
+    lose, duplicate: probabilities.
+    delay_s: longest delay in s; uniformly distributed per copy, so the order may change.
     """
 
     lose: float = 0.0

@@ -128,9 +128,9 @@ class RunningBoard(ABC, Generic[B]):
                 self._wired.receive(data, time.monotonic(), channel)
 
     def _due(self, due_s: float) -> tuple[int, float]:
-        """Return the number of overdue ticks, and the time in s at which the next tick is due.
+        """Return the number of overdue ticks, and the time in s of the next tick.
 
-        Their output is sent at once, as a real line continues during delays.
+        Overdue output is sent at once, like a real line's.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

@@ -43,9 +43,8 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    links: symbolic links: one for each pseudo-terminal, or one path for all, to which "-CHANNEL" is
-        appended.
-    udp_port: first UDP port, 0 for any free port; the next channels' ports follow.
+    links: one path for each pseudo-terminal, or one for all ("PATH-CHANNEL").
+    udp_port: first UDP port, 0 for any free port.
 
     Raises OSError on entry if a link or a port is unavailable.
     """

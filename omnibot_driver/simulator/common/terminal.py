@@ -18,10 +18,10 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal. The driver opens ``address``, the simulator uses ``descriptor``.
 
-    The driver may close and reopen it. Beyond ``UNREAD_LIMIT`` unread bytes, bytes are lost.
+    Beyond ``UNREAD_LIMIT`` unread bytes, bytes are lost.
 
-    ``link``: path of a symbolic link, removed by ``close``. It replaces a dead link or a link to a
-    pseudo-terminal. Raises FileExistsError for anything else.
+    ``link``: path of a symbolic link. It replaces a dead link, or a link to a pseudo-terminal.
+    Raises FileExistsError for anything else.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

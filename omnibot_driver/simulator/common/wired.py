@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board with its lines, in board time: each packet passes through a line, which may be faulty.
+"""A board with its lines, in board time: each packet passes through a line, perhaps a faulty one.
 
-The same settings and input give the same output. This module knows channels and lines. It must not
-know real time or packets' meaning.
+Equal input gives equal output. This module knows channels and lines. It must not know real time or
+packets' meaning.
 """
 
 from collections.abc import Sequence

@@ -2,8 +2,8 @@
 
 """A simulated MART motion controller that follows its manual or its public server.
 
-It shares no code with the driver, so that tests can reveal a misread manual. ``MartServer`` uses no
-sockets or clocks; ``SimulatedMart`` wraps it for real ports and ``sim://``.
+It shares no code with the driver. ``MartServer`` is pure; ``SimulatedMart`` wraps it for real ports
+and ``sim://``.
 """
 
 from omnibot_driver.simulator.mart.board import CHANNELS, SimulatedMart

@@ -26,8 +26,8 @@ class Chassis:
 
     right, left: registers of the two motors.
     x_m, y_m, yaw_rad: the true pose, yaw unwrapped.
-    counts: encoder counts of the right wheel since the last reset.
-    way_m: total distance, forward and backward added.
+    counts: encoder counts since the last reset.
+    way_m: total distance, forward and backward.
     volts, stuck, motor_status, silent: set them only by ``change``.
     """
 

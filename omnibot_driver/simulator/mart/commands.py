@@ -2,8 +2,8 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The first matching row wins: F matches any request that begins with F and fits no earlier row. This
-module knows command words and numbers; it does not know how a motion proceeds.
+The first row that fits the beginning of a request wins. This module knows command words and
+numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -91,9 +91,9 @@ def _joined(server: "MartServer") -> bool:
 
 
 def _timed(server: "MartServer", text: str) -> str | None:
-    """Start TF or TB. The request has an optional speed word, then a distance in inches.
+    """Start TF or TB: an optional speed word, then a distance in inches.
 
-    Without the quirk ``speed_word_first``, the speed word may also follow the distance.
+    Without the quirk ``speed_word_first``, the word may also follow.
     """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]

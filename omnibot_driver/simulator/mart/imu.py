@@ -12,9 +12,9 @@ class Imu:
     """The gyro, and the values that the server computes from it.
 
     alive: whether the IMU is plugged in; may be set. The settings may plan further failures.
-    closed: whether the server has stopped using the IMU, until RST IMU or SB succeeds.
-    rate_dps: last sample in deg/s, minus the bias that the server knows.
-    heading_deg: the relative heading in degrees, left positive.
+    closed: the server does not use the IMU, until RST IMU or SB.
+    rate_dps: last sample, minus the bias that the server knows.
+    heading_deg: the relative heading, left positive.
     """
 
     def __init__(self, settings: MartSettings) -> None:

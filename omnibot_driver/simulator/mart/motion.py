@@ -52,11 +52,10 @@ RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
 class Motion:
     """The state of the last motion of a kind, kept after its end.
 
-    running: whether the motion is in progress, so that the server refuses other motions.
+    running: whether the server refuses other motions.
     watching: whether the module ``alarms`` supervises the motion.
     posts: number of start and stop notices that no waiter has taken yet.
     right, left: motor registers, as the server knows them.
-    encoder: the last count, for the next sample.
     sampled_s: time of the last sample of the IMU, or -1.
     moved_s, turned_s: first and last time at which the wheel turned.
     released: whether the stop port ended the motion.

@@ -50,9 +50,7 @@ def start_controlled(
 ) -> None:
     """Start a move over a distance (TF, TB, PTF, MCF, MCB).
 
-    ``inches``: the distance. With 0 or less, the move is unlimited.
-
-    ``plain``: whether the reply has no distance.
+    ``inches``: 0 or less is unlimited. ``plain``: the reply has no distance.
     """
     motion = server.motions[kind]
     motion.word, motion.backward = word, backward
@@ -83,10 +81,9 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """Take a sample of the gyro bias, with ``left`` to take; schedule the next one.
+    """Take a sample of the gyro bias; ``left`` are still to take, ``missed`` have failed in a row.
 
-    After the last, start the motion ``kind``, or answer SB if ``kind`` is None. ``missed``: missing
-    samples in a row.
+    After the last, start the motion ``kind``, or answer SB (None).
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0
@@ -154,8 +151,7 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    With 0 degrees or less, the command only tests the IMU. With the quirk ``probe_turns``, it also
-    runs the motors.
+    0 degrees or less only test the IMU; ``probe_turns`` also runs the motors.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word

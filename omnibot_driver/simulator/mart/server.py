@@ -2,8 +2,7 @@
 
 """The server: two ports with a thread each, a timer while something moves, and simulated time.
 
-The same settings and input give the same output. Time jumps from event to event. This module does
-not know sockets, real time or the set of commands.
+Equal input gives equal output. This module does not know sockets, real time or the set of commands.
 """
 
 from collections import deque
@@ -120,8 +119,7 @@ class MartServer(ServerState):
     def restart(self, boot_s: float = BOOT_S) -> None:
         """Restart the server program. The motors keep the last command that they received.
 
-        Datagrams of the next ``boot_s`` seconds are lost. ``START_UP_S`` later, the server has
-        started up completely.
+        Datagrams of the next ``boot_s`` seconds are lost; complete after START_UP_S more.
         """
         self.begin()
         self.imu.restart()
@@ -182,7 +180,7 @@ class MartServer(ServerState):
     def post(self, kind: Kind) -> None:
         """Give the first waiter the notice that a motion of this kind has started or ended.
 
-        If no waiter waits for this kind of motion, the notice is kept.
+        Without a waiter, keep the notice.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -14,30 +14,30 @@ from typing import Literal
 class Quirks:
     """Deviations of the public server from its manual: none by default.
 
-    The last three come from the public source alone; the running server differs in the heading.
+    The last three were found in the public source, not on the running server.
 
     stop_port_keeps_motion: SL stops F, B and RM, but the motion stays "in progress". Later motions
         are refused; a later SM or SRM hangs the command port.
     spin_stop_ends_drives: SS stops F, B and RM, as SL does.
-    early_stop_is_ignored: the stop port has no effect before the reply to F, B, R, L or RM.
+    early_stop_is_ignored: the stop port has no effect before the reply to a start.
     left_spin_in_reference_move: L is accepted during RM, and hangs the command port.
-    moves_wait_for_imu: F, B, TF, TB and SB wait until a dead IMU works, and then continue.
+    moves_wait_for_imu: F, B, TF, TB and SB wait for a working IMU.
     drives_trust_imu: RM, R, L start, and uncontrolled motions continue, without an IMU. Then the
         server detects no obstacle, start or stop.
     reference_speed_wraps: in RM, speeds below 1 or above 127 wrap around; RMCS limits them.
     reference_start_counts_on: RM's start continues the sample count of the previous RM's stop. RM's
         failure text is that of the last F or B.
     speed_word_first: a speed word after the number is ignored.
-    zero_distance_is_unlimited: 0 inches, or a word as number, makes TF, TB, MCF, MCB unlimited.
+    zero_distance_is_unlimited: in TF, TB, MCF and MCB; so is a word as number.
     echoes_distance: TF and TB report the distance computed from time.
-    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR with too few numbers end the server.
+    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR end the server.
     crashes_early: VOLTS and all motions except F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
-    exit_is_silent: EXIT is answered only if LOG was sent before.
+    exit_is_silent: EXIT is answered only after LOG.
     log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN.
     unknown_reset_repeats: RST with an unknown word repeats the previous reply.
     clock_moves_heading: TIME in a motion adds turn rate * clock jump to the heading.
-    undocumented_commands: without this quirk, ENC is the only one accepted.
+    undocumented_commands: without this quirk, ENC is the only undocumented command.
     heading_in_reference_moves_only: the heading of RMRA changes in RM only.
     probe_turns: MCR 0 runs the motors until the wheel moves, or 0.5 s with a dead IMU.
     heading_starts_off: RM's first sample adds half the turn rate * time since the previous RM.
@@ -95,13 +95,13 @@ class MartSettings:
     dead_zone_units: effort that is needed before a motor turns; only the rest gives speed.
     motor_inequality: how much faster the left motor is, as a fraction of the speed.
     encoder_sign: -1 if the encoder counts down while the robot drives forward.
-    gyro_bias_dps: bias of the gyro, unknown to the server before SB.
+    gyro_bias_dps: unknown to the server before SB.
     gyro_noise_dps: standard deviation of a gyro sample while a wheel turns.
     imu_dies_s, imu_returns_s: times since construction.
     motor_board_silent: whether the serial line to the motor board is cut.
     motor_status: bits of MCSTAT, except the voltage's; a trip or short circuit stops the motor.
     front_m, rear_m: distances from the start to walls across the x axis.
-    dock_m: distance from the start forward to the dock.
+    dock_m: distance from the start forward.
     reference_start_fails: whether RM is answered ``fail`` although the robot moves.
     clock_s: initial wall clock in Unix time.
     """

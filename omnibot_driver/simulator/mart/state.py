@@ -21,8 +21,7 @@ NEAR_READINGS_S = 0.15
 """Duration in s of the three sonar readings that confirm a near obstacle."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Error of the server in s if a duration is negative. The server counts milliseconds without a
-sign, so it computes a duration that is too long by this time."""
+"""Error in s of a negative duration: the server counts milliseconds without a sign."""
 FILES = 100
 
 Then = Callable[..., None]
@@ -45,10 +44,7 @@ class ServerState:
     starting: the kind of motion whose command is not answered yet.
     custom: parameters that SLMP and SSP have set.
     sampling_since_s: time since which a motion uses a sonar, or -1.
-    front_m, rear_m, dock_m: distances from the start.
-
-    ``front_m``, ``rear_m``, ``dock_m`` and the attributes of chassis and IMU may be changed at any
-    time.
+    front_m, rear_m, dock_m: from the start; may be changed, like chassis and IMU.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -152,7 +148,7 @@ class ServerState:
     def clearance_in(self, *, backward: bool) -> int:
         """Return the last reading, in inches, of the sonar that the present motion uses.
 
-        The result is -1 before the first reading, and if no wall is in range.
+        -1: no reading yet, or no wall in range.
         """
         since_s = self.sampling_since_s
         if since_s < 0.0 or self.now_s - since_s < NEAR_READINGS_S:

@@ -2,8 +2,7 @@
 
 """Codec of the datagrams as the server reads and writes them. Its only source is the manual.
 
-A request is a line without a terminator, with numbers as in C's ``atoi``. This module does not know
-the meaning of a command.
+Numbers are parsed as by C's ``atoi``. This module does not know the meaning of a command.
 """
 
 import re
