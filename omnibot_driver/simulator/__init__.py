@@ -3,7 +3,7 @@
 """Simulated motor boards for tests of the driver, each written from the manual of the real board.
 
 The simulator shares no code with the driver: tests reveal a misread manual. The next release
-removes ``simulator.omnibot``'s names here.
+removes the names of ``simulator.omnibot`` from here.
 """
 
 import warnings

@@ -32,7 +32,7 @@ END_M, END_RAD = 0.004, math.radians(0.4)
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of the angle that the server reports for a turn on the spot.
 
-``TOLD_TURN_RAD``: in rad, as it reports whole degrees. ``TOLD_TURN``: as a fraction.
+``TOLD_TURN_RAD``: in rad, from rounding to whole degrees. ``TOLD_TURN``: as a fraction.
 """
 PIVOT: Final = 0.01
 """Distance from the robot's centre to the point about which it turns on the spot.

@@ -2,8 +2,8 @@
 
 """The check that the IMU works (RST IMU, or MCR SLOW 0), and its last results.
 
-A failed RST IMU closes the IMU. This module knows replies and times; it does not know which motion
-is started. The caller passes the time.
+A failed RST IMU closes the IMU, so it is repeated. This module knows replies and times; it does not
+know which motion is started. The caller passes the time.
 """
 
 import math

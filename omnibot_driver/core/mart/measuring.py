@@ -22,7 +22,7 @@ STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 """Times in s for which a robot may coast after the end of a motion.
 
-``ROLLS_S``: after a stop. ``ROLLS_AFTER_MOVE_S``: after a move, as failures are reported early.
+``ROLLS_S``: after a stop. ``ROLLS_AFTER_MOVE_S``: after a move, whose failure may come before rest.
 """
 
 

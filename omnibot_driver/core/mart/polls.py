@@ -36,7 +36,7 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 In the other states the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
-"""The two sonars, and the least time in s between queries of both.
+"""The two sonars, and the least time in s between their queries.
 
 If nothing is near, both report the same: a late copy could be mistaken.
 """

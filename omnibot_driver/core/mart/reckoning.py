@@ -24,7 +24,7 @@ from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 BEGIN_RADPS: Final = 0.03
 """Standard deviation in rad/s of the turn rate in RM before the server reports a heading.
 
-The cause: unequal motors.
+The motors are unequal.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""

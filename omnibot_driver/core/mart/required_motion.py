@@ -20,7 +20,7 @@ SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 RAMP_LEFT: Final = 0.2
 """A turn on the spot begins only when its ramped yaw rate is this near to the final value.
 
-A fraction of the final value.
+It is a fraction of the final value.
 """
 
 

@@ -33,8 +33,9 @@ LARGE_UNITS: Final = 3
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """Effect of slow exchanges with the server on learning.
 
-``LEARN_TRIPS``: exchanges added to the averaging window. ``LESS_PER_S``: standard deviation * (1 +
-LESS_PER_S * duration in s).
+``LEARN_TRIPS``: exchanges added to the averaging window.
+
+``LESS_PER_S``: factor 1 + LESS_PER_S * duration (s) of a speed's standard deviation.
 """
 SLOWEST_MPS: Final = 0.015
 """A wheel whose measured speed in m/s is above this is regarded as turning."""
@@ -119,7 +120,7 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        From MOST_DEAD units on, a motor is blocked: nothing is learned.
+        From MOST_DEAD units on, a standing motor is blocked: nothing is learned.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

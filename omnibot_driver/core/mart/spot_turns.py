@@ -48,8 +48,9 @@ STEADY: Final = 0.03
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-``SPINS_UP_S``: least time in s, plus the averaging time. ``SEEN_RAD``: least angle. ``TOLD_RAD``:
-above it, the server's angle is used.
+``SPINS_UP_S``: least time in s, plus the averaging time. ``SEEN_RAD``: least angle.
+
+``TOLD_RAD``: above this angle, the server's angle is used.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
@@ -106,8 +107,9 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
 
-        SSP must be sent before the check of the IMU. ``delay_s``: time for copies of the older SSP,
-        in s.
+        SSP must be sent before the check of the IMU.
+
+        ``delay_s``: longest delay of a datagram, in s. A new SSP waits for copies of the old one.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -225,7 +227,7 @@ class SpotTurns:
         rate_radps = self.seen_radps
         if self._is_held(rate_radps):
             return
-        if abs(spun_rad) > TOLD_RAD:
+        if abs(spun_rad) > TOLD_RAD:  # whole degrees are then more precise than the wheel
             whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
             rate_radps *= abs(math.radians(degrees)) / whole_rad
         self._undo_false_lesson(abs(rate_radps / self._rate_radps))
@@ -242,6 +244,7 @@ class SpotTurns:
         ``part``: the next turn's rate / commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
+            # from both turns, a dead zone would be learned that the motors do not have
             self._loop.restore(self._before_slow)
             self._before_slow = None
         else:

@@ -39,7 +39,7 @@ TIMED_OUT_S: Final = 0.5
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
-"""Longest duration of a controlled move: 3 s, plus these s for each inch or degree."""
+"""Longest duration of a controlled move: 3 s, plus this time in s for each inch or degree."""
 REFERENCE_FAILS: Final = 2
 """After this number of bare ``fail`` replies to RM in a row, the driver stops trying.
 
@@ -246,7 +246,7 @@ class Starts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure text of RM may be about another motion, e.g. the last B.
 
-        An obstacle is believed if the front sonar sees it, or RM repeats it.
+        An obstacle is believed if the front sonar sees it, or RM reports it twice in a row.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -53,8 +53,9 @@ class TurnAngle:
     def end(self, *, may_be_recorded: bool) -> float:
         """End the turn after its last count; return the correction.
 
-        An implausible ``told_rad`` is replaced by the wheel's turn. ``may_be_recorded``: by the
-        server.
+        The wheel's turn replaces an implausible ``told_rad``.
+
+        ``may_be_recorded``: whether the server may have recorded the turn.
         """
         self._may_be_recorded = may_be_recorded
         if self.told_rad is None:

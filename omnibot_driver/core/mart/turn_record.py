@@ -2,7 +2,7 @@
 
 """The angle of a controlled turn, as the server has recorded it (LAST TURN).
 
-The public server can send about 1,000 files only. This module knows the form of the file; it does
+The public server can send only about 1,000 files. This module knows the form of the file; it does
 not know when the file is downloaded.
 """
 

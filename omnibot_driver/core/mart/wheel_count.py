@@ -2,8 +2,8 @@
 
 """The distance rolled by the right wheel, from an encoder count that begins anew in each motion.
 
-Implausible counts must repeat. This module knows counts and times; it does not know the robot's
-motion. The caller passes the time.
+The third implausible count in a row is accepted. This module knows counts and times; it does not
+know the robot's motion. The caller passes the time.
 """
 
 import math

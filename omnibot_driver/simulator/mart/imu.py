@@ -12,8 +12,8 @@ class Imu:
     """The gyro, and the values that the server computes from it.
 
     alive: whether the IMU is plugged in; may be set. The settings may plan further failures.
-    closed: the server does not use the IMU, until RST IMU or SB.
-    rate_dps: last sample, minus the bias that the server knows.
+    closed: whether the server has stopped using the IMU, until RST IMU or SB succeeds.
+    rate_dps: turn rate of the last sample, minus the bias that the server knows.
     heading_deg: the relative heading, left positive.
     """
 

@@ -52,7 +52,7 @@ RAMPS_S = {"NORMAL": (0.3, 0.12), "SLOW": (0.2, 0.08)}
 class Motion:
     """The state of the last motion of a kind, kept after its end.
 
-    running: whether the server refuses other motions.
+    running: whether the motion is in progress; the server then refuses other motions.
     watching: whether the module ``alarms`` supervises the motion.
     posts: number of start and stop notices that no waiter has taken yet.
     right, left: motor registers, as the server knows them.

@@ -19,7 +19,7 @@ class Quirks:
     stop_port_keeps_motion: SL stops F, B and RM, but the motion stays "in progress". Later motions
         are refused; a later SM or SRM hangs the command port.
     spin_stop_ends_drives: SS stops F, B and RM, as SL does.
-    early_stop_is_ignored: the stop port has no effect before the reply to a start.
+    early_stop_is_ignored: the stop port has no effect before the reply to F, B, R, L or RM.
     left_spin_in_reference_move: L is accepted during RM, and hangs the command port.
     moves_wait_for_imu: F, B, TF, TB and SB wait for a working IMU.
     drives_trust_imu: RM, R, L start, and uncontrolled motions continue, without an IMU. Then the
@@ -29,7 +29,7 @@ class Quirks:
         failure text is that of the last F or B.
     speed_word_first: a speed word after the number is ignored.
     zero_distance_is_unlimited: in TF, TB, MCF and MCB; so is a word as number.
-    echoes_distance: TF and TB report the distance computed from time.
+    echoes_distance: TF and TB report the distance computed from time, not the driven one.
     crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR end the server.
     crashes_early: VOLTS and all motions except F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
