@@ -22,7 +22,7 @@ from omnibot_driver.core.packets import Packets
 STOP_AGAIN_S: Final = 3.0
 """Interval in s at which SL and SS are repeated while the server is silent.
 
-The server is silent in a controlled move until SL or SS ends the move.
+They also end a controlled move.
 """
 APART_S: Final = 0.4
 """Least time in s between two encoder counts that are compared to see whether the robot moves."""

@@ -51,7 +51,7 @@ TRAITS: Final = Traits(
 UNREAD_S: Final = 0.5
 """If the last reading is older than this time in s, the next reply gives at least NOTHING_MEASURED.
 
-Measurements of a moving robot come at shorter intervals.
+A moving robot is measured more often.
 """
 EXPECTED_EVERY_S: Final = 0.2
 

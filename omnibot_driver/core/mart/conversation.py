@@ -116,7 +116,7 @@ class Conversation:
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now: no request is pending.
 
-        Queries outside PRESSING also wait until a late reply can no longer be mistaken for theirs.
+        Queries outside PRESSING also wait until no late reply can be mistaken.
         """
         if self.pending is not None:
             return False
@@ -170,7 +170,7 @@ class Conversation:
     def ask(self, request: Request, now: float, patience_s: float | None = None) -> Packets:
         """Return the packets with the request, and begin to wait for its reply.
 
-        ``patience_s``: how long to wait, in s. The default follows from the command.
+        ``patience_s``: longest wait in s; by default from the command.
         """
         if patience_s is None:
             patience_s = self._patience_s(request.word)
@@ -266,7 +266,7 @@ class Conversation:
     def _patience_s(self, word: Word) -> float:
         """Return how long the driver waits for the reply to ``word``, in s.
 
-        It is short for queries and changes: a moving robot must be measured.
+        The wait is short for queries and changes, because a robot may be moving.
         """
         longest_s = 2 * self.delay_s
         if word.kind in (Kind.QUERY, Kind.CHANGE):

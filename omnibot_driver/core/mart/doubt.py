@@ -87,9 +87,8 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn.
-
-        ``aside_m``: standard deviation across the motion, in m.
+        ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn. ``aside_m``:
+        across the motion.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -157,8 +156,7 @@ class Doubt:
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
         """Replace the heading error of a turn that has ended, because its angle is known now.
 
-        Call this before the position changes. ``spun_rad``: by the wheel; ``told_rad``: by the
-        gyro.
+        Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

@@ -23,12 +23,12 @@ NORMAL_UNITS: Final = 30
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 """After ENOUGH_MOVES moves, a distance of ENOUGH_M (m) from the goal is near enough.
 
-To come nearer, the robot would have to turn towards the goal first.
+Otherwise the robot would have to turn again.
 """
 STRETCH: Final = 1.3
-"""Ratio of driven to requested length of a straight move, assumed until the first measurement.
+"""Ratio of driven to requested length of a straight move, until the first measurement.
 
-A request for 12 inches becomes a move of 15.8 inches.
+For example, 12 inches become 15.8 inches.
 """
 DOCK_STRETCH: Final = 1.6
 """Largest assumed ratio of driven to requested length of a docking move.

@@ -224,8 +224,7 @@ class Ground:
     def _heading_first(self) -> bool:
         """Whether the heading must be read before the encoder.
 
-        The first count after a motion ends the motion in the odometry. RM's last heading must
-        precede it.
+        RM's last heading must precede the count that ends the motion.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

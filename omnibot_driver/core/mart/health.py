@@ -34,19 +34,16 @@ BITS: Final = {
 NO_READ: Final = 255
 HALTING: Final = 4 | 8 | 16 | 32
 FRONT_IN, REAR_IN = 19, 15
-"""Distances in inches: the controller stops the robot if an obstacle is nearer.
-
-FRONT_IN is the limit in front of the robot, REAR_IN the limit behind it.
-"""
+"""Distances in inches (front, rear): the controller stops the robot if an obstacle is nearer."""
 SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
 """Largest difference between two readings that are regarded as equal, in V or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of equal readings in a row after which an uncertain reading is accepted.
+"""Number of equal readings in a row after which a reading is accepted.
 
-A reading is uncertain if the reply may belong to another query.
+It applies if the reply may belong to another query.
 """
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3

@@ -62,9 +62,9 @@ class Hearing(Measuring):
             self._answered(answer, now)
 
     def _may_be_late(self, reply: Ok, now: float) -> bool:
-        """Return whether a reply after a stop may be a copy, or the answer to an earlier request.
+        """Return whether a reply after a stop may be a copy, or answer an earlier request.
 
-        For example, ``ok`` to the start or the IMU check, or an encoder count.
+        For example, ``ok`` to the start, or an encoder count.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:

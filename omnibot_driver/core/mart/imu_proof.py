@@ -25,7 +25,7 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-If a check takes longer, the driver adds half of the additional time to the age of the result.
+Half of any additional time is added to the age of the result.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""

@@ -154,8 +154,7 @@ class Jobs:
     def next(self, now: float, *, stands: bool) -> Request | None:
         """Return the job's request if it must be sent now, else None.
 
-        ``stands``: whether measurements show rest. TURN_RECORD does not need this: its turn has
-        ended.
+        ``stands``: whether measurements show rest, which TURN_RECORD does not need.
         """
         ready = stands or self.job is Job.TURN_RECORD
         return self._request if ready and not self._waiting else None

@@ -122,7 +122,7 @@ class Measuring(Starts):
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """Stop a robot whose encoder counts change although it should be at rest.
 
-        Possible causes are a late duplicate of a start, another client, and a push.
+        Causes: a late duplicate of a start, another client, a push.
         """
         self._counted_at_rest += 1
         rolls_s = ROLLS_AFTER_MOVE_S if self._moved_last else ROLLS_S

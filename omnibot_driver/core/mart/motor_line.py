@@ -69,7 +69,7 @@ class MotorLine:
     def move(self, slope: float, offset: float) -> None:
         """Add these changes to the slope and the offset of the line.
 
-        A measurement has just changed the line of the other motor by the same amounts.
+        The other motor's line has just changed by the same amounts.
         """
         self._learned = True
         self._set(self.slope + slope, self.offset + offset)

@@ -108,9 +108,9 @@ class Motors:
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
-        """Return the speeds of the right and the left wheel, in m/s.
+        """Return the speeds of the right and the left wheel, in m/s, not negative.
 
-        The speeds are not negative: in a tight turn the inner wheel stands still.
+        In a tight turn the inner wheel stands still.
         """
         half = rate_radps * self._settings.track_m / 2
         return max(0.0, speed_mps + half), max(0.0, speed_mps - half)

@@ -105,9 +105,9 @@ class Pilot(Hearing):
         return self.greeted and not self.health.stranger and self.state is not State.LOST
 
     def fell_silent(self) -> None:
-        """Begin a new connection after a long silence, unless a motion or a job is in progress.
+        """Begin a new connection after a long silence, because the server may have been restarted.
 
-        The server may have been restarted during the silence.
+        Not during a motion or a job.
         """
         if self.state in (State.STILL, State.UNKNOWN):
             self.connect()

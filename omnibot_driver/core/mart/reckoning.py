@@ -303,7 +303,7 @@ class Reckoning:
     def stale(self, now: float) -> tuple[float, float]:
         """Return how much older than FRESH_S the last heading is, in s, and the resulting error.
 
-        The error: standard deviation of the turn, in rad. Both are 0 except in RM.
+        The error is a standard deviation in rad. Both are 0 except in RM.
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

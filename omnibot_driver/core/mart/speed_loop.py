@@ -120,7 +120,7 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        From MOST_DEAD units on, a standing motor is blocked: nothing is learned.
+        A motor with MOST_DEAD units or more is blocked: nothing is learned.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units

@@ -55,7 +55,7 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
 
-UNSURE_RAD + UNSURE_PART * expected turn + turn during two exchanges.
+UNSURE_RAD + UNSURE_PART * expected turn + two exchanges' turn.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after SSP in which the server certainly still knows the speed of R and L."""
@@ -109,7 +109,7 @@ class SpotTurns:
 
         SSP must be sent before the check of the IMU.
 
-        ``delay_s``: longest delay of a datagram, in s. A new SSP waits for copies of the old one.
+        ``delay_s``: a new SSP waits this long for copies of the old one.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:

@@ -102,7 +102,7 @@ class Starts(Adjusting):
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
 
-        A move would block the command port; a stop would end the motion.
+        A move would block the command port, a stop end the motion.
         """
         moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
         return moves or now < self._halted_s + self._delay_s
@@ -246,7 +246,7 @@ class Starts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure text of RM may be about another motion, e.g. the last B.
 
-        An obstacle is believed if the front sonar sees it, or RM reports it twice in a row.
+        An obstacle is believed if the front sonar sees it or RM repeats it.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -128,7 +128,7 @@ LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
 }
 """For each motion, the commands that stop the motors when the command port is silent.
 
-These commands are the last resort, because they may hang the server.
+They are the last resort: they may hang the server.
 """
 
 STARTS: Final[Mapping[Word, Motion]] = {

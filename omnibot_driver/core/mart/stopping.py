@@ -95,7 +95,7 @@ class Stopping:
     def asks_name(self, now: float) -> bool:
         """Return whether to ask for the server's name too, because the move's reply may be lost.
 
-        A server that gives its name has finished the move.
+        The name shows that the move has ended.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 

@@ -16,8 +16,7 @@ SAME_DEG: Final = 0.5
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
 """Sums of the recorded angles, in rad.
 
-From LEAST_RAD on, the driver uses the ratio that the records show. From ENOUGH_RAD on, it downloads
-no more records.
+From LEAST_RAD on, the records' ratio is used; from ENOUGH_RAD on, no record is downloaded.
 """
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""

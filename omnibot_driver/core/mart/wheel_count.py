@@ -77,7 +77,7 @@ class WheelCount:
     def refused(self) -> None:
         """Record that the motion did not begin, so the count continues from its last value.
 
-        The call is ignored if the server has acknowledged the motion.
+        Ignored if the server has acknowledged the motion.
         """
         if not self._confirmed:
             self.last, self._begins = self._before, False

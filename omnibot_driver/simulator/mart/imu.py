@@ -63,7 +63,7 @@ class Imu:
     def drift(self, now: float, *, integrates: bool) -> None:
         """Advance to ``now``. The robot has been at rest since the previous sample.
 
-        ``integrates``: whether the unknown part of the bias changes the heading during this time.
+        ``integrates``: whether the unknown bias changes the heading meanwhile.
         """
         if integrates and self.living(now):
             self.heading_deg += (self._bias_dps - self._known_dps) * (now - self._since_s)

@@ -167,7 +167,7 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` at the next notice that a motion of this kind has started or ended.
 
-        If such a notice is already there, call ``then`` now.
+        If a notice is already there, call it now.
         """
         motion = self.motions[kind]
         if motion.posts:

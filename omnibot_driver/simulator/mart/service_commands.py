@@ -131,11 +131,7 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 
 
 def take_bias(server: "MartServer", text: str) -> str | None:
-    """Measure the gyro bias (SB).
-
-    If the server has stopped using the IMU, it first opens the IMU again. If it cannot open the
-    IMU, SB fails.
-    """
+    """Measure the gyro bias (SB). A closed IMU is opened first; if that fails, SB fails."""
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
         server.later(RESET_FAILS_S, _fail)
