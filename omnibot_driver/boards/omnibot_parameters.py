@@ -26,8 +26,8 @@ OMNIBOT: Final = (
         "linear_scale",
         70.0,
         "LSB/(m/s)",
-        "Number, in units of the board (LSB), that commands a linear speed of 1 m/s of the"
-        " robot, or of a wheel's rim (wheel_cmd).",
+        "Board units (LSB) for a linear speed of 1 m/s. For cmd_vel it is the speed of the robot,"
+        " for wheel_cmd that of a wheel's rim.",
         low=1.0,
         high=10_000.0,
         calibrated=True,

@@ -30,7 +30,9 @@ def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: G
     measured: Any = left.subplots(len(wheels), 1, sharex=True, squeeze=False)
     for axes, wheel in zip(measured[:, 0], wheels, strict=True):
         _draw_wheel(axes, wheel)
-    measured[0, 0].set_title("Measured: mean speed in 40 ms, fraction of the step", fontsize=10)
+    measured[0, 0].set_title(
+        "Measured speed as a fraction of the step (mean over 40 ms)", fontsize=10
+    )
     measured[-1, 0].legend(fontsize=7, loc="lower right")
     measured[-1, 0].set_xlabel("time from the control tick to the middle of the 40 ms, in ms")
     command, load = right.subplots(2, 1, sharex=True)
@@ -40,7 +42,7 @@ def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: G
     command.set_ylabel("fraction of the step")
     command.legend(fontsize=7, loc="lower right")
     _draw_predictions(load, motors, now, better, command=0.0, load=1.0)
-    load.set_title("Predicted: a load as large as the effort for 1 count per tick", fontsize=10)
+    load.set_title("Predicted response to a load (size: effort for 1 count per tick)", fontsize=10)
     load.set_ylabel("counts per tick")
     load.set_xlabel("time after the control tick, in ms")
 
