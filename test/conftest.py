@@ -2,9 +2,8 @@
 
 """Fixtures that all tests share, and the settings of ROS and Hypothesis.
 
-ROS traffic stays on this machine and within this test run. Hypothesis tries the same examples in
-every run, so a test that newly fails shows the effect of a change. ``pytest --hypothesis-profile
-exploring`` tries other examples. No example has a time limit.
+ROS traffic stays within this test run. Hypothesis tries the same examples in every run. ``pytest
+--hypothesis-profile exploring`` tries other ones.
 """
 
 import os

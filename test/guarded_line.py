@@ -25,10 +25,7 @@ LATCHED_WORDS = b"and these under the e-stop"
 
 
 class Line:
-    """A pseudo-terminal in place of a serial line.
-
-    ``near`` is the port that the driver uses. The test reads the other end, as a board would.
-    """
+    """A pseudo-terminal in place of a serial line. ``near`` is the driver's port."""
 
     def __init__(self) -> None:
         self._far, self.near = os.openpty()

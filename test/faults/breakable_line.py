@@ -1,8 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated board on a line that can be broken, and a record of what the board really sent.
-
-A ``Damage`` changes the bytes of one tick, or of one write.
+"""A simulated board on a line that can be broken, and a record of what the board sent.
 
 This module knows bytes and ticks; it does not know frames.
 """
@@ -37,9 +35,9 @@ def losing(rate: float, random: Random) -> Damage:
 
 
 def losing_bursts(rate: float, random: Random) -> Damage:
-    """Return a damage that loses 1 to 200 bytes in a row. The row may last several ticks.
+    """Return a damage that loses 1 to 200 bytes in a row.
 
-    ``rate``: the probability that such a loss begins at a byte.
+    ``rate``: the probability that a loss begins at a byte.
     """
     return FaultyLine(LineFaults(burst=rate), random.getrandbits(32)).carry
 
@@ -62,9 +60,9 @@ def gaining(rate: float, random: Random) -> Damage:
 
 
 def noise(random: Random) -> Damage:
-    """Return a damage that replaces all bytes, as a wrong baud rate or a broken wire does.
+    """Return a damage that replaces all bytes by random ones, as many as the line can carry.
 
-    Each tick has as many random bytes as the line can carry.
+    For example, a wrong baud rate does so.
     """
     return lambda _data: random.randbytes(BYTES_PER_TICK)
 
@@ -88,13 +86,11 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board behind a line.
+    """A board behind a line. All bytes pass through the line and its damage.
 
-    ``receive`` and ``advance`` pass all bytes through the line and its damage.
+    ``sent``: what the board sent, before damage.
 
-    ``sent``: every frame and text that the board sent, before damage.
-
-    ``driven_at``: the last tick in which the board's motors had a command to turn.
+    ``driven_at``: the last tick in which the motors had a command to turn.
     """
 
     tick_s = TICK_S

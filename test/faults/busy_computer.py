@@ -2,8 +2,8 @@
 
 """A busy computer: busy loops on every core, and an adapter that delivers four bytes at a time.
 
-The line is undamaged. So the driver must publish exactly what the board sent, and its log must not
-name the cable as a cause.
+The line is undamaged. So all that the board sends must be published, and the log must not blame the
+cable.
 """
 
 import math
@@ -27,9 +27,9 @@ SILENCE_S: Final = 1.0
 TRANSIT: Final = 200
 """Number of frames that are possibly still on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""A message is compared with the frames after that of the previous message, up to this distance.
+"""A message is compared with this number of frames after the previous message's frame.
 
-If none of these frames equals the message, the message is wrong.
+If none equals the message, the message is wrong.
 """
 
 
@@ -80,8 +80,7 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages were never sent, and how many sent frames have no message.
 
-    At constant speed many frames are equal. So the comparison is tried from each frame that equals
-    the first message, and the best result is returned.
+    Equal frames are frequent, so the best of several starts counts.
     """
     starts = [n for n, key in enumerate(sent) if same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

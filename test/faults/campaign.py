@@ -2,9 +2,7 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-The campaign has all scripted faults, random input, and random walks through the faults. With
-``--minutes`` it is only a long random walk. Drivers run in real time, so the pieces of the campaign
-run in parallel. Each piece has its own drivers, boards and ROS domain. The exit code is 1 when
+With ``--minutes`` it is only a long random walk through the faults. The exit code is 1 when
 anything was wrong.
 """
 
@@ -66,13 +64,9 @@ class Row:
 class Outcome:
     """Result of some pieces of the campaign.
 
-    ``rows``: the rows of the table.
-
-    ``complaints``: all complaints.
-
     ``published``: number of messages that were compared with what the board sent.
 
-    ``wrong``: how many of these messages were wrong.
+    ``wrong``: number of wrong messages among them.
     """
 
     rows: list[Row] = field(default_factory=list)
@@ -208,9 +202,7 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test stops on a line that loses bytes to the board, until the last stop has been judged.
 
-        ``number_of_life``: the index of the group of stops in LIVES.
-
-        ``numbers``: for each of these numbers, a new driver performs the group.
+        ``number_of_life``: index in LIVES. ``numbers``: of the drivers.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
@@ -320,7 +312,7 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
     """Run those of the pieces that apply to the board, in parallel.
 
-    Return the sum of their results. The results are added in the order of ``wanted``.
+    Return the sum of their results in the order of ``wanted``.
     """
     total, without = Outcome(), load(board).without
     wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]

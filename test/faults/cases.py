@@ -2,8 +2,7 @@
 
 """Scripted faults: each occurs while a commander drives the robot, and the robot must then stop.
 
-A case is a function that gets a rig. Before and after each case, the rig's robot is at rest. The
-rig's ``findings`` collect complaints.
+A case is a function of a rig. Before and after a case, the robot is at rest.
 """
 
 import signal
@@ -100,7 +99,7 @@ def flood_of_commands(rig: Rig) -> None:
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
     """Damage the bytes on the line while the robot drives for ``seconds``.
 
-    Then the commands end. The damage continues until the robot must be at rest.
+    The damage outlasts the commands until the robot must be at rest.
     """
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board
@@ -198,8 +197,7 @@ def unplugged_while_somebody_drives_on(rig: Rig) -> None:
 def estop(rig: Rig) -> None:
     """Latch the e-stop. While commands continue, the board reboots and the cable is pulled.
 
-    The robot must stay at rest. When the commands have ended and the e-stop is released, the last
-    command must not move the robot.
+    The robot stays at rest, also after the release.
     """
     rig.drive()
     answer = rig.probe.call(SetBool, "estop", data=True)
@@ -295,10 +293,9 @@ SERVICES: Final[dict[str, Case[Rig]]] = {
 
 
 def driver_hangs(rig: Rig) -> None:
-    """Suspend the driver's process while commands continue and wait in queues.
+    """Suspend the driver's process while commands continue.
 
-    The guard must stop the robot. When the driver runs again, the old commands must not move the
-    robot.
+    The guard must stop the robot. Later, the queued commands must not move the robot.
     """
     rig.drive()
     since = rig.line.tick

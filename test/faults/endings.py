@@ -2,8 +2,7 @@
 
 """Ways in which a driver ends while the robot drives: on request, by a defect, or by force.
 
-An ending may have Python code that runs in the driver's process before the driver starts. After an
-ending, the rig has no driver.
+After an ending, the rig has no driver.
 """
 
 import os
@@ -55,17 +54,13 @@ os.close(terminal)
 class Ending:
     """A way to end the driver, and what must follow. The board must always receive Stop last.
 
-    ``end``: ends the driver of a rig.
-
-    ``exit_codes``: the allowed exit codes of the driver.
-
     ``before``: Python code that runs in the driver's process before the driver starts.
 
-    ``allowed_s``: how long the robot may still drive after the ending, in s.
+    ``allowed_s``: how long the robot may still drive after the ending.
 
-    ``late_s``: additional time that the process may take to end, in s.
+    ``late_s``: additional time for the end of the process.
 
-    ``full``: whether the port is full of old commands when the driver ends.
+    ``full``: whether the port is full of old commands.
 
     ``read``: whether the driver ends only when it next reads data.
     """
@@ -105,9 +100,9 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Return an ending that sends these signals to the driver's process group.
+    """Return an ending that sends these signals to the driver's process group without pauses.
 
-    The signals follow each other without pauses, as from a shell or a launcher.
+    A shell or a launcher does so.
     """
 
     def end(rig: Rig) -> None:
@@ -134,9 +129,9 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 
 
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
-    """Unplug the cable and plug it in again. Send SIGINT before the driver has opened the port.
+    """Send SIGINT after the cable was plugged in again, before the driver has opened the port.
 
-    At this time, the robot still follows its last command.
+    The robot still follows its last command.
     """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")

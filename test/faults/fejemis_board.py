@@ -2,8 +2,7 @@
 
 """The Fejemis in the fault campaign: two ports, lines of text with checksums, one robot.
 
-The two boards send at different rates, so messages are not compared with what was sent. The driver
-of this robot has no wheel command and no reset.
+The boards send at different rates. So messages are not compared with what was sent.
 """
 
 import re
@@ -27,8 +26,7 @@ MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.M
 class Pair:
     """Both Teensys, with the interface of a single board. Its ticks are those of the rig.
 
-    ``received``: the motion commands that the drive board has received, without checksums and
-    padding.
+    ``received``: motion commands to the drive board, without checksums and padding.
     """
 
     channels = CHANNELS
@@ -68,9 +66,9 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 
 
 def half_restarts(half: str) -> Any:
-    """Make a case in which one Teensy restarts.
+    """Make a case in which one Teensy has the fault ``what``, and commands have no effect.
 
-    The commander leaves before the restart, because a restarted Teensy obeys at once.
+    ``allowed_s``: how long the robot may still drive. 0: no limit.
     """
 
     def case(rig: Rig) -> None:
@@ -85,12 +83,9 @@ def half_restarts(half: str) -> Any:
 
 
 def half_is(half: str, what: str, allowed_s: float) -> Any:
-    """Make a case in which one Teensy has the fault ``what``.
+    """Make a case in which one Teensy has the fault ``what``. Meanwhile, commands have no effect.
 
-    Until the Teensy works again, commands must have no effect.
-
-    ``allowed_s``: how long the robot may still drive, in s. 0 means no limit: the robot may drive
-    on until the Teensy works again.
+    ``allowed_s``: how long the robot may still drive. 0 means no limit.
     """
 
     def case(rig: Rig) -> None:

@@ -19,10 +19,7 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""The least share of the board's readings that the driver must publish during the random input.
-
-The readings in the 2 s after the input are included.
-"""
+"""The least share of readings that the driver must publish during random input and 2 s after."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 

@@ -2,7 +2,7 @@
 
 """Events that discard a goal of position control. The robot must rest until another command.
 
-Each event returns the board's tick from which the robot must be at rest.
+Each event returns the tick from which the robot must rest.
 """
 
 import signal

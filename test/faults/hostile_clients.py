@@ -133,10 +133,9 @@ def nonsense_for_parameters(rig: Rig) -> None:
 
 
 def limit_lowered(rig: Rig) -> None:
-    """Lower the speed limit to zero while commands continue. The robot must stop at once.
+    """Lower the speed limit to zero while commands continue.
 
-    It must be at rest when the service answers. The duration of the call is not judged, because it
-    includes the search for the service.
+    The robot must be at rest when the service answers.
     """
 
     def limit(mps: float) -> None:

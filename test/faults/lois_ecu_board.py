@@ -2,9 +2,7 @@
 
 """The LOIS ECU in the fault campaign: lines of text, two wheels, no IMU.
 
-The motors obey a command at the board's next control interrupt. These interrupts are 91 ms apart.
-The driver predicts odometry from groups of reports, so messages are not compared with what was
-sent.
+Odometry is predicted from groups of reports. So messages are not compared with what was sent.
 """
 
 from typing import Final

@@ -1,11 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes to the board.
+"""Stops on a line that loses bytes to the board, until the stop is judged.
 
-The loss begins before a stop, and lasts until the stop is judged. Process and pseudo-terminal are
-real, so each stop takes real time. Too few stops are possible to measure the rate of failures.
-test/integrity/outbound.py measures this rate in simulated time. The board of each driver has a
-different receiver.
+Each stop takes real time. test/integrity/outbound.py measures the rate of failures in simulated
+time. Each driver's board has a different receiver.
 """
 
 import signal

@@ -2,9 +2,8 @@
 
 """The MART controller in the fault campaign: datagrams on request, and blocking motions.
 
-The faults are those of a network, which loses, doubles and delays complete datagrams. The driver
-assumes a network with certain limits. The names of some cases say that their fault exceeds these
-limits.
+A network loses, doubles and delays complete datagrams. The names of some cases say that they exceed
+the driver's limits.
 """
 
 import socket

@@ -91,9 +91,7 @@ class Terminal(PtyBoard):
 class Server(RunningBoard):
     """A board behind a serial-port server on the network.
 
-    ``deaf``: whether the server keeps back data to the board.
-
-    ``mute``: whether the server keeps back data from the board.
+    ``deaf``: whether the server keeps back data to the board. ``mute``: from the board.
 
     ``accepted_at``: the board's tick at each connection.
     """

@@ -33,10 +33,9 @@ def sent_imu_key(frame: bytes) -> Key | None:
 
 
 def odom_key(message: Odometry) -> Key | None:
-    """Return the speed and the yaw rate of a message, in 0.1 mm and 0.1 mrad per 40 ms.
+    """Return speed and yaw rate in 0.1 mm and 0.1 mrad per 40 ms. None means unmeasured.
 
-    Both numbers are independent of the robot's heading. Return None if the message marks the speed
-    as unmeasured.
+    Both are independent of the robot's heading.
     """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE

@@ -1,10 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A rig: a real driver process on a breakable line, a commander, and checks of robot and driver.
-
-The checks are: the robot rests in time, the board has sent every published message, odometry does
-not jump, and the process does not grow.
-"""
+"""A rig: a real driver process on a breakable line, a commander, and checks of robot and driver."""
 
 import math
 import os
@@ -39,7 +35,7 @@ DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 """``NEW_VARIANCE``: largest variance of x just after a reset of odometry, in m².
 
-``GAP_MPS2``: assumed acceleration of the robot in a gap of data, in m/s².
+``GAP_MPS2``: assumed acceleration in a gap of data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
 """If one byte in 100 is lost, at most one published message in this number may be wrong."""
@@ -70,19 +66,15 @@ class Findings:
 
 
 class Rig:
-    """Context manager of a driver and its board.
-
-    The driver's port is a symbolic link, as udev makes it.
-
-    ``kind``: the kind of board, which is made with ``settings``.
+    """Context manager of a driver and its board, at a symbolic link as udev makes it.
 
     ``before``: Python code that runs in the driver's process before the driver starts.
 
-    ``grace_s``: additional time that the robot may take to come to rest, in s.
+    ``grace_s``: additional time for the robot to come to rest.
 
-    ``ends_within_s``: how long a driver may take to end, in s.
+    ``ends_within_s``: longest time for a driver's end.
 
-    ``parameters``: further parameters of the driver.
+    ``settings``: of the board. ``parameters``: of the driver.
     """
 
     def __init__(
@@ -203,10 +195,9 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect the motors to go off soon after ``since_tick``, and to stay off.
+        """Expect the motors to be off soon after ``since_tick``, and then for ``REST_TICKS``.
 
-        The motors may still be on for ``allowed_s`` plus the grace time. Then they must be off for
-        ``REST_TICKS``.
+        ``allowed_s``: longest time until then, without the grace time.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)
@@ -269,8 +260,7 @@ class Rig:
     def judge_stream(self, damaged_bytes: bool = False) -> None:
         """Expect that the board has sent every published message, and that odometry does not jump.
 
-        ``damaged_bytes``: whether bytes were lost or added. If so, a few wrong messages are
-        allowed.
+        ``damaged_bytes``: whether a few wrong messages are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

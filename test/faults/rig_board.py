@@ -18,58 +18,48 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``make``: makes a simulated board from settings, or from None.
-
-    ``parameters``: the driver's parameters for this board.
-
-    ``ports``: takes the path of the link to the terminal, and returns the parameters that name the
-    board's ports.
+    ``ports``: takes the path of the link to the terminal. Returns the parameters of the board's
+    ports.
 
     ``old_command``: the bytes of a motion command.
 
-    ``stop``: the last bytes that the board must receive when a driver ends.
+    ``stop``: the last bytes to the board when a driver ends.
 
-    ``opening``: the first bytes that the board must receive on a new line.
+    ``opening``: the first bytes to the board on a new line.
 
-    ``wheels``: the number of values in wheel_cmd.
+    ``wheels``: number of values in wheel_cmd.
 
-    ``services``: the common services that the board's driver has.
+    ``services``: the driver's common services.
 
     ``tuning``: parameters that must refuse invalid values.
 
-    ``off_within_s``: longest allowed time from a stop until the motors are off.
+    ``off_within_s``: longest time from a stop until the motors are off.
 
-    ``old_bytes_s``: how long the board takes to receive all old commands from a full port.
+    ``old_bytes_s``: time in which the board receives all old commands from a full port.
 
-    ``ends_later_s``: additional time that the driver may take to end.
+    ``ends_later_s``: additional time for the end of the driver.
 
-    ``deaf_s``: longest time for which the board may ignore its input. The driver then has to repeat
-    commands.
+    ``deaf_s``: longest time for which the board may ignore its input.
 
     ``silent_s``: longest usual pause between two transmissions of the board.
 
-    ``imu``: whether the board has an IMU.
-
-    ``jump_stddevs``: how much predicted odometry may be corrected, in standard deviations of the
-    prediction.
+    ``jump_stddevs``: allowed correction of predicted odometry, in its standard deviations.
 
     ``sent``: returns the frames of the board's last tick.
 
-    ``not_sent``: returns for each kind of message how many published ones were never sent, and how
-    many were published.
+    ``not_sent``: returns (kind of message, number never sent, number published).
 
-    ``lossy``: takes a number, and returns the settings of a board on a line that loses bytes.
+    ``lossy``: takes a number. Returns the settings of a board behind a lossy line.
 
-    ``line``: makes the line. None means a breakable line of bytes.
+    ``line``: None means a breakable line of bytes.
 
-    ``serve``: makes the server of the line. None means a terminal.
+    ``serve``: None means a terminal.
 
-    ``port``: takes a folder, and returns the driver's ``port``.
+    ``port``: takes a folder.
 
-    ``cases``: takes the number of a round, and returns the faults of the round. None means the
-    usual faults of a serial line.
+    ``cases``: takes the number of a round. None means the usual faults of a serial line.
 
-    ``without``: names of the faults and parts of the campaign that do not apply to the board.
+    ``without``: faults and parts of the campaign that do not apply.
     """
 
     name: str

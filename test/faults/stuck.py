@@ -16,11 +16,9 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive while the adapter is stuck for ``seconds``.
+    """Drive while the adapter is stuck for ``seconds``. It then delivers all that it has kept.
 
-    Then the adapter delivers all that it has kept.
-
-    ``mute``: whether the adapter also keeps the data from the board.
+    ``mute``: whether it also keeps the board's data.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -53,8 +51,7 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 def full_for_long(rig: Rig) -> None:
     """Keep the port full for long.
 
-    The driver opens the port again and again, but must report this only once. When the port accepts
-    data, the robot must stop.
+    The driver opens the port repeatedly but reports this once. Later, the robot must stop.
     """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
@@ -70,7 +67,7 @@ def full_for_long(rig: Rig) -> None:
 def estop_into_a_full_port(rig: Rig) -> None:
     """Latch the e-stop while the port is full. The reply must contain a warning.
 
-    When the port accepts data again, the board must get no new motion command before the e-stop.
+    Then no new motion command may precede the e-stop.
     """
     rig.drive()
     rig.hand.leave()

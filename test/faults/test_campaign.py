@@ -51,20 +51,18 @@ def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
 
 
 def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
-    """Faults occur in random order, several at the same time.
+    """Faults occur in random order, several at the same time. The robot rests in time, then obeys.
 
-    The robot rests in time and then obeys.
-
-    ``make faults`` and ``make soak`` run long random walks.
+    ``make soak`` runs a long walk.
     """
     walk(rig, Random(0), steps=6)
     assert not rig.findings.take(), rig.driver.output
 
 
 def test_nothing_was_published_that_was_not_sent(rig: Rig) -> None:
-    """The other tests have caused many faults. Meanwhile, the driver has published nothing false.
+    """Under the faults of the other tests, the driver has published nothing false.
 
-    The board has sent every published message, and the odometry has not jumped.
+    The board has sent every message, and odometry has not jumped.
     """
     rig.judge_stream(damaged_bytes=True)
     assert not rig.findings.take()

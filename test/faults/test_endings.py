@@ -29,10 +29,7 @@ SOME = (
 def test_the_robot_stands_still_however_the_driver_ends(
     ending: Ending, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The driver ends during a drive. The board receives Stop last, and the exit code is right.
-
-    If the driver cannot send Stop, its guard does.
-    """
+    """The driver ends during a drive. The board receives Stop last, and the exit code is right."""
     with Rig(tmp_path, BOARD, before=ending.before, **lenience) as rig:
         ending(rig)
         assert not rig.findings.take(), rig.driver.output

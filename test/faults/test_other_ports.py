@@ -72,11 +72,9 @@ def test_a_goal_is_discarded_and_a_fresh_one_is_pursued(
 
 
 def test_goals_and_faults_in_random_order(goals: GoalRig) -> None:
-    """Some faults occur in random order under position control.
+    """Faults occur in random order under position control.
 
     The robot rests in time and then obeys.
-
-    ``make faults`` and ``make soak`` run long random walks.
     """
     walk(goals, Random(1), steps=3)
     goals.judge_stream(damaged_bytes=True)

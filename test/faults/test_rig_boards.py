@@ -11,11 +11,7 @@ from rig_board import load
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """Every board has faults.
-
-    The names of the faults that it leaves out are names of existing faults. A misspelt name would
-    leave out no fault.
-    """
+    """Every board has faults. The names of the faults that it leaves out exist."""
     kind = load(board)
     own = (kind.cases or survivable)(0)
     assert own.keys() - kind.without

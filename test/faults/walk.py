@@ -2,9 +2,8 @@
 
 """Faults in random order, several of them at the same time, under random commands.
 
-Every few steps the commander leaves. Then the robot must come to rest in time, and the driver must
-be in its usual state. The robot must then obey a fresh command. All faults of the line end when the
-commander leaves. Only a loss of bytes to the board lasts until the robot is at rest.
+Every few steps the commander leaves. All faults end, except the loss of bytes to the board. The
+robot must rest, and then obey a fresh command.
 """
 
 from collections.abc import Callable
@@ -20,7 +19,7 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-A driver that has received no data for a while must first see that the robot moves.
+A driver without data must see the motion first.
 """
 
 

@@ -19,13 +19,11 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 class Bound:
     """The limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``: at most one decoded frame in this number may be wrong, if the chunking
-    keeps the line's idle gaps. None means that no frame may be wrong.
+    ``one_wrong_in_visible``: N of "one decoded frame in N may be wrong". None means no frame.
 
-    ``one_wrong_in_hidden``: the same limit, if the chunking hides the idle gaps.
+    ``one_wrong_in_hidden``: the same, if the chunking hides the line's idle gaps.
 
-    ``delivered``: the least share of the intact frames that must be decoded. 1.0 means all frames
-    after the first two of a stream.
+    ``delivered``: least share of decoded intact frames. 1.0: all after the first two.
 
     ``chunkers``: the chunkings to which the limits apply.
     """
@@ -36,17 +34,14 @@ class Bound:
     chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
-        """Return N of the limit "at most one wrong frame in N", or None if no frame may be wrong.
-
-        N depends on whether the chunking keeps the line's idle gaps.
-        """
+        """Return N of the limit "at most one wrong frame in N". None means no wrong frame."""
         visible = chunker in GAPS_VISIBLE
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded.
 
-        The share is smaller for a chunking in which both adapter and reader are late.
+        It is smaller if adapter and reader are both late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

@@ -2,8 +2,8 @@
 
 """A busy computer: the line is undamaged, but the reading process runs late.
 
-When the process runs, a read returns all data that has arrived. A chunker of this module takes the
-pieces that an adapter delivers. It returns the end and the time of each read. All times are in s.
+A chunker takes the pieces that an adapter delivers. It returns the end and the time of each read,
+in s.
 """
 
 from bisect import bisect_right

@@ -117,10 +117,9 @@ def single_bytes(received: Received, random: Random) -> Chunks:
 
 
 def few_bytes(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of one to eight bytes, each when its last byte arrives.
+    """Deliver pieces of one to eight bytes. A piece may contain a pause of the line.
 
-    A piece may contain a pause of the line. But no byte waits for more than 16 ms, as with any
-    adapter.
+    Adapters keep no byte for more than 16 ms.
     """
     times, chunks, at = received.times_s, [], 0
     while at < len(times):

@@ -4,10 +4,8 @@
 
     PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-The velocity of a robot that obeys is between rest and its command. A reaction time begins with the
-first tick in which the velocity is 0.05 m/s or 0.15 rad/s outside this range. It ends when the
-driver sends Stop. The reaction time depends on how soon the next displacement follows. The table
-has the shortest and the longest time over all phases of the displacements.
+A reaction begins when the velocity leaves the allowed range by 0.05 m/s or 0.15 rad/s. The range is
+from rest to the command. The reaction ends with Stop.
 """
 
 from collections.abc import Callable
@@ -41,9 +39,9 @@ def robot(**settings: object) -> Callable[[float], Bench]:
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Let a robot obey ``command``, then force ``motion`` on it.
+    """Force ``motion`` on a robot that obeys ``command``.
 
-    Return the time in s from the beginning of this motion until the driver sends Stop.
+    Return the time in s until the driver sends Stop.
     """
     if any(command):
         for _ in range(15):
@@ -66,10 +64,7 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Measure the reaction time for each phase of the displacements, and print a row of the table.
-
-    The row has the shortest and the longest time.
-    """
+    """Print a row: the shortest and longest reaction time over all phases of the displacements."""
     shown = []
     for period_s in PERIODS_S:
         times = []

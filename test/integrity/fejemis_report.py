@@ -2,10 +2,8 @@
 
 """Integrity of the Fejemis's published values on lines with faults (``make integrity``).
 
-A session drives a simulated pair of boards in curves. The boards share no code with the driver.
-Other sessions then get the bytes of both boards, undamaged and damaged. A value is wrong if the
-session with undamaged lines did not publish it. Odometry after a lost value always differs a
-little. So odometry is judged by its distance from the odometry with undamaged lines.
+The simulated boards share no code with the driver. A value is wrong if the session with undamaged
+lines did not publish it. Odometry always differs after a loss, so its distance is judged.
 """
 
 from bisect import bisect_left
@@ -36,9 +34,9 @@ SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""Limits for lines with checksums: the least share of values to deliver, and N, for each fault.
+"""Limits with checksums, by fault: the least share of values, and N.
 
-At most one value in N may be wrong. N = 0 means that none may be wrong.
+At most one value in N may be wrong. N = 0: none.
 """
 ASTRAY_M: Final = 0.02
 
@@ -50,13 +48,11 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``: number of values with undamaged lines.
+    ``sent``: number with undamaged lines. ``out``: with damaged lines.
 
-    ``out``, ``wrong``: number of published values, and of wrong ones among them.
+    ``odometry``: number of compared odometry messages.
 
-    ``odometry``: number of published odometry messages that were compared.
-
-    ``astray_m``: greatest error of the odometry, in m.
+    ``astray_m``: greatest error of the odometry.
     """
 
     sent: int = 0

@@ -13,11 +13,9 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""A match that skips more intact frames than this needs a confirmation.
+"""A match that skips more intact frames than this needs a second match shortly behind.
 
-The judge searches for a decoded frame among the frames that were sent after the previous match. A
-false frame may equal a true frame that was sent much later. So a match that skips many frames needs
-a second match: the next decoded frame must match shortly behind it.
+A false frame may equal a much later true one.
 """
 REACH_BYTES = 600
 """The search for a decoded frame begins this number of bytes before the current read."""
@@ -101,9 +99,9 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
 
 
 def _place(received: Received, key: Key, at: int, horizon: int) -> int:
-    """Return the index of the next frame with this content that begins at ``horizon`` or before.
+    """Return the index of the next frame with this content, up to ``horizon``.
 
-    If the content is not found, return the number of all frames.
+    If it is not found, return the number of frames.
     """
     frames = received.truth.frames
     while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:

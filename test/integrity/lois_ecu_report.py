@@ -2,9 +2,8 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board drives in curves. It shares no code with the driver. The true reports are those
-that the decoder finds on the undamaged line. A report from a damaged line is right if it equals a
-true report after the previous right one. All other reports are wrong.
+The simulated board shares no code with the driver. A report is right if the undamaged line has an
+equal one, after the previous right one.
 """
 
 from collections import Counter
@@ -39,8 +38,7 @@ class Score:
 
     ``sent``: number of reports in the undamaged stream.
 
-    ``lines``, ``lines_out``: number of valid lines of text in the undamaged and in the damaged
-    stream.
+    ``lines``, ``lines_out``: valid lines of text in the undamaged and in the damaged stream.
     """
 
     lines: int = 0
@@ -83,10 +81,7 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
 
 
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
-    """Count the reports of a damaged stream, and the wrong ones among them.
-
-    A report is right if it equals a true report after the previous right one.
-    """
+    """Count the reports of a damaged stream, and the wrong ones among them (see the module)."""
     found, lines_out = decode(stream)
     result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
     left = Counter(map(repr, truth))

@@ -2,10 +2,9 @@
 
 """Errors of the odometry of a LOIS ECU, and NEES, in many simulated drives.
 
-``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. With
-``--nominal``, the wheels have the size that the driver assumes. With ``--gains boot``, the wheel
-controllers keep the gains that the board has after its start. The constants of the odometry were
-chosen with seeds below 4000, so use other seeds to judge them.
+``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. The odometry was
+tuned with seeds below 4000, so use larger ones. ``--nominal``: the wheels have the size that the
+driver assumes. ``--gains boot``: the wheel controllers keep the board's gains.
 """
 
 import argparse

@@ -2,10 +2,8 @@
 
 """Integrity of the values published for a MART controller on a bad network (``make integrity``).
 
-A complete session runs with the simulated controller, in simulated time. The controller shares no
-code with the driver. A pose is wrong if its error is too large for its covariance. If the
-covariances are right, only one pose in 270,000 has such an error. A voltage or a range is wrong if
-it differs from the truth.
+The simulated controller shares no code with the driver. A pose is wrong if its error exceeds
+``WRONG_NEES``. A voltage or a range is wrong if it differs from the truth.
 """
 
 import math
@@ -49,9 +47,9 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""A pose whose squared error, normalized by its covariance, is larger than this is wrong.
+"""A pose is wrong if its squared error, normalized by its covariance, is larger than this.
 
-If the covariances are right, 1 pose in 270,000 exceeds this by chance.
+With right covariances, 1 pose in 270,000 exceeds this.
 """
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
@@ -64,9 +62,7 @@ Otherwise the robot might reach the wall.
 
 @dataclass(slots=True)
 class Score:
-    """Counts of published messages. Scores can be added.
-
-    ``published``, ``wrong``: number of messages of each kind, and of wrong ones among them.
+    """Counts of published messages of each kind. Scores can be added.
 
     ``stood``: number of drives at whose end the robot stood.
     """
@@ -140,9 +136,9 @@ def _watch(bench: MartBench, score: Score) -> None:
 
 
 def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
-    """Return whether a sonar's range agrees with the true distance to the only wall.
+    """Return whether a sonar's range agrees with the true distance to the wall before the start.
 
-    The wall is in front of the start, across x. From 254 inches on, the sonar reports -1.
+    From 254 inches on, the sonar reports -1.
     """
     ahead = math.cos(yaw_rad) if sonar.side == "front" else -math.cos(yaw_rad)
     sees_m = (FRONT_M - x_m) / ahead if ahead > 0.3 else math.inf

@@ -2,10 +2,10 @@
 
 """How often does the motion monitor stop robots that obey? Hours of driving are simulated.
 
-PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
+    PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 
-``--first`` is the seed of the first robot. ``--period`` is the period of the displacements, in s.
-The exit code is 1 when the monitor stopped a robot.
+``--first``: seed of the first robot. ``--period``: period of the displacements, in s. The exit code
+is 1 when a robot was stopped.
 """
 
 import argparse

@@ -2,10 +2,9 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-The real session plays every scene. Its bytes go over a damaged line to every kind of receiver. The
-faults last until the stop of the scene is judged. With ``--share``, only this share of the trials
-runs, and nothing is written. With ``--examples``, the bytes that led to an error are shown. The
-exit code is 1 when any receiver misses a bound.
+The session's bytes go over damaged lines to every kind of receiver. With ``--share``, only this
+share of the trials runs, and nothing is written. ``--examples`` shows bytes that led to errors. The
+exit code is 1 when a bound is missed.
 """
 
 import argparse
@@ -33,16 +32,13 @@ BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Limits of the errors that a damaged line may cause.
+    """Limits of the errors. Stray motion and false letters are never allowed.
 
     ``share``: largest share of the driving time with an uncommanded set-point.
 
-    ``long_in``: at most one frame in this number may lead to an uncommanded set-point of more than
-    2 ms.
+    ``long_in``: one frame in this number may lead to such a set-point for over 2 ms.
 
-    ``overdue``: whether a robot that still drives is an error. If not, it is only reported.
-
-    Stray motion and false letters are never allowed.
+    ``overdue``: whether a robot that still drives is an error. Otherwise it is only reported.
     """
 
     share: float = 1.0

@@ -2,11 +2,8 @@
 
 """What the driver writes in a scene.
 
-The writes are rehearsed once for all trials in which the board shows the same states. The line from
-the board is undamaged. So what the driver writes depends only on what the board shows: its mode,
-and whether the robot moves. A ``Course`` has the session's writes for one sequence of these states.
-When the board shows another state in a trial, the trial continues with another course. That course
-is rehearsed when it is first needed.
+The line to the driver is undamaged. So the writes depend only on the states that the board shows. A
+``Course`` has the writes for one sequence of states, rehearsed when first needed.
 """
 
 from dataclasses import dataclass
@@ -25,9 +22,8 @@ class Understood:
 
     ``held``: the bytes that the receiver holds after each write.
 
-    ``alike_until``: for each write, the index of the next write that is different. Two writes are
-    different if only one of them is a motion. A write is also different if the receiver does not
-    understand it exactly as sent.
+    ``alike_until``: for each write, the index of the next different one. A write differs if only
+    one of both is a motion, or if the receiver misunderstands it.
     """
 
     held: list[bytes]

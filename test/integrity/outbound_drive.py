@@ -2,9 +2,8 @@
 
 """The driver in an outbound trial: what the real session writes, and when.
 
-A ``Scene`` is what the driver has to do. ``rehearse`` runs the session through a scene in simulated
-time, while the board shows given states. When the driver ends, this module acts in place of the
-driver's link and guard.
+``rehearse`` runs the session through a ``Scene`` in simulated time. At the driver's end, this
+module acts in place of its link and guard.
 """
 
 import contextlib
@@ -61,15 +60,15 @@ class Command:
 class Scene:
     """One script of what the driver does. All times are in s.
 
-    ``kind``: the kind of scene, such as "timeout".
+    ``kind``: such as "timeout".
 
     ``wishes``: the calls of the session.
 
     ``ends_s``: the end of the scene.
 
-    ``faults_from_s``: the time from which the line has faults.
+    ``faults_from_s``: the line has faults from this time on.
 
-    ``still_by_s``: the time at which the robot must be at rest.
+    ``still_by_s``: the robot must be at rest at this time.
 
     ``begins``: the state that the board shows at first.
 
@@ -77,15 +76,11 @@ class Scene:
 
     ``rate_hz``: how often the driver repeats a command.
 
-    ``control``: the position of the board's switch.
-
     ``linear_scale``: LSB per m/s.
 
     ``exits_s``, ``killed_s``: the time at which the driver ends or is killed.
 
-    ``guard_after_s``: the delay from the end of the driver until the guard acts.
-
-    ``on_exit``: the driver's parameter of this name.
+    ``guard_after_s``: delay from the driver's end to the guard's action.
     """
 
     kind: str
@@ -172,10 +167,9 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """Act as the link does when the driver ends.
+        """Act as the link does at the driver's end: send Stop until the robot rests, then watch it.
 
-        The link sends Stop until the robot is at rest, and then watches it without writing. If the
-        robot does not come to rest, the guard writes.
+        If the robot does not come to rest, the guard writes.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)

@@ -2,15 +2,12 @@
 
 """The judge of an outbound trial: it compares what the board understood with what the driver sent.
 
-- The driver *drives* from the first byte of a write with a motion frame. It *stands* from the time
-  at which the next frame of another kind should have arrived completely at the board.
-- A set-point is *commanded* if the board understands it while it is one of the control frames in
-  the current or the previous write. It stays commanded until the board understands another frame.
-- Any other set-point that the board understands while the driver drives is *uncommanded*. It stays
-  so until the next commanded set-point, a pause or a reboot.
-- A motion frame that the board understands while the driver stands is *stray*.
-- A letter on which the board acts is *false* if its byte was not sent as a letter. It is *added* if
-  the line has added or changed that byte.
+- The driver *drives* from a write with a motion until the first frame of another kind.
+- A *commanded* set-point is in the current or the previous write.
+- During a drive, all other set-points are *uncommanded*, until a commanded one, a pause or a
+  reboot.
+- A *stray* motion frame is understood while the driver does not drive.
+- A *false* letter was not sent as a letter. The byte of an *added* letter comes from the line.
 """
 
 import math
@@ -29,20 +26,19 @@ _LONGEST: Final = ("stray_s", "longest_s")
 
 @dataclass(slots=True)
 class Score:
-    """Counts and times of trials. Scores can be added. Times are in s.
+    """Counts and times of trials, in s. Scores can be added. The module defines the terms.
 
-    ``strayed``: number of trials with stray motion. ``stray_s``: longest duration of stray motion.
+    ``strayed``: number of trials with stray motion. ``stray_s``: the longest one.
 
     ``overdue``: number of trials in which the robot was driven when it had to be at rest.
 
     ``for_good``: number of trials in which the robot was driven at the end.
 
-    ``driving_s``: time for which the driver drove. ``frames``: number of control frames that it
-    sent meanwhile.
+    ``frames``: number of control frames that were sent in ``driving_s``.
 
-    ``uncommanded_s``, ``uncommanded``: total time and number of uncommanded set-points.
+    ``uncommanded_s``: total time of the ``uncommanded`` set-points.
 
-    ``long``: number of uncommanded set-points longer than LONG_S. ``longest_s``: the longest one.
+    ``long``: number of those above LONG_S. ``longest_s``: the longest one.
     """
 
     trials: int = 0
@@ -150,8 +146,7 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return the name of its error, or "".
 
-        ``at``: the position of its byte in the write. It is negative if the line added or changed
-        the byte.
+        ``at``: position of its byte in the write, or negative for a byte from the line.
         """
         if at < 0:
             self.score.added_letters += 1

@@ -16,7 +16,7 @@ CHANGED: Final = -2
 Arrival = tuple[int, float, int]
 """A byte that arrives: its value, its position in its write, and its origin.
 
-The position of an added byte is a fraction. The origin is the position, or ADDED, or CHANGED.
+Origin: the position, ADDED or CHANGED. Added bytes have fractions as positions.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 
@@ -24,9 +24,8 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes that arrive before the next fault. If a write has at most this number
-    of bytes, the caller only subtracts their number from ``whole``. All other writes go through
-    ``carry``.
+    ``whole``: number of bytes that arrive before the next fault. For a write that is not longer,
+    the caller only subtracts its length. All other writes go through ``carry``.
     """
 
     whole: int

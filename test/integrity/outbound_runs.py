@@ -22,10 +22,9 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. Each script has other commands."""
 NEEDED: Final = 10_000
-"""Number of trials for each receiver and each loss.
+"""Number of trials for each receiver and each loss. The scenes that end a drive share it.
 
-The scenes that end a drive share this number. There is one exception: with 1 byte in 100 lost, each
-scene in ``HURRIES`` has this number of trials.
+Each of ``HURRIES`` has this number at ``AT_HURRIES``.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -101,8 +100,7 @@ def add(total: Scores, more: Scores) -> None:
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
     """Return the sum of the scores of one fault.
 
-    If ``receiver`` is empty, the sum is over all receivers. If ``scene`` is empty, the sum is over
-    all scenes that end a drive.
+    An empty ``receiver`` means all receivers. An empty ``scene`` means all scenes that end a drive.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():

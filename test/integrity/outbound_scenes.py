@@ -2,8 +2,8 @@
 
 """Scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made from a seed. The speeds are random within the limits. Many of them are chosen such
-that a byte of the frame equals a letter or a header byte.
+A scene is made from a seed. Many speeds are chosen such that a byte of the frame equals a letter or
+a header byte.
 """
 
 import math

@@ -2,9 +2,8 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-The board boots, is paused or runs, and its robot moves or is at rest. A moving robot follows the
-last motion frame that was written, at once and without slip. So the driver cannot see that the
-board has received a damaged command.
+A moving robot follows the last motion frame that was written, at once and without slip. So damaged
+commands are invisible to the driver.
 """
 
 import math

@@ -2,9 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board is only a mode and a set-point, without motors. As long as the driver drives, the board
-shows a moving robot. Afterwards, it shows one as long as the set-point is a motion. A change of the
-board's state is visible after one or two ticks. A shorter change is not visible.
+The board is only a mode and a set-point. During a drive it shows a moving robot. A change of its
+state is visible after one or two ticks.
 """
 
 import math
@@ -33,12 +32,10 @@ MEMO: Final = 100_000
 
 Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
-"""Results that were computed before, for one kind of receiver on a running board.
+"""Results for one kind of receiver on a running board.
 
-A key has the bytes that the receiver holds, whether a pause comes next, and the new bytes.
-
-A value has the bytes that the receiver holds afterwards, and the frames. Each frame comes with the
-index of the byte that completes it. The value is None if the board acts on a letter.
+Key: bytes held before, whether a pause follows, new bytes. Value: bytes held, frames with their
+ends. None: a letter.
 """
 
 
@@ -77,8 +74,8 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    The beginning without faults is played only once. Each ``run`` continues from the end of this
-    beginning. Trials with the same kind of receiver may share a ``memo``.
+    The beginning without faults is played once. Each ``run`` continues from its end. Trials with
+    the same kind of receiver may share a ``memo``.
     """
 
     def __init__(self, course: Course, board: BoardKind, memo: Memo) -> None:

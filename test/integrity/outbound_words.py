@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parser of the driver's writes, by the layout in the manual alone.
+"""Parser of the driver's writes, by the layout in the manual alone, without code of the driver.
 
-The parser knows zeros, control frames and letters. It uses no code of the driver.
+It knows zeros, control frames and letters.
 """
 
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ Words = tuple[int, int, int]
 class Items:
     """The control frames and letters in a write.
 
-    ``frames``: for each control frame the offset of its last byte, its mode and its words.
+    ``frames``: the offset of the last byte, the mode and the words of each control frame.
 
-    ``letters``: for each letter its offset and its byte.
+    ``letters``: the offset and the byte of each letter.
 
     ``moves``: whether one of the frames is a motion.
 
-    ``stops``: whether there are frames, and none of them is a motion.
+    ``stops``: whether there are frames, all without motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()

@@ -34,9 +34,9 @@ def driver() -> tuple[Feed, Feed]:
 
 
 def plain() -> tuple[Feed, Feed]:
-    """Make a plain parser. Return the functions that feed and flush it.
+    """Make a parser that checks nothing. Return the functions that feed and flush it.
 
-    At a header, the parser takes as many bytes as a frame of this kind has. It checks nothing.
+    A header fixes the number of bytes to take.
     """
     held = bytearray()
 

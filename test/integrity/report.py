@@ -2,9 +2,8 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-``--seconds`` is the length of a stream, ``--seeds`` the number of seeds, and ``--first`` the first
-seed. The decoder's costs were tuned with seeds from 1000 on. The codecs of other boards are
-measured in other modules. The exit code is 1 when a bound is missed in any scenario.
+``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: the first seed. The
+decoder was tuned with seeds from 1000 on. The exit code is 1 when a bound is missed.
 """
 
 import argparse

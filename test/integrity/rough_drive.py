@@ -1,10 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulated robots that obey, on bad floors and among people.
+"""Simulated robots that obey, on bad floors and among people, in simulated time.
 
-The motion monitor must not stop them. Each robot has its own motors, controllers, scales and line.
-It has 5 % slip and drives on a slope. Its commander changes the way of commanding every few
-seconds. People hold, carry and push the robot. Everything is in simulated time.
+The motion monitor must not stop them. Each robot has its own motors, controllers, scales, line and
+slope. The commander often changes the way of commanding.
 """
 
 import math
@@ -44,9 +43,9 @@ class Outcome:
 
     ``trips``: how and when the motion monitor stopped the robot.
 
-    ``said``: how often the driver gave each message.
+    ``said``: number of each of the driver's messages.
 
-    ``happened``: how often people did each thing.
+    ``happened``: number of each kind of push, hold or carry.
     """
 
     seconds: float = 0.0

@@ -81,10 +81,9 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The last byte of a motion frame is lost. The frame has no effect until the next write.
+    """The last byte of a motion frame is lost. The next write's zeros complete the frame.
 
-    The zeros at the beginning of the next write complete the frame. The frame of this write then
-    replaces it at once.
+    The frame of this write then replaces it.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
@@ -142,9 +141,9 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """The board acts on letters. A letter that was sent is right.
+    """The board acts on letters. A letter that was sent is right, a payload byte is "false".
 
-    A payload byte that acts as a letter is false. A letter that the line has made is "added".
+    A letter from the line is "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)

@@ -2,8 +2,7 @@
 
 """Tests of three shortcuts of the decoder: none of them changes the result.
 
-One shortcut is the quick loop for calm frames. Another is the path for an IMU frame that arrives
-alone. The third one leaves out parts of the trellis.
+They are the quick loop for calm frames, the path for a single IMU frame, and the reduced trellis.
 """
 
 from collections.abc import Sequence
@@ -247,9 +246,9 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """The search has a lower bound of the cost that remains at each node of the trellis.
+    """Each node of the trellis has a lower bound of the remaining cost.
 
-    Along an edge, this bound falls by at most the cost of the edge.
+    Along an edge, this bound falls by at most the edge's cost.
     """
     least = least_costs(data)
     search = trellis._Search(

@@ -2,9 +2,8 @@
 
 """Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
-The generator packs frames with ``struct`` by the layouts of the manual, and uses no code of the
-driver. The sensor noise is that of an MPU6050 with its filter on: about 46 counts of the
-accelerometer and 6.5 counts of the gyro.
+It uses the manual's layouts and no code of the driver. The noise is that of an MPU6050 with its
+filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
 """
 
 import math
@@ -24,7 +23,7 @@ Key = tuple[object, ...]
 class Truth:
     """A true stream: its bytes, their times of arrival in s, and its frames.
 
-    A frame is its content, the index of its first byte, and the index after its last byte.
+    A frame is its content, its first byte's index, and the index after its last byte.
     """
 
     data: bytearray = field(default_factory=bytearray)

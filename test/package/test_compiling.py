@@ -1,9 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``OMNIBOT_DRIVER_COMPILE=1``.
+"""Tests of ``OMNIBOT_DRIVER_COMPILE=1``. If compiling fails, plain Python is installed.
 
-If compiling fails, the package is installed as plain Python. In the tests, a substitute for mypyc
-makes one small C module, because mypyc itself takes a minute. ``make compiled`` runs mypyc.
+A substitute for mypyc makes one small C module. ``make compiled`` runs mypyc, for a minute.
 """
 
 import os

@@ -55,8 +55,7 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
     """Return the position of a wheel, and the velocity of its centre over the floor, in m/s.
 
-    The lowest point of the wheel rests on the floor. Relative to the centre, this point moves with
-    the rim. So the centre moves over the floor with the opposite velocity.
+    The lowest point of the rim does not slide.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -93,10 +92,9 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """The wheels turn at the rates for a twist.
+    """The wheels turn at the rates for a twist. Each rolls as fast as its place on the body.
 
-    Each wheel rolls as fast as the body moves at the wheel's place. Rollers let a wheel slide along
-    its axle, so only velocities in the rolling direction are compared.
+    Only the rolling direction counts, because rollers slide.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -66,10 +66,7 @@ def test_every_link_leads_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_no_row_has_lost_its_table(page: Path) -> None:
-    """All rows of a table follow its heading without a blank line.
-
-    A blank line in a table turns the rows below it into plain text.
-    """
+    """All rows of a table follow its heading without a blank line, which would end the table."""
     text = re.sub(r"^```.*?^```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
         assert re.search(r"\A.*\n\|[-:| ]+\|\n", block), block

@@ -83,8 +83,7 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 def test_what_the_driver_tells_is_explained() -> None:
     """The guide has a row for each message of the driver.
 
-    The row's sentence contains the beginning of the message, or the message contains all parts of
-    the sentence.
+    The row has the message's beginning, or the message contains all parts of the row.
     """
 
     def is_explained(template: str) -> bool:
@@ -144,7 +143,7 @@ def test_every_assumption_has_its_step_and_what_mends_it() -> None:
 def test_the_wheels_turn_as_the_guide_says() -> None:
     """The guide says in which direction each wheel turns for a command. The kinematics agree.
 
-    A wheel with a positive rate turns counter-clockwise, seen from outside the robot.
+    Positive: counter-clockwise, seen from outside the robot.
     """
     kinematics = OmniKinematics(wheel_radius_m=0.029, base_radius_m=0.143)
     expected = {

@@ -67,7 +67,7 @@ Started = dict[str, dict[str, Any]]
 def launch(tmp_path: Path) -> Callable[..., Started]:
     """Return a function that launches a file with recorders instead of the real executables.
 
-    The function returns what each started recorder has recorded: its arguments and parameter files.
+    It returns the arguments and parameter files of each recorder.
     """
     executables = {
         PACKAGE: "driver",
@@ -172,7 +172,7 @@ def test_a_board_without_a_parameter_file_is_refused(
 ) -> None:
     """The launch file offers only boards that have a parameter file.
 
-    For a missing file, launch itself would only warn, and start the node without parameters.
+    For a missing file, launch would only warn, and start the node without parameters.
     """
     for module in ("launch", "launch_ros"):
         for part in (
@@ -243,9 +243,9 @@ def test_the_parameter_file_is_that_of_the_board(
 def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
     launch: Callable[..., Started], tmp_path: Path, file: str
 ) -> None:
-    """The user gives the argument ``board``, and a parameter file without a board.
+    """The argument ``board`` is used beside a parameter file without a board.
 
-    The argument is used. Otherwise the driver would send the OmniBot's frames to another board.
+    Otherwise another board would get the OmniBot's frames.
     """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")

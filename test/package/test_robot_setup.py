@@ -44,7 +44,7 @@ def test_every_rule_matches_before_it_assigns() -> None:
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
     """The file has a rule for each of four adapters. All but one are commented out.
 
-    Each of them makes the link /dev/omnibot, which only the group dialout may use.
+    Each makes the link /dev/omnibot, for the group dialout.
     """
     assert len(OFFERED) == 4
     for rule in OFFERED:
@@ -65,9 +65,9 @@ def test_only_one_adapter_is_taken_for_the_board() -> None:
 
 
 def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
-    """A rule sets the timer of an FTDI adapter to 1 ms instead of 16 ms.
+    """A rule sets an FTDI adapter's timer to 1 ms instead of 16 ms.
 
-    The rule applies as soon as the kernel's driver is bound to the adapter.
+    It applies when the kernel's driver is bound.
     """
     (timer,) = [rule for rule in ACTIVE if "ATTR{latency_timer}" in rule]
     assert timer["DRIVER"] == ("==", "ftdi_sio")

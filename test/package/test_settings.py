@@ -205,10 +205,7 @@ def test_foxglove_shows_topics_and_services_that_exist() -> None:
 
 
 def test_foxglove_lays_out_every_panel_once() -> None:
-    """Each panel in Foxglove's layout has one place, and each place has a panel's settings.
-
-    A panel without a place is not drawn, and a place without settings is empty.
-    """
+    """Each panel in Foxglove's layout has one place, and each place has a panel's settings."""
     layout = json.loads((CONFIG / "foxglove.json").read_text())
     places = list(everything_under("first", layout)) + list(everything_under("second", layout))
     panels = [place for place in places if isinstance(place, str)]

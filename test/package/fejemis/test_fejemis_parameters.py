@@ -27,10 +27,10 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """The driver writes the parameters that are given, in the units of the boards.
+    """The driver writes the given parameters in the units of the boards.
 
-    ``confw`` has the wheel radii, the gear, the encoder ticks and the track width. ``confs`` has
-    the track width and the steering distance. ``fwoffset`` has the front wheel's offset in degrees.
+    ``confw``: radii, gear, ticks, track. ``confs``: track, steering distance. ``fwoffset``:
+    degrees.
     """
     values = check(
         wheel_radii=[0.08, 0.081],

@@ -33,8 +33,7 @@ def load(name: str) -> Any:
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
     """The filter fuses only velocities and the yaw rate of the gyro.
 
-    It fuses no poses and no accelerations. The board's yaw is not fused, because the board computes
-    this yaw from the same gyro.
+    The board's yaw comes from the same gyro, so it is not fused.
     """
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {

@@ -11,7 +11,7 @@ from omnibot_driver.core.errors import ParameterError
 def test_commands_are_slow_in_a_terminal_mode() -> None:
     """In a terminal mode, a command rate above 25 Hz is refused.
 
-    In this mode the public firmware passes commands on to a compass at only 4800 baud.
+    The public firmware passes commands on to a compass at 4800 baud.
     """
     with pytest.raises(ParameterError, match="at most 25 Hz"):
         PARAMETERS.check_all({"terminal_mode": "compass", "command_rate": 30.0})
