@@ -130,10 +130,9 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """A board with few abilities has only the common parameters that it can use.
+    """A board has its own parameters, and only the common parameters that it can use.
 
-    Its profile may change their defaults. The table also has the parameters that only this board
-    has.
+    The board's profile may change common defaults.
     """
     own = table(
         "few",
@@ -202,7 +201,7 @@ def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
 ) -> None:
     """A parameter of another board is refused, and the error names that board.
 
-    An unknown parameter is refused, and the error names the most similar parameter of this board.
+    For an unknown parameter, the error names the most similar one.
     """
     other = SimpleNamespace(PARAMETERS=table("few", FEW, own={"Docking": (OWN,)}))
     monkeypatch.setitem(boards.PROFILES, "few", "few_profile")

@@ -55,7 +55,7 @@ def message_name(message: object) -> str:
 def settings(draw: st.DrawFn) -> MessageSettings:
     """Draw message settings with any noise and with frame names of any length.
 
-    The length of a name decides how the numbers after it are aligned.
+    The length decides how the numbers after the name are aligned.
     """
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
@@ -66,7 +66,7 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 def padded(data: bytes, like: bytes) -> bytes:
     """Return ``data`` with the padding bytes of ``like``, because rclpy may put any bytes there.
 
-    Padding is the bytes between a string's NUL and the next multiple of eight.
+    Padding: from a string's NUL to the next multiple of eight.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):
@@ -140,8 +140,7 @@ def test_a_difference_is_found_at_start(
 ) -> None:
     """A constant part of the driver's messages is wrong.
 
-    The comparison with rclpy at the driver's start finds this. Another test compares messages with
-    varying values.
+    The comparison with rclpy at start finds this.
     """
     monkeypatch.setattr(cdr, name, wrong)
     chosen = MessageSettings.from_parameters(DEFAULTS, omnibot.kinematics(DEFAULTS))

@@ -48,7 +48,7 @@ def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
 def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None:
     """The pipe from the driver to the guard breaks. The guard repeats the stop bytes, then ends.
 
-    It repeats them because the board may not receive the first ones.
+    The first stop bytes may be lost.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.end(stopped=False)
@@ -75,7 +75,7 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
     """The driver changes the stop bytes. Its guard writes the new ones, and so does the next guard.
 
-    The driver changes them because the bytes that stop a board may depend on the board's state.
+    A board's state may decide how it is stopped.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -98,7 +98,7 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """Old commands fill the port's buffer. The guard discards them to make room for the stop bytes.
 
-    The test reads the port only after the guard has ended, so reading does not make the room.
+    The test does not read the port before.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
@@ -118,9 +118,9 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """Signals arrive that usually end a process. The guard ignores them.
+    """The guard ignores signals that usually end a process.
 
-    The guard has its own session, so ctrl-C in the driver's terminal does not reach it.
+    The guard has its own session, so ctrl-C in the driver's terminal does not reach the guard.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
@@ -137,7 +137,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
 ) -> None:
     """``pkill -9 -f omnibot_driver`` kills the driver, but not its guard.
 
-    The guard's command line has no "omnibot", even if the path of the interpreter contains it.
+    The guard's command line has no "omnibot", whatever the interpreter's path.
     """
     interpreter = tmp_path / "omnibot_driver" / ".venv" / "bin" / "python"
     interpreter.parent.mkdir(parents=True)
@@ -179,7 +179,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """A board has two lines, and one of them is gone. The guard still stops the other one.
+    """A board has two lines, and one is gone. The guard stops the other line.
 
     Each line gets only its own stop bytes.
     """
@@ -197,10 +197,7 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """The board's UDP port is closed at first, so sending the stop bytes fails.
-
-    The guard tries again, and the board is stopped when its port opens.
-    """
+    """The board's UDP port is closed at first. The guard repeats the stop bytes until it opens."""
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
     address = host.getsockname()
@@ -229,10 +226,9 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """The guard gets heartbeats and stop bytes through one pipe.
+    """The guard separates heartbeats and stop bytes from one pipe, wherever a read ends.
 
-    The guard separates them correctly, wherever a read ends. Stop bytes may contain the letter
-    ``e``. Alone, this letter means a heartbeat with a latched e-stop.
+    An ``e`` alone means a heartbeat with a latched e-stop.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

@@ -99,9 +99,9 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard hangs and cannot be killed, like a process in uninterruptible sleep.
+    """A guard hangs and cannot be killed.
 
-    The driver starts another guard at once, and reaps the first one later.
+    The driver starts another at once, and reaps the first later.
     """
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -161,7 +161,7 @@ def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
 ) -> None:
     """The guard cannot be killed when the driver ends. The driver does not wait for it.
 
-    In this test, the guard is a suspended process that the driver cannot kill.
+    Here, the guard is a suspended process.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

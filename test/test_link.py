@@ -40,9 +40,9 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """A caller gives one command. The pacer repeats it, and stops the robot after the timeout.
+    """The pacer repeats one command, and stops the robot after the timeout.
 
-    The caller's thread is not needed for this, so it may hang.
+    The caller's thread may hang.
     """
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -63,7 +63,7 @@ def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passe
 ) -> None:
     """The guard gets heartbeats at a fixed rate, although the pacer runs more often.
 
-    The driver recognizes a guard that hangs by the number of its unread heartbeats.
+    The number of unread heartbeats shows that a guard hangs.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -121,7 +121,7 @@ def test_every_read_and_every_write_can_be_listened_to(
 ) -> None:
     """``on_read`` and ``on_write`` get exactly the bytes on the line, also those of the final Stop.
 
-    What the board sent before the port was opened is discarded.
+    What the board sent earlier is discarded.
     """
     end_patiently(monkeypatch)
     read, written = [], []

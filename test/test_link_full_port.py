@@ -33,8 +33,7 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 ) -> None:
     """A write fails because the port is full, so the board may have received half a command.
 
-    The link then opens the port again and repeats its opening sequence before anything else. Even
-    before that, it writes a Stop, because the board may accept data sooner.
+    The link writes Stop, opens the port again, and repeats the opening sequence.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())
@@ -74,7 +73,7 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
     """The port is full when the e-stop is pressed. The link says that it is blocked.
 
-    When there is room again, the link writes the e-stop first.
+    Later, the link writes the e-stop first.
     """
     link, _ours = at_rest(terminal)
     reader, may_open = link._reader, threading.Event()

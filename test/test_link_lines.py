@@ -120,7 +120,7 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
 ) -> None:
     """One of two lines is missing. The link repeats Stop on the other line.
 
-    Both lines are one connection, so motion is refused, and the error names the missing line.
+    Motion is refused, and the error names the missing line.
     """
     lines.link.start()
     lines.drive.read_until(5 * STOPS)
@@ -153,7 +153,7 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 ) -> None:
     """One line disappears while the robot drives, and the link stops the robot.
 
-    When the line is back, the link does not repeat the command from before.
+    When the line is back, the link does not repeat the command.
     """
     lines.connect()
     lines.link.start()
@@ -214,7 +214,6 @@ def ends_at_rest() -> bool:
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
     """A link closes while the robot drives. It waits until odometry proves a standstill.
 
-    Odometry arrives only every 0.4 s. On a busy computer it may be too late, so the test tries
-    again.
+    Odometry comes every 0.4 s. On a busy computer the test tries again.
     """
     assert any(ends_at_rest() for _ in range(5))

@@ -39,8 +39,7 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 ) -> None:
     """The port is missing. The link tries to open it, and waits longer before each new attempt.
 
-    Each wait is 1.5 times as long as the previous one, up to a limit. Because of the limit, a board
-    that is plugged in late is found soon.
+    Each wait is 1.5 times the previous one, up to a limit.
     """
 
     class Timed(Listener):
@@ -66,7 +65,7 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
     """A board is unplugged during a drive and comes back under another device name.
 
-    The link finds it through udev's symbolic link. It does not repeat the command from before.
+    udev's link leads to it. The old command is not repeated.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
@@ -125,10 +124,9 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
-    """The port is lost during a drive, and the driver ends.
+    """The port is lost during a drive. At the driver's end, the port is opened again for a Stop.
 
-    The driver tries to open the port once more for a Stop. The driver knows that this Stop was
-    sent, but that nothing confirms it.
+    The driver knows that nothing confirms this Stop.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()

@@ -101,9 +101,9 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """The driver estimates the offset of two clocks.
+    """A late reading of one clock does not change the estimated offset.
 
-    A late reading of one clock does not change the estimate. A step of a clock changes it.
+    A step of a clock changes it.
     """
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
@@ -113,9 +113,9 @@ def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
 
 
 def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
-    """The pose is in odom, and the twist is in base_link.
+    """The pose is in odom, and the twist in base_link.
 
-    Each covariance is a matrix over x, y, z and three angles, row by row.
+    A covariance is a matrix over x, y, z and three angles, row by row.
     """
     estimate = OdometryEstimate(
         0.0,
@@ -148,8 +148,7 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
     """An unknown twist is zero with a large variance.
 
-    For example, the twist is unknown after a pause, because the first displacement contains the
-    motion of the whole pause.
+    After a pause, for example: the first displacement contains all motion of the pause.
     """
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS
@@ -201,10 +200,9 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
 
 
 def test_joint_states_are_the_manuals_wheels() -> None:
-    """The robot drives 1 m forward at 0.1 m/s.
+    """The robot drives 1 m forward at 0.1 m/s. The wheels have a radius of 29 mm.
 
-    Wheel A turns backwards, B forwards, and C not at all. Angles are in rad and rates in rad/s. The
-    wheels have a radius of 29 mm.
+    A turns backwards, B forwards, C not.
     """
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)

@@ -75,7 +75,7 @@ with UnblockedOutput():
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
     """The output is not read. Python prints a traceback after the context, and this does not block.
 
-    The pipe is exactly full (16 lines), or more output waits for it (100 lines).
+    16 lines fill the pipe exactly.
     """
     program = f"""
 import contextlib, os, time
@@ -111,10 +111,9 @@ raise SystemExit("then the last words")
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
 def test_a_port_never_takes_the_place_of_a_closed_standard_output(closed: str) -> None:
-    """A standard output is closed, so its descriptor is free.
+    """A standard output is closed, so its descriptor is free. An opened port does not get it.
 
-    A port that is opened then does not get this descriptor. Otherwise, printed text would go to the
-    board.
+    Otherwise, printed text would go to the board.
     """
     program = """
 import os, sys

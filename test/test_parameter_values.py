@@ -248,9 +248,9 @@ def test_a_wrong_list_is_refused_with_what_it_may_be(
 
 
 def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
-    """The board itself stores some parameters. Such a parameter is None until the user gives it.
+    """Some parameters are stored by the board. Such a parameter is None until the user gives it.
 
-    Its default only says its type. Other parameters refuse None.
+    Its default only says its type.
     """
     gain = Parameter("gain", 1.0, "1", "A gain.", low=0.0, high=9.0, unset=True)
     assert gain.initial is None

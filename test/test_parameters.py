@@ -192,7 +192,7 @@ def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_contro
 def test_values_reach_the_core_under_their_meaning() -> None:
     """The value of each parameter arrives in the setting that has the same meaning.
 
-    All values differ from their defaults, so the test would find a value in the wrong place.
+    No value is a default, so the test finds misplaced ones.
     """
     values = check_all(
         {
@@ -286,8 +286,7 @@ def test_no_speed_is_commanded_that_odometry_takes_as_impossible(
 ) -> None:
     """A speed limit above the fastest possible speed is refused.
 
-    With such a limit the robot could drive so fast that odometry rejects every displacement.
-    Odometry would stop without a message.
+    Otherwise odometry would reject every displacement of a fast robot, without a message.
     """
     commanded, possible = f"max_{kind}_speed", f"fastest_{kind}_speed"
     assert check_all({commanded: fastest})[commanded] == fastest

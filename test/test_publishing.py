@@ -112,8 +112,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 ) -> None:
     """Measurements are published only after the simulated clock has begun.
 
-    Their stamps increase, even between two steps of that clock. If the clock jumps back, the stamps
-    follow.
+    Their stamps increase between its steps, too. If the clock jumps back, the stamps follow.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
@@ -174,9 +173,9 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """During one read the board pauses and resumes. Another thread publishes the state "paused".
+    """The board pauses and resumes in one read. Another thread publishes the state "paused".
 
-    The last published state must still be the one after the read.
+    The last published state is still the one after the read.
     """
     session, publishing = session_with(node)
     published: list[str] = []

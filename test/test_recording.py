@@ -73,7 +73,7 @@ def test_options_say_how_fast_when_and_what(tmp_path: Path) -> None:
 def test_each_line_of_a_board_with_several_comes_back_as_its_channel(tmp_path: Path) -> None:
     """A bag has two robots with two lines each. The topic of one line selects the robot.
 
-    The replay gives the bytes of each line to the right channel of the board.
+    The bytes of each line reach the right channel.
     """
     path = bag(tmp_path / "bag", *(f"/{who}{RX}/{name}" for who in "ab" for name in ("one", "two")))
     recording = open_recording(f"replay://{path}?topic=/b{RX}/one", ("two", "one"))

@@ -65,7 +65,7 @@ def test_a_sender_of_refused_commands_does_not_pause(
 ) -> None:
     """The motion monitor has stopped the robot, and the sender sends invalid or late commands.
 
-    These do not count as a pause. Only silence for the timeout allows motion again.
+    Only silence for the timeout, not these commands, allows motion again.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -79,9 +79,9 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motion monitor has stopped the robot. A stall then makes the driver refuse commands.
+    """After a stop by the motion monitor, a stall makes the driver refuse commands.
 
-    The refused commands do not count as a pause of their sender.
+    Refused commands are not a pause of their sender.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

@@ -69,10 +69,9 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """The driver stalls three times in a few seconds.
+    """The driver stalls three times. Commands from before the last stall's end are not fresh.
 
-    Commands from before the end of the last stall are not fresh. A retransmission may deliver a
-    command only after a second or third stall.
+    A retransmission may deliver a command after several stalls.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
@@ -102,9 +101,9 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command seems to be sent right after a stall. It may be from the stall, so it is not fresh.
+    """A command that seems to be sent right after a stall is not fresh.
 
-    The driver knows the offset of the sender's clock only to within a message's transit time.
+    The clock of a sender is known only to within a transit time.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
@@ -114,7 +113,7 @@ def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_fro
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
     """A command is sent during a stall and arrives seconds later. It is not fresh.
 
-    Ten seconds after the stall, the detector no longer suspects such commands.
+    Ten seconds after the stall, the detector suspects nothing more.
     """
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
@@ -128,9 +127,9 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
 def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_old(
     step_s: float,
 ) -> None:
-    """NTP steps the clock after a stall. Commands from the stall stay old, and new ones stay fresh.
+    """NTP steps the clock after a stall.
 
-    All of them have send times by the stepped clock.
+    Commands from the stall stay old, and new ones stay fresh.
     """
     standstill = resumed(3.0)
     standstill.passed(103.5, wall_ns(103.5))

@@ -80,7 +80,7 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 ) -> None:
     """The estimated delay never exceeds the true delay, so no command in time is refused.
 
-    The estimate includes the delays in the network and in the driver's queue.
+    The estimate includes the network and the driver's queue.
     """
     receiver, sender, now_s = Receiver(receiver_s), Sender(sender_s), 100.0
     for pause_s, late_s, waits in messages:
@@ -95,9 +95,9 @@ def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apar
 def test_a_command_that_was_under_way_for_longer_is_refused(
     sender_s: float, receiver_s: float, numbered: bool, late_s: float, silent_s: float
 ) -> None:
-    """A sender is silent for a while, and its next command arrives late. The command is refused.
+    """A sender is silent for a while. Its next command arrives late and is refused.
 
-    The next command that arrives in time is accepted.
+    The next command in time is accepted.
     """
     receiver, sender = Receiver(receiver_s), Sender(sender_s, numbered)
     for number in range(10):
@@ -159,9 +159,9 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 
 @given(st.floats(1.0, 1e6))
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
-    """The sender's clock steps forward. Its commands are still accepted.
+    """The sender's clock steps forward.
 
-    Its late commands are still refused, because the driver judges their age by the new clock.
+    Its commands are still accepted, and late ones still refused.
     """
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(100):
@@ -173,9 +173,9 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 
 
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
-    """Single commands arrive late, each after a silence, as key presses on a bad network do.
+    """Single commands arrive late, each after a silence, like key presses on a bad network.
 
-    They are refused. The driver must not conclude that the sender's clock was set back.
+    They are refused. No sender's clock seems to be set back.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
@@ -247,10 +247,9 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """A sender's first message is 0.5 s late, so its clock seems to be 0.5 s behind.
+    """A sender's first message is 0.5 s late, so the sender's clock seems to be behind.
 
-    The clock may also be right. So the driver has two estimates of the next send time: by its own
-    clock, and by the sender's clock. Here the second one is right.
+    The driver has two estimates of the next send time. Here the one by the sender's clock is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -262,7 +261,7 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
     """After ten messages of a sender, the driver has only one estimate of the next send time.
 
-    The estimate is by the driver's own clock. An offset of the sender's clock has no effect on it.
+    An offset of the sender's clock has no effect.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

@@ -2,8 +2,8 @@
 
 """Bounds for the number of Python calls per tick of the nominal stream. Times are not measured.
 
-A bound is a little above the number of calls at the time when it was set. A change that needs more
-calls raises the bound and gives the reason in docs/internals/performance.md.
+A change that needs more calls raises the bound and gives the reason in
+docs/internals/performance.md.
 """
 
 import gc
@@ -96,7 +96,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """The session needs at most ``bound`` calls per tick, from the bytes to its events.
 
-    The link's calls for output and for the next wake-up are included.
+    The link's calls for output and wake-up are included.
     """
     session = opened_session()
 

@@ -66,9 +66,9 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 
 
 def half_restarts(half: str) -> Any:
-    """Make a case in which one Teensy has the fault ``what``, and commands have no effect.
+    """Make a case in which one Teensy restarts.
 
-    ``allowed_s``: how long the robot may still drive. 0: no limit.
+    The commander leaves before the restart, because a restarted Teensy obeys at once.
     """
 
     def case(rig: Rig) -> None:

@@ -54,10 +54,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Fill the kernel's buffer with ``old`` commands, about 20 kB.
+        """Fill the kernel's buffer with ``old`` commands (20 kB), which the board does not read.
 
-        The board does not read them. At the end of the context, wait until the board has received
-        all of them.
+        At the end, wait until the board has received them.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)

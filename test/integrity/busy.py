@@ -2,8 +2,7 @@
 
 """A busy computer: the line is undamaged, but the reading process runs late.
 
-A chunker takes the pieces that an adapter delivers. It returns the end and the time of each read,
-in s.
+A chunker turns the pieces of an adapter into reads: the end and the time of each, in s.
 """
 
 from bisect import bisect_right

@@ -146,7 +146,7 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return the name of its error, or "".
 
-        ``at``: position of its byte in the write, or negative for a byte from the line.
+        ``at``: its position in the write, or negative if the line added or changed it.
         """
         if at < 0:
             self.score.added_letters += 1

@@ -2,8 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board is only a mode and a set-point. During a drive it shows a moving robot. A change of its
-state is visible after one or two ticks.
+The board shows a moving robot while the driver drives. Then the set-point decides. A change of the
+board's state is visible after one or two ticks.
 """
 
 import math
@@ -34,8 +34,8 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Results for one kind of receiver on a running board.
 
-Key: bytes held before, whether a pause follows, new bytes. Value: bytes held, frames with their
-ends. None: a letter.
+Key: held bytes, whether a pause follows them, new bytes. Value: held bytes, frames with their ends.
+None: a letter.
 """
 
 

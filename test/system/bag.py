@@ -68,11 +68,9 @@ def _time(duration: Duration) -> QosTime:
 class Recorder:
     """Records all topics that a driver publishes. It finds the topics at run time.
 
-    ``messages``: the messages of each topic.
+    ``types``: message type by topic, such as "nav_msgs/msg/Odometry".
 
-    ``types``: the message type of each topic, such as "nav_msgs/msg/Odometry".
-
-    ``offered``: the quality of service that the driver offers on each topic.
+    ``offered``: the driver's quality of service by topic.
     """
 
     def __init__(self, probe: Probe) -> None:

@@ -55,8 +55,7 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe of a driver.
 
-    On a busy computer a driver may stall and refuse a command. The probe then publishes its newest
-    message again, as the refusal asks.
+    The probe publishes its newest message again if a stall made the driver refuse it.
     """
 
     def start(driver: Driver) -> Probe:

@@ -2,13 +2,8 @@
 
 """A drive over a bad serial line: the published messages are compared with the board's frames.
 
-``python test/system/drive.py SECONDS --lose 0.001`` runs the driver as a separate process on a
-simulated board and drives curves over ``cmd_vel``. It prints how many messages are wrong, and the
-error of ``odom``.
-
-Every message must match a frame of the board. An Imu matches by its six values. An Odometry matches
-by the length and the turn of its displacement. The pose in an Odometry is compared with the pose of
-the board.
+``python test/system/drive.py SECONDS --lose 0.001`` prints the number of wrong messages, and the
+error of ``odom``. An Imu matches by its values, an Odometry by its displacement's length and turn.
 """
 
 import argparse
@@ -30,9 +25,9 @@ TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
 """Largest distance, in deltas, between a message's own delta and the delta at its timestamp."""
 LONGEST_STALL = 1000
-"""Largest distance, in IMU frames, between a message's own frame and the frame at its timestamp.
+"""Largest distance, in IMU frames, from a message's own frame to the frame at its timestamp.
 
-A stall of the computer may shift the timestamps by this distance.
+A stall of the computer may shift the timestamps.
 """
 
 Triple = tuple[float, float, float]
@@ -42,10 +37,7 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    ``way_m``: length of the path.
-
-    ``imu_sent``, ``odom_sent``: number of frames that the board sent, from the first one that
-    arrived.
+    ``imu_sent``, ``odom_sent``: frames that the board sent from the first arrived one on.
 
     ``imu_wrong``, ``odom_wrong``: number of messages that match no frame.
 
@@ -83,8 +75,7 @@ class Outcome:
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
     """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames.
 
-    ``lose``, ``burst`` and ``flip`` are the fault rates of the line. The caller must have
-    initialised rclpy.
+    ``lose``, ``burst``, ``flip``: the line's fault rates. The caller must have initialised rclpy.
     """
     from driver_process import Driver
     from geometry_msgs.msg import Twist
@@ -183,8 +174,7 @@ def trace(
 ) -> list[int | None]:
     """Return the index of the IMU frame for each message, or None if no frame has its values.
 
-    The noise makes each frame different from all others. A message's frame is searched after the
-    frame of the previous message. The frame that is nearest in time is tried first.
+    Noise makes each frame unique. The nearest in time is tried first.
     """
     found: list[int | None] = []
     at, at_s = -1, stamps_s[0]
@@ -224,11 +214,9 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return three lists with one item for each delta that the board sent.
+    """Return each delta that the board sent, the pose after it, and the last IMU frame's index.
 
-    The first list has the deltas, as three integers. The second has the board's pose after each
-    delta. It is the last pose that the board sent plus the later deltas, at most four, which are
-    rounded. The third has the index of the last IMU frame before each delta.
+    A pose is the last one sent plus at most four later, rounded deltas.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []
@@ -258,10 +246,7 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return the length, in 0.1 mm, and the turn, in 0.1 mrad, of a message's displacement.
-
-    The driver has computed the message's twist from this displacement.
-    """
+    """Return length (0.1 mm) and turn (0.1 mrad) of the displacement in a message's twist."""
     twist = message.twist.twist
     turn = twist.angular.z * PERIOD_S
     shrink = math.sin(turn / 2) / (turn / 2) if turn else 1.0

@@ -2,9 +2,8 @@
 
 """A nursery for driver processes: it imports the driver once and forks a process for each driver.
 
-A driver spends most of its start on imports, and the tests start hundreds of drivers. Each forked
-driver has its own output, environment, arguments and exit code, and runs the usual ``main``. Tests
-of the start itself run a new interpreter instead.
+The imports take most of a start. A forked driver runs the usual ``main`` with its own output,
+environment, arguments and exit code. Tests of the start run a new interpreter.
 """
 
 import atexit
@@ -109,7 +108,7 @@ def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
 def serve(descriptor: int) -> None:
     """Fork a driver for each request that arrives on the socket ``descriptor``.
 
-    When a driver ends, write its exit code to the pipe that came with its request.
+    Its exit code is written to the pipe that came with the request.
     """
     import omnibot_driver.node  # noqa: F401, which takes most of the time
     from omnibot_driver import boards
@@ -162,10 +161,9 @@ def reap(statuses: dict[int, int]) -> None:
 
 
 def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
-    """Run the driver in this forked process.
+    """Run the driver in this forked process. End without the exit handlers of libraries.
 
-    The process ends without the exit handlers of libraries. The handler of LTTng would stop a
-    thread that does not exist after a fork.
+    LTTng's handler would stop a thread that the fork lacks.
     """
     from omnibot_driver import driver
 

@@ -29,12 +29,10 @@ _nursery = Nursery()
 
 
 class Driver:
-    """The driver as a separate process in a namespace.
+    """The driver as a separate process in a namespace, by default an unused one.
 
-    ``before``: Python code that runs before the driver, in a new interpreter. Without such code,
-    the nursery forks the process.
-
-    ``namespace``: the driver's namespace. By default it is an unused one.
+    ``before``: Python code that runs before the driver, in a new interpreter. Without it, the
+    nursery forks the process.
 
     ``more``: further ROS arguments.
     """
@@ -108,9 +106,9 @@ class Driver:
         return line
 
     def end(self, *signals: signal.Signals) -> int:
-        """Send the signals in order, wait until the driver has ended, and return its exit code.
+        """Send the signals in order, and return the driver's exit code.
 
-        After the call, ``lines`` has all output of the driver.
+        ``lines`` then has all output.
         """
         for number in signals:
             self.process.send_signal(number)

@@ -2,9 +2,8 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. The program is a
-separate process because of Fast DDS: a process that was once a client of a server finds nothing
-without a server afterwards.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. A separate process is
+needed: in Fast DDS, a former client finds nothing without a server.
 """
 
 import sys

@@ -2,10 +2,9 @@
 
 """Program that imports the driver once and runs several drivers, each in a separate process.
 
-``python fleet_of_drivers.py NUMBER PREFIX`` runs the drivers ``/PREFIX0``, ``/PREFIX1`` and so on.
-It prints their process ids and ends when its standard input is closed. Each driver has its own DDS
-participant, as on several robots. The drivers' port does not exist, which saves computing time and
-is enough for discovery.
+``python fleet_of_drivers.py NUMBER PREFIX`` runs ``/PREFIX0``, ``/PREFIX1`` and so on, and prints
+their process ids. The program ends when its standard input is closed. The drivers' port does not
+exist.
 """
 
 import os

@@ -2,8 +2,8 @@
 
 """Profile of a board with few features: two wheels and ``cmd_vel``, but no IMU and no pause.
 
-The board uses the OmniBot's protocol and ignores the IMU frames, so a simulated OmniBot can serve
-as the board. The profile has one topic and one service that other boards do not have.
+The protocol is the OmniBot's, so a simulated OmniBot can serve. One topic and one service are the
+profile's own.
 """
 
 from collections.abc import Callable, Mapping

@@ -119,9 +119,8 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again, some seconds later.
 
-        The delay is longer than the driver's stall. It is also longer than ``WARN_EVERY_S``, the
-        driver's shortest interval between two logged refusals. So the probe notices if the driver
-        refuses the message again.
+        The delay exceeds the driver's stall and ``WARN_EVERY_S``. So the driver logs a second
+        refusal.
         """
 
         def publish() -> None:
@@ -167,7 +166,7 @@ class Probe:
     def client(self, kind: type, service: str) -> Any:
         """Return the client of a service. Each client is created only once.
 
-        The middleware never forgets a client, so new ones for each call would accumulate.
+        The middleware never forgets a client.
         """
         if service not in self._clients:
             self._clients[service] = self.node.create_client(

@@ -80,10 +80,7 @@ def test_a_corner_turns_the_robot_to_the_next_side(leg: int, before_m: float, ya
 def test_the_square_closes(
     steer: Any, yaw_at_the_end: int, x_m: float, y_m: float, yaw_rad: float
 ) -> None:
-    """A robot that follows commands with a lag of 0.1 s drives a lap. It passes all four corners.
-
-    At the end it has the right heading.
-    """
+    """A robot that follows commands with a lag of 0.1 s drives a lap through all four corners."""
     pose, leg, step_s, lag_s = Pose(x_m, y_m, yaw_rad), 0, 0.08, 0.1
     moving = BodyTwist(0.0, 0.0, 0.0)
     nearest = [math.inf] * 4
@@ -125,9 +122,9 @@ def test_a_status_row_stands_under_its_heading(
 
 @contextmanager
 def running_demo(**environment: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Run a demo, and yield its process and a mark that all processes of the demo have.
+    """Run a demo. Yield its process and a mark in the environment of all its processes.
 
-    At the end, kill all processes that have the mark in their environment.
+    At the end, kill all processes with the mark.
     """
     mark = uuid.uuid4().hex
     with subprocess.Popen(
@@ -189,9 +186,9 @@ def read_until_it_drives(process: subprocess.Popen[str]) -> None:
 
 
 def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
-    """After 20 s the demo ends with exit code 0 and an odometry error below 10 mm and 2°.
+    """After 20 s the demo ends with code 0. The odometry error is below 10 mm and 2°.
 
-    Four IMU messages arrive for each odometry message, and no process is left.
+    There are four IMU messages per odometry message. No process is left.
     """
     with running_demo(DEMO_SECONDS="20") as (process, mark):
         output, _ = process.communicate(timeout=PATIENCE_S)
@@ -239,8 +236,7 @@ def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
 ) -> None:
     """The demo runs for a robot without an IMU that cannot drive sideways.
 
-    The demo does not mention IMU data, and says that the robot turns at the corners. The command
-    for the real robot names the board.
+    Its text has turns at the corners, no IMU data, and the board's name in the command.
     """
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     page = "docs/boards/cart.md"

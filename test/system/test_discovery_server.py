@@ -62,8 +62,7 @@ def free_udp_port() -> int:
 def test_a_super_client_finds_16_drivers_through_the_server() -> None:
     """16 drivers and an observer are clients of a discovery server. The observer finds all drivers.
 
-    Clients of a server do not use multicast, so the observer finds the drivers only through the
-    server.
+    Clients do not use multicast.
     """
     port = str(free_udp_port())
     environment = {

@@ -8,7 +8,7 @@ from drive import drive
 def test_over_a_bad_line_every_message_is_what_the_board_sent_and_odom_is_its_pose() -> None:
     """The robot drives for 20 s, and its line loses single bytes and bursts.
 
-    At most 3 of 2,500 messages are wrong. ``drive.py`` as a program can run longer.
+    At most 3 of 2,500 messages are wrong.
     """
     outcome = drive(20.0, lose=0.001, burst=0.0005)
     assert outcome.bytes_lost > 100, outcome

@@ -52,9 +52,9 @@ def test_what_a_file_gives_is_named_once(start_driver: Start, tmp_path: Path) ->
 def test_names_that_are_not_read_are_told_with_the_nearest(
     start_driver: Start, tmp_path: Path
 ) -> None:
-    """The calibration file has names that the driver does not read. One warning lists them all.
+    """One warning lists all names in the calibration file that the driver does not read.
 
-    A mistyped name is listed with the nearest known name.
+    For a mistyped name it has the nearest known one.
     """
     path = tmp_path / "robot.yaml"
     path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")

@@ -38,7 +38,7 @@ def newest(board: SimulatedBoard) -> ReceivedCommand:
 def test_cmd_vel_reaches_the_board_as_the_manuals_frame(probe: Probe, board: PtyBoard) -> None:
     """A user commands 0.3 m/s, -0.2 m/s and 0.5 rad/s. The board receives 21, -14 and 250 LSB.
 
-    After the command timeout, the board receives Stop.
+    After the timeout it receives Stop.
     """
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
@@ -65,10 +65,9 @@ omnibot_driver.node.OmniBotDriver._on_estop_topic = hold_up
 def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path, topic: str
 ) -> None:
-    """The driver's executor is blocked while a command arrives, so the command waits for 2 s.
+    """The driver's executor is blocked, so a command waits for 2 s. The driver refuses it.
 
-    The driver refuses the command because of its age since it was sent. The middleware gives the
-    time of sending, so the stamp of a goal has no effect. The driver obeys the next command.
+    The age counts from the sending. A goal's stamp has no effect.
     """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)
@@ -153,9 +152,9 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
 def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     probe: Probe, driver: Driver, board: PtyBoard, data: list[float], reason: str
 ) -> None:
-    """A wheel_cmd has a wrong number of values, or NaN or infinity.
+    """A wheel_cmd with a wrong number of values, NaN or infinity is rejected with a reason.
 
-    The driver rejects this command with a reason, and obeys the next correct one.
+    The next correct one is obeyed.
     """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=data))
@@ -169,10 +168,7 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
     probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
 ) -> None:
-    """A Twist is rejected if any axis has NaN or infinity, even an axis that the driver ignores.
-
-    Such a value shows that the sender is faulty.
-    """
+    """A Twist is rejected if any axis has NaN or infinity, even an axis that the driver ignores."""
     commands = probe.publisher(Twist, "cmd_vel")
     twist = Twist()
     twist.linear.y = 0.3
@@ -235,7 +231,7 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 ) -> None:
     """A stamped command is older than ``cmd_vel_timeout``. The driver refuses it.
 
-    A stamp of zero is not a time. The driver obeys a command with this stamp.
+    A stamp of zero is not a time, so such a command is obeyed.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True)
     probe: Probe = probe_of(driver)
@@ -257,7 +253,7 @@ def test_a_stale_stamped_command_is_refused_with_its_age_and_an_unstamped_one_is
 def test_who_publishes_the_other_type_is_named_once(probe: Probe, driver: Driver) -> None:
     """A node publishes cmd_vel with the wrong message type. The driver warns of it once.
 
-    The middleware does not deliver such commands, and does not report them either.
+    The middleware drops such commands without a report.
     """
     reports = probe.listen(DiagnosticArray, "/diagnostics")
     probe.node.create_publisher(TwistStamped, "cmd_vel", 1)
@@ -284,10 +280,9 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
 def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """The board is under positional control, and a user gives a goal 0.25 m ahead in odom.
+    """Under positional control, a user gives a goal 0.25 m ahead in odom. The robot drives to it.
 
-    The robot drives to the goal, although the board's frame has another origin than odom. Velocity
-    commands are refused.
+    The board's frame has another origin than odom.
     """
     board = start_board(
         control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)

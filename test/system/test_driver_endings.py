@@ -47,8 +47,7 @@ driver.LONGEST_END_S = 50.0
 """
 """Code that sets longer time limits for the driver's end.
 
-A busy computer delays the board's report of a standstill. On an idle computer the report comes
-early, and the limits have no effect.
+A busy computer delays the report of a standstill. On an idle computer nothing changes.
 """
 
 
@@ -95,7 +94,7 @@ atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in e
 """
 """Code that makes the driver print how many executors still run at its exit.
 
-It also makes the driver wait longer for its threads, which a busy computer delays.
+The driver also waits longer for its threads.
 """
 
 
@@ -130,7 +129,7 @@ def test_a_defect_or_a_shutdown_of_ros_while_driving_ends_with_the_stop_frame(
 ) -> None:
     """A callback has a defect, or ROS is shut down, while the robot drives.
 
-    The driver sends Stop last. It exits with code 1 after a defect, and with 0 after a shutdown.
+    The driver sends Stop last. Exit code: 1 (defect), 0 (shutdown).
     """
     board = start_board()
     driver: Driver = start_driver(board.path, before=before, cmd_vel_timeout=10.0)
@@ -186,9 +185,9 @@ def test_the_board_can_be_left_paused_or_reset(
 
 
 def test_a_log_that_nobody_reads_does_not_keep_the_robot_moving(start_board: Start) -> None:
-    """The driver's output is not read, for example because ctrl-S has stopped the terminal.
+    """The driver's output is not read, e.g. after ctrl-S or because a pipe's reader hangs.
 
-    A pipe whose reader hangs has the same effect. Command timeout, e-stop and SIGTERM still work.
+    Command timeout, e-stop and SIGTERM still work.
     """
     board = start_board(running=True)
     reading, writing = os.pipe()

@@ -121,8 +121,7 @@ def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
 ) -> None:
     """The driver hangs while the robot drives, and the guard stops the robot.
 
-    Commands wait in the middleware during the hang. When the driver runs again, it refuses them.
-    Only a command that is sent later moves the robot.
+    Commands from the hang are refused. A later command is obeyed.
     """
     commands = driving(probe, board)
     mark = hang(driver, board)
@@ -165,10 +164,9 @@ CLOCK_BOOTTIME also counts the time for which a host is suspended.
 def test_a_robot_is_stopped_when_its_host_was_suspended(
     board: PtyBoard, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The computer is suspended while the robot drives.
+    """The computer is suspended while the robot drives. Afterwards the driver stops the robot.
 
-    When it resumes, the driver stops the robot. The clock for the command timeout does not advance
-    during a suspension, so the command has not timed out. The driver still discards it.
+    The command has not timed out: the timeout's clock omits the suspension.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
@@ -189,8 +187,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 ) -> None:
     """A stamped command is sent while the driver hangs.
 
-    The driver refuses it, although its stamp is recent. The sender may be a planner that does not
-    know about the hang.
+    The driver refuses it despite its new stamp.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)

@@ -77,9 +77,8 @@ def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Robot]:
 def test_the_gyro_is_calibrated_saved_and_loaded_again(
     robot: Robot, start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """The simulated gyro has a known bias.
+    """``~/calibrate_gyro`` reports the simulated gyro's bias and saves it in the file.
 
-    ``~/calibrate_gyro`` reports the bias and saves it in the file. The driver then subtracts it.
     Another driver loads it from the file.
     """
     planted = [math.radians(value) for value in PLANTED_DPS]
@@ -127,7 +126,7 @@ def test_the_bias_is_what_was_set_last(
 ) -> None:
     """The driver has refined the gyro bias at rest, and the user sets ``gyro_bias``.
 
-    The user's value replaces the refined one, even if the parameter has this value already.
+    The user's value is used, even if the parameter already has it.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
@@ -148,7 +147,7 @@ def test_the_bias_is_what_was_set_last(
 def test_the_wheels_turn_as_they_are_told(robot: Robot) -> None:
     """A user sends wheel_cmd. The wheels in joint_states turn at the commanded rates.
 
-    Order, signs and units are the same. The angles of the wheels grow while the wheels turn.
+    Order, signs and units are the same.
     """
     joints = robot.probe.listen(JointState, "joint_states")
     commands = robot.probe.publisher(Float32MultiArray, "wheel_cmd")
@@ -236,10 +235,9 @@ def test_who_does_not_want_transforms_hears_nothing_of_tf(
 def test_measurements_wait_for_simulated_time_and_it_is_said(
     start_driver: Callable[..., Driver], probe_of: Callable[[Driver], Probe]
 ) -> None:
-    """The parameter ``use_sim_time`` is true, and /clock has no time yet.
+    """With ``use_sim_time``, measurements wait until /clock has a time.
 
-    The driver publishes measurements only when /clock has a time. This also applies to a simulated
-    board, whose own time differs from /clock.
+    A simulated board waits, too, because its own time differs from /clock.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

@@ -126,9 +126,9 @@ OPENS_NOTHING = "import serial; serial.serial_for_url = None"
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int
 ) -> None:
-    """A parameter file is for another node. The driver reports this.
+    """A parameter file is for another node.
 
-    ROS ignores such a file without a message, so the driver would use its default port.
+    ROS ignores it without a message, but the driver reports it.
     """
     path = tmp_path / "driver.yaml"
     path.write_text(f"{first_line}:\n  ros__parameters:\n    port: /dev/null\n")
@@ -227,8 +227,7 @@ def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
 ) -> None:
     """A user sets ``max_linear_speed`` above ``fastest_linear_speed``, the limit of odometry.
 
-    The driver refuses this, whichever of the two parameters is changed, and keeps the old value.
-    One request may raise both parameters. The same holds for the angular speeds.
+    Any such change is refused, also of the angular speeds. One request may raise both.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))

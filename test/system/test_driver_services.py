@@ -70,9 +70,9 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """A button publishes true on ``estop``, and false as soon as the user releases it.
+    """A button publishes true on ``estop``, then false. The driver gets both messages at once.
 
-    The driver is suspended, so all messages wait and arrive together. The e-stop is still latched.
+    The e-stop is still latched.
     """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
@@ -87,7 +87,7 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:
     """A user calls ``~/pause`` twice with the same value. The board keeps the requested mode.
 
-    The command P toggles between running and paused, so the driver sends it only once.
+    The driver sends P only once, because P toggles.
     """
     for data, mode in [
         (True, BoardMode.PAUSED),

@@ -2,8 +2,7 @@
 
 """Tests of two toy boards with the complete driver, on real terminals and sockets.
 
-The toys test the interface for boards. The driver knows them only by profiles that are registered
-under their names.
+The toys test the interface for boards. Each is a registered profile.
 """
 
 import os
@@ -57,7 +56,7 @@ class Toy:
     def comes_to_a_stand(self) -> None:
         """Wait until the robot has been at rest for 1.5 s.
 
-        Some robots also rest between two moves of a drive, but for a shorter time.
+        The rests between two moves of a drive are shorter.
         """
         ways: deque[float] = deque(maxlen=150)
 

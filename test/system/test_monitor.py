@@ -39,8 +39,7 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received the command.
 
-    One press may not be enough. After a stall of the computer the monitor discards a key press as
-    outdated. The monitor may also discover the driver before it discovers the test's subscription.
+    A stall may outdate a press. The subscription may be undiscovered.
     """
     for _ in range(20):
         said.clear()
@@ -126,10 +125,9 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The user presses a key once.
+    """The user presses a key once. The monitor sends a motion, a few zero commands, then nothing.
 
-    The monitor sends a motion, then a few zero commands, then nothing. When the user quits the
-    monitor, it sends another zero command.
+    Another zero command follows when the monitor ends.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")
@@ -157,7 +155,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 ) -> None:
     """A held key moves the robot. The monitor ends by SIGTERM, or its window is closed.
 
-    The monitor stops the robot at its end. The commands are stamped.
+    The monitor stops the robot. Its commands are stamped.
     """
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")
@@ -180,7 +178,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 ) -> None:
     """The monitor is suspended while it steers, so the driver stops the robot.
 
-    The user presses keys. When the monitor resumes, these keys do not move the robot.
+    Keys that were pressed meanwhile do not move it.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

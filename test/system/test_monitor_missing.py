@@ -46,10 +46,9 @@ def measure(fake: Probe, odometry: Odometry) -> None:
 
 
 def test_an_estop_that_nobody_confirms_is_said_again(fake: Probe) -> None:
-    """The service ``~/estop`` is missing.
+    """Without ``~/estop``, the monitor sends the e-stop on the topic ``estop``.
 
-    The monitor sends the e-stop on the topic ``estop`` instead. It repeats the message until the
-    driver reports a latched e-stop.
+    The message is repeated until the driver reports a latched e-stop.
     """
     said = fake.listen(Bool, "estop")
     feed = Feed([], "fake", "omnibot_driver")

@@ -48,7 +48,7 @@ def profiles() -> dict[str, Element]:
 def allowed(profile: Element) -> Rules:
     """Return the full names that a profile allows, as SROS2 expands them.
 
-    ``~`` stands for the node, and a relative name is in the namespace of the profile.
+    ``~`` is the node. Relative names are in the profile's namespace.
     """
     namespace = profile.attrib["ns"].rstrip("/")
     found: Rules = {"publish": set(), "subscribe": set(), "reply": set(), "request": set()}

@@ -29,7 +29,7 @@ Start = Callable[..., Any]
 def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> None:
     """The robot drives straight, turns, drives a curve, and stops when the commands end.
 
-    The pose in odom is then within 2 cm of the truth.
+    Its pose in odom is right within 2 cm.
     """
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
@@ -88,10 +88,9 @@ def test_its_sensors_are_published(
 
 
 def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: Probe) -> None:
-    """A user sets the parameter ``tof_maximum`` to 2, which ``ros2 param set`` sends as an integer.
+    """A user sets the real parameter ``tof_maximum`` to 2. ``ros2 param set`` sends an integer.
 
-    The parameter is a real number, but the driver accepts the integer. It publishes the new
-    maximum.
+    The driver accepts the integer and publishes the new maximum.
     """
     ranges = probe.listen(Range, "range/tof")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=2)
@@ -103,7 +102,7 @@ def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: 
 def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe: Probe) -> None:
     """The user latches the e-stop while brush and lift work. The driver switches both off.
 
-    The release of the e-stop does not switch them on again.
+    Both stay off after the release.
     """
     lift, led = probe.publisher(Float32, "lift_cmd"), probe.publisher(ColorRGBA, "led_cmd")
     led.publish(ColorRGBA(r=1.0, g=0.5, b=0.0, a=1.0))
@@ -160,9 +159,9 @@ def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) 
 
 
 def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None:
-    """A user pauses the robot during a drive. The robot stays at rest, and the state is "paused".
+    """A user pauses the robot during a drive. The robot stays at rest in the state "paused".
 
-    After the pause, only a new command moves the robot.
+    Then only a new command moves the robot.
     """
     with driven(probe, robot):
         assert probe.call(SetBool, "pause", data=True).success

@@ -25,7 +25,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 ) -> None:
     """One half is unplugged during a drive. The driver stops the half that is still connected.
 
-    When the unplugged half is plugged in again, the driver stops it, too. The brush stays off.
+    The unplugged half is stopped at its return. The brush stays off.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):

@@ -51,7 +51,7 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 def test_the_others_are_allowed_what_the_driver_has_and_only_the_operator_calls() -> None:
     """The policy allows other enclaves only topics and services that the driver has.
 
-    Only the operator's enclave is allowed to call services and to publish lift commands.
+    Only the operator may call services and publish lift commands.
     """
     every = rules()
     driver = every.pop("/omnibot/driver")

@@ -22,10 +22,9 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets from which a replay can recognise both Teensys. They arrive within about 1 s.
+"""Number of packets by which a replay recognises both Teensys (about 1 s).
 
-The test records them while the robot rests. A recording may begin after the Teensys have answered
-the driver's first questions, so the answers may be missing.
+A recording may lack the answers to the driver's first questions.
 """
 
 

@@ -26,9 +26,9 @@ DRIVE, FRONT = 0, 1
 class TwoPorts(RunningBoard[SimulatedFejemis]):
     """A simulated Fejemis on two pseudo-terminals.
 
-    ``ports``: paths of two symbolic links to the terminals, like the links that udev makes.
+    ``ports``: paths of symbolic links to the terminals, as udev makes them.
 
-    ``heard``: bytes that each port has received since it was last plugged in.
+    ``heard``: bytes received by each port since it was last plugged in.
     """
 
     def __init__(self, board: SimulatedFejemis, folder: Path) -> None:

@@ -49,8 +49,7 @@ def test_it_drives_and_odometry_tells_how_far(
 ) -> None:
     """The robot drives 1 m and stops when the commands end. Odometry is within 4 cm of the truth.
 
-    The test sets gains, because the robot swerves with the board's own gains. Other tests measure
-    the swerve in simulated time.
+    With the board's own gains, the robot would swerve.
     """
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")
@@ -106,8 +105,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 ) -> None:
     """A user presses the board's button during a drive. The e-stop is latched, and the robot stops.
 
-    Only the service releases the e-stop, not the button. Before the first press, the driver does
-    not publish the state of the button.
+    Only the service releases the e-stop.
     """
     button = probe.listen(Bool, "estop_button", latched=True)
     latched = probe.listen(Bool, f"{NODE}/estop_active", latched=True)
@@ -127,7 +125,7 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
 def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
     ecu: Ecu, probe: Probe
 ) -> None:
-    """The board restarts after a drive. The driver writes the setting of the low-pass filter again.
+    """The board restarts after a drive. The driver writes the low-pass setting again.
 
     The pose in odom continues from its value before the restart.
     """
@@ -149,8 +147,7 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """A user calls ``~/reset`` after a drive.
 
-    The encoder ticks are then 0, but the pose in odom continues. After the reset the robot drives
-    again.
+    The ticks are then 0, but the pose in odom continues.
     """
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
@@ -164,10 +161,9 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 
 
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
-    """A user sets a gain.
+    """A user sets a gain. The driver writes it to the board, and again after a restart.
 
-    The driver writes it to the board, and again after a restart of the board. The driver does not
-    write gains that the user has not set.
+    Gains that the user has not set are not written.
     """
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)

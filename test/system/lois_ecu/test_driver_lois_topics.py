@@ -41,7 +41,7 @@ def test_gps_time_and_heading_are_published_where_the_board_tells_them(
 ) -> None:
     """The compass shows east, and the declination is 0.1 rad. The heading in ENU is -0.1 rad.
 
-    The position and the time of the GPS receiver are published, too.
+    GPS position and time are published, too.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
@@ -98,8 +98,7 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 ) -> None:
     """A duty arrives while the driver is suspended. The driver refuses it when it runs again.
 
-    The duty is the sender's first message, so the driver does not know the sender's clock yet. The
-    refusal does not depend on this clock.
+    The refusal does not need the sender's clock.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")
@@ -121,8 +120,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 ) -> None:
     """A user sets a terminal mode and then a drive mode. The topics of each mode appear.
 
-    In either terminal mode the public firmware forwards the lines of both sensors, GPS and compass.
-    Here both sensors send at the same time.
+    In either terminal mode the board forwards GPS and compass.
     """
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
@@ -159,10 +157,9 @@ def recorded(robot: Any) -> Path:
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The calibration tool makes a record while the robot drives.
+    """The calibration tool records the ticks of both wheels during a drive. Then the robot rests.
 
-    The file has the ticks of both wheels. After the record, the robot rests. If the driver refuses
-    a record, the tool reports the reason.
+    The tool reports why the driver refuses a record.
     """
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(

@@ -105,7 +105,7 @@ def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[Non
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
     """The robot drives 1 m and stops when the commands end. The pose in odom is right within 1 cm.
 
-    The driver also publishes the battery, the ranges and the docking state.
+    The driver publishes battery, ranges and docking.
     """
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
@@ -228,11 +228,10 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """A user changes ``range_maximum`` and ``dock_distance``.
+    """A user changes ``range_maximum`` and ``dock_distance`` at run time.
 
-    Both take effect while the driver runs. An integer is accepted for a real number. For a distance
-    of 0.1 m the driver requests only 2 inches, because the robot may drive 1.6 times as far as
-    requested.
+    The integer 4 is accepted. For 0.1 m, 2 inches are requested: the robot may drive 1.6 times as
+    far.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
