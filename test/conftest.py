@@ -2,8 +2,8 @@
 
 """Fixtures that all tests share, and the settings of ROS and Hypothesis.
 
-ROS traffic stays within this test run. Hypothesis tries the same examples in every run. ``pytest
---hypothesis-profile exploring`` tries other ones.
+ROS traffic stays within this test run. ``pytest --hypothesis-profile exploring`` tries other
+examples than usual.
 """
 
 import os

@@ -12,9 +12,9 @@ PATIENCE_S = 60.0
 
 
 def fill(descriptor: int, words: bytes = b"x", *, full_s: float = 0.2) -> None:
-    """Write ``words`` repeatedly until the kernel has accepted no more for ``full_s``.
+    """Write ``words`` until the non-blocking descriptor has accepted no more for ``full_s``.
 
-    The descriptor must be non-blocking. The kernel may make room later, so one attempt is too few.
+    The kernel may make room later, so one attempt is too few.
     """
     taken, full = 0, 0
     while full < 100 * full_s:

@@ -98,7 +98,7 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
     """Old commands fill the port's buffer. The guard discards them to make room for the stop bytes.
 
-    The test does not read the port before.
+    The test reads nothing before the guard's end.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     line.fill()
@@ -228,7 +228,7 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
     """The guard separates heartbeats and stop bytes from one pipe, wherever a read ends.
 
-    An ``e`` alone means a heartbeat with a latched e-stop.
+    Stop bytes may contain ``e``, alone a heartbeat with a latched e-stop.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

@@ -31,9 +31,9 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
     terminal: Terminal,
 ) -> None:
-    """A write fails because the port is full, so the board may have received half a command.
+    """A write fails because the port is full. The board may have received half a command.
 
-    The link writes Stop, opens the port again, and repeats the opening sequence.
+    The link writes Stop, then its opening sequence.
     """
     listener = Listener()
     link = link_to(terminal.path, listener, session())

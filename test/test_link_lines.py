@@ -214,6 +214,6 @@ def ends_at_rest() -> bool:
 def test_an_end_waits_until_slow_odometry_shows_that_the_robot_stands() -> None:
     """A link closes while the robot drives. It waits until odometry proves a standstill.
 
-    Odometry comes every 0.4 s. On a busy computer the test tries again.
+    Odometry comes every 0.4 s, or later on a busy computer.
     """
     assert any(ends_at_rest() for _ in range(5))

@@ -39,7 +39,7 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 ) -> None:
     """The port is missing. The link tries to open it, and waits longer before each new attempt.
 
-    Each wait is 1.5 times the previous one, up to a limit.
+    Wait: 1.5 times the previous one, up to a limit.
     """
 
     class Timed(Listener):
@@ -126,7 +126,7 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
     """The port is lost during a drive. At the driver's end, the port is opened again for a Stop.
 
-    The driver knows that nothing confirms this Stop.
+    Nothing confirms this Stop, as the driver knows.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()

@@ -76,7 +76,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
     """The computer is suspended during a drive. When it resumes, the driver stops the robot.
 
-    The steady clock does not count the suspension.
+    The heartbeats' clock does not count the suspension.
     """
     suspended_s = 0.0
     monkeypatch.setattr(

@@ -75,7 +75,7 @@ with UnblockedOutput():
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
     """The output is not read. Python prints a traceback after the context, and this does not block.
 
-    16 lines fill the pipe exactly.
+    The pipe is exactly full (16 lines) or too small (100).
     """
     program = f"""
 import contextlib, os, time

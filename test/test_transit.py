@@ -173,9 +173,9 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 
 
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
-    """Single commands arrive late, each after a silence, like key presses on a bad network.
+    """Single commands arrive late after a silence, like key presses on a bad network.
 
-    They are refused. No sender's clock seems to be set back.
+    They are refused. The sender's clock is not taken as set back.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
@@ -249,7 +249,7 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """A sender's first message is 0.5 s late, so the sender's clock seems to be behind.
 
-    The driver has two estimates of the next send time. Here the one by the sender's clock is right.
+    The driver also estimates by the sender's clock, here rightly.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)

@@ -2,8 +2,7 @@
 
 """Bounds for the number of Python calls per tick of the nominal stream. Times are not measured.
 
-A change that needs more calls raises the bound and gives the reason in
-docs/internals/performance.md.
+If a bound is raised, docs/internals/performance.md gives the reason.
 """
 
 import gc

@@ -86,7 +86,7 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board behind a line. All bytes pass through the line and its damage.
+    """A board behind a damaged line.
 
     ``sent``: what the board sent, before damage.
 

@@ -2,8 +2,7 @@
 
 """A busy computer: busy loops on every core, and an adapter that delivers four bytes at a time.
 
-The line is undamaged. So all that the board sends must be published, and the log must not blame the
-cable.
+The line is undamaged, so no data may be lost.
 """
 
 import math
@@ -29,7 +28,7 @@ TRANSIT: Final = 200
 REACH: Final = 200
 """A message is compared with this number of frames after the previous message's frame.
 
-If none equals the message, the message is wrong.
+The message is wrong if none of these is equal.
 """
 
 

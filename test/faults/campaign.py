@@ -2,8 +2,7 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-With ``--minutes`` it is only a long random walk through the faults. The exit code is 1 when
-anything was wrong.
+With ``--minutes`` it is only a long random walk. The exit code is 1 when anything was wrong.
 """
 
 import argparse
@@ -202,7 +201,7 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test stops on a line that loses bytes to the board, until the last stop has been judged.
 
-        ``number_of_life``: index in LIVES. ``numbers``: of the drivers.
+        ``number_of_life``: index in LIVES. ``numbers``: one per driver.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}

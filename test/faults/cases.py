@@ -2,7 +2,7 @@
 
 """Scripted faults: each occurs while a commander drives the robot, and the robot must then stop.
 
-A case is a function of a rig. Before and after a case, the robot is at rest.
+A case is a function of a rig, whose robot is at rest before and after it.
 """
 
 import signal

@@ -54,13 +54,13 @@ os.close(terminal)
 class Ending:
     """A way to end the driver, and what must follow. The board must always receive Stop last.
 
-    ``before``: Python code that runs in the driver's process before the driver starts.
+    ``before``: Python code that runs in the driver's process before the driver.
 
-    ``allowed_s``: how long the robot may still drive after the ending.
+    ``allowed_s``: how long the robot may still drive.
 
-    ``late_s``: additional time for the end of the process.
+    ``late_s``: additional time for the process.
 
-    ``full``: whether the port is full of old commands.
+    ``full``: whether old commands fill the port.
 
     ``read``: whether the driver ends only when it next reads data.
     """
@@ -100,9 +100,9 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Return an ending that sends these signals to the driver's process group without pauses.
+    """Return an ending that signals the driver's process group, as a shell or a launcher does.
 
-    A shell or a launcher does so.
+    The signals follow without pauses.
     """
 
     def end(rig: Rig) -> None:

@@ -2,7 +2,7 @@
 
 """The Fejemis in the fault campaign: two ports, lines of text with checksums, one robot.
 
-The boards send at different rates. So messages are not compared with what was sent.
+Messages are not compared with what was sent, because the boards send at different rates.
 """
 
 import re
@@ -85,7 +85,7 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy has the fault ``what``. Meanwhile, commands have no effect.
 
-    ``allowed_s``: how long the robot may still drive. 0 means no limit.
+    ``allowed_s``: longest further drive, in s. 0: no limit.
     """
 
     def case(rig: Rig) -> None:

@@ -2,7 +2,7 @@
 
 """The LOIS ECU in the fault campaign: lines of text, two wheels, no IMU.
 
-Odometry is predicted from groups of reports. So messages are not compared with what was sent.
+Messages are not compared with what was sent, because odometry is predicted.
 """
 
 from typing import Final

@@ -3,7 +3,7 @@
 """Stops on a line that loses bytes to the board, until the stop is judged.
 
 Each stop takes real time. test/integrity/outbound.py measures the rate of failures in simulated
-time. Each driver's board has a different receiver.
+time.
 """
 
 import signal

@@ -2,8 +2,7 @@
 
 """The MART controller in the fault campaign: datagrams on request, and blocking motions.
 
-A network loses, doubles and delays complete datagrams. The names of some cases say that they exceed
-the driver's limits.
+The names of some cases say that the network is worse than the driver assumes.
 """
 
 import socket

@@ -90,7 +90,7 @@ class Terminal(PtyBoard):
 class Server(RunningBoard):
     """A board behind a serial-port server on the network.
 
-    ``deaf``: whether the server keeps back data to the board. ``mute``: from the board.
+    ``deaf``, ``mute``: whether the server keeps back data to the board, or from it.
 
     ``accepted_at``: the board's tick at each connection.
     """

@@ -68,13 +68,13 @@ class Findings:
 class Rig:
     """Context manager of a driver and its board, at a symbolic link as udev makes it.
 
-    ``before``: Python code that runs in the driver's process before the driver starts.
+    ``before``: Python code that runs in the driver's process before the driver.
 
-    ``grace_s``: additional time for the robot to come to rest.
+    ``grace_s``: additional time for the robot to rest.
 
     ``ends_within_s``: longest time for a driver's end.
 
-    ``settings``: of the board. ``parameters``: of the driver.
+    ``parameters``: further parameters of the driver.
     """
 
     def __init__(

@@ -18,8 +18,7 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``ports``: takes the path of the link to the terminal. Returns the parameters of the board's
-    ports.
+    ``ports``: takes the terminal's link. Returns the parameters of the board's ports.
 
     ``old_command``: the bytes of a motion command.
 
@@ -27,15 +26,11 @@ class RigBoard:
 
     ``opening``: the first bytes to the board on a new line.
 
-    ``wheels``: number of values in wheel_cmd.
-
-    ``services``: the driver's common services.
-
     ``tuning``: parameters that must refuse invalid values.
 
     ``off_within_s``: longest time from a stop until the motors are off.
 
-    ``old_bytes_s``: time in which the board receives all old commands from a full port.
+    ``old_bytes_s``: time to receive all old commands from a full port.
 
     ``ends_later_s``: additional time for the end of the driver.
 
@@ -49,15 +44,11 @@ class RigBoard:
 
     ``not_sent``: returns (kind of message, number never sent, number published).
 
-    ``lossy``: takes a number. Returns the settings of a board behind a lossy line.
+    ``lossy``: returns the settings of the n-th board behind a lossy line.
 
-    ``line``: None means a breakable line of bytes.
+    ``line``, ``serve``: None means a breakable line of bytes, on a terminal.
 
-    ``serve``: None means a terminal.
-
-    ``port``: takes a folder.
-
-    ``cases``: takes the number of a round. None means the usual faults of a serial line.
+    ``cases``: returns the faults of the n-th round. None: those of a serial line.
 
     ``without``: faults and parts of the campaign that do not apply.
     """

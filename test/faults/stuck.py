@@ -16,9 +16,9 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive while the adapter is stuck for ``seconds``. It then delivers all that it has kept.
+    """Drive while the adapter is stuck for ``seconds`` and keeps the data. Then all data arrives.
 
-    ``mute``: whether it also keeps the board's data.
+    ``mute``: whether the adapter also keeps the board's data.
     """
     rig.drive()
     rig.terminal.deaf = True

@@ -2,8 +2,8 @@
 
 """Faults in random order, several of them at the same time, under random commands.
 
-Every few steps the commander leaves. All faults end, except the loss of bytes to the board. The
-robot must rest, and then obey a fresh command.
+Every few steps the commander leaves. Only a loss of bytes to the board continues. The robot must
+rest, and then obey a fresh command.
 """
 
 from collections.abc import Callable

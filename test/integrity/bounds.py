@@ -23,9 +23,7 @@ class Bound:
 
     ``one_wrong_in_hidden``: the same, if the chunking hides the line's idle gaps.
 
-    ``delivered``: least share of decoded intact frames. 1.0: all after the first two.
-
-    ``chunkers``: the chunkings to which the limits apply.
+    ``delivered``: least share of intact frames. 1.0 means all after the first two.
     """
 
     one_wrong_in_visible: int | None

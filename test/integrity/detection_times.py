@@ -4,8 +4,8 @@
 
     PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-A reaction begins when the velocity leaves the allowed range by 0.05 m/s or 0.15 rad/s. The range is
-from rest to the command. The reaction ends with Stop.
+A reaction begins when the velocity is 0.05 m/s or 0.15 rad/s beyond rest or the command. The
+reaction ends with Stop.
 """
 
 from collections.abc import Callable

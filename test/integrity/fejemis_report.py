@@ -2,8 +2,8 @@
 
 """Integrity of the Fejemis's published values on lines with faults (``make integrity``).
 
-The simulated boards share no code with the driver. A value is wrong if the session with undamaged
-lines did not publish it. Odometry always differs after a loss, so its distance is judged.
+The simulated boards share no code with the driver. The reference for values and odometry is a
+session with undamaged lines.
 """
 
 from bisect import bisect_left
@@ -48,7 +48,7 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``: number with undamaged lines. ``out``: with damaged lines.
+    ``sent``, ``out``: number with undamaged and with damaged lines.
 
     ``odometry``: number of compared odometry messages.
 

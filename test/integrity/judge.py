@@ -15,7 +15,7 @@ Feed = Callable[[bytes, float], list[Key]]
 MOST_DROPPED = 30
 """A match that skips more intact frames than this needs a second match shortly behind.
 
-A false frame may equal a much later true one.
+A false frame may equal a much later true frame.
 """
 REACH_BYTES = 600
 """The search for a decoded frame begins this number of bytes before the current read."""

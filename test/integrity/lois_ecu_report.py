@@ -2,8 +2,8 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board shares no code with the driver. A report is right if the undamaged line has an
-equal one, after the previous right one.
+The simulated board shares no code with the driver. A right report equals a true report after the
+previous right one.
 """
 
 from collections import Counter
@@ -36,7 +36,7 @@ Stream = list[bytes]
 class Score:
     """Counts of decoded lines of text and of reports. Scores can be added.
 
-    ``sent``: number of reports in the undamaged stream.
+    ``sent``: reports in the undamaged stream.
 
     ``lines``, ``lines_out``: valid lines of text in the undamaged and in the damaged stream.
     """

@@ -2,9 +2,9 @@
 
 """Errors of the odometry of a LOIS ECU, and NEES, in many simulated drives.
 
-``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. The odometry was
-tuned with seeds below 4000, so use larger ones. ``--nominal``: the wheels have the size that the
-driver assumes. ``--gains boot``: the wheel controllers keep the board's gains.
+``python test/integrity/lois_odometry.py --drives 50 --seed 5000`` prints a table. Seeds below 4000
+were used for tuning. ``--nominal``: the wheels have the assumed size. ``--gains boot``: the
+controllers keep the board's gains.
 """
 
 import argparse

@@ -3,7 +3,7 @@
 """Integrity of the values published for a MART controller on a bad network (``make integrity``).
 
 The simulated controller shares no code with the driver. A pose is wrong if its error exceeds
-``WRONG_NEES``. A voltage or a range is wrong if it differs from the truth.
+``WRONG_NEES``.
 """
 
 import math

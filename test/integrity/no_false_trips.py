@@ -4,8 +4,8 @@
 
     PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 
-``--first``: seed of the first robot. ``--period``: period of the displacements, in s. The exit code
-is 1 when a robot was stopped.
+``--first``: seed of the first robot. ``--period``: of the displacements, in s. The exit code is 1
+when a robot was stopped.
 """
 
 import argparse

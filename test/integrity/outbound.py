@@ -2,9 +2,8 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-The session's bytes go over damaged lines to every kind of receiver. With ``--share``, only this
-share of the trials runs, and nothing is written. ``--examples`` shows bytes that led to errors. The
-exit code is 1 when a bound is missed.
+``--share``: run only this share of the trials, and write nothing. ``--examples``: show bytes that
+led to errors. The exit code is 1 when a receiver misses a bound.
 """
 
 import argparse
@@ -36,9 +35,9 @@ class Bound:
 
     ``share``: largest share of the driving time with an uncommanded set-point.
 
-    ``long_in``: one frame in this number may lead to such a set-point for over 2 ms.
+    ``long_in``: least number of frames per uncommanded set-point of over 2 ms.
 
-    ``overdue``: whether a robot that still drives is an error. Otherwise it is only reported.
+    ``overdue``: whether a robot that still drives is an error.
     """
 
     share: float = 1.0

@@ -2,8 +2,8 @@
 
 """What the driver writes in a scene.
 
-The line to the driver is undamaged. So the writes depend only on the states that the board shows. A
-``Course`` has the writes for one sequence of states, rehearsed when first needed.
+The writes depend only on the states that the board shows. A ``Course`` has the writes for one
+sequence of states. All trials share it.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ class Understood:
 
     ``held``: the bytes that the receiver holds after each write.
 
-    ``alike_until``: for each write, the index of the next different one. A write differs if only
-    one of both is a motion, or if the receiver misunderstands it.
+    ``alike_until``: for each write, the index of the next different one. A misunderstood write is
+    different, and so is a first or last motion.
     """
 
     held: list[bytes]

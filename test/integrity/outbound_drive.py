@@ -2,8 +2,7 @@
 
 """The driver in an outbound trial: what the real session writes, and when.
 
-``rehearse`` runs the session through a ``Scene`` in simulated time. At the driver's end, this
-module acts in place of its link and guard.
+At the driver's end, this module acts in place of the driver's link and guard.
 """
 
 import contextlib
@@ -64,8 +63,6 @@ class Scene:
 
     ``wishes``: the calls of the session.
 
-    ``ends_s``: the end of the scene.
-
     ``faults_from_s``: the line has faults from this time on.
 
     ``still_by_s``: the robot must be at rest at this time.
@@ -74,11 +71,9 @@ class Scene:
 
     ``run``: whether the driver starts the board.
 
-    ``rate_hz``: how often the driver repeats a command.
-
     ``linear_scale``: LSB per m/s.
 
-    ``exits_s``, ``killed_s``: the time at which the driver ends or is killed.
+    ``exits_s``, ``killed_s``: the time of the driver's end.
 
     ``guard_after_s``: delay from the driver's end to the guard's action.
     """
@@ -169,7 +164,7 @@ class _Rehearsal:
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
         """Act as the link does at the driver's end: send Stop until the robot rests, then watch it.
 
-        If the robot does not come to rest, the guard writes.
+        If the robot keeps moving, the guard writes.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)

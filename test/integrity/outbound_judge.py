@@ -2,12 +2,11 @@
 
 """The judge of an outbound trial: it compares what the board understood with what the driver sent.
 
-- The driver *drives* from a write with a motion until the first frame of another kind.
+- The driver *drives* from a motion write until the first frame of another kind.
 - A *commanded* set-point is in the current or the previous write.
-- During a drive, all other set-points are *uncommanded*, until a commanded one, a pause or a
-  reboot.
-- A *stray* motion frame is understood while the driver does not drive.
-- A *false* letter was not sent as a letter. The byte of an *added* letter comes from the line.
+- An *uncommanded* set-point is in neither. It lasts until a commanded one, a pause or a reboot.
+- A *stray* motion frame is understood outside of a drive.
+- A *false* letter was not sent as a letter. An *added* letter comes from the line.
 """
 
 import math
@@ -28,17 +27,17 @@ _LONGEST: Final = ("stray_s", "longest_s")
 class Score:
     """Counts and times of trials, in s. Scores can be added. The module defines the terms.
 
-    ``strayed``: number of trials with stray motion. ``stray_s``: the longest one.
+    ``strayed``: trials with stray motion. ``stray_s``: the longest one.
 
-    ``overdue``: number of trials in which the robot was driven when it had to be at rest.
+    ``overdue``: trials in which the robot was driven when it had to rest.
 
-    ``for_good``: number of trials in which the robot was driven at the end.
+    ``for_good``: trials in which the robot was driven at the end.
 
-    ``frames``: number of control frames that were sent in ``driving_s``.
+    ``frames``: number of control frames in ``driving_s``.
 
     ``uncommanded_s``: total time of the ``uncommanded`` set-points.
 
-    ``long``: number of those above LONG_S. ``longest_s``: the longest one.
+    ``long``: those above LONG_S. ``longest_s``: the longest one.
     """
 
     trials: int = 0
@@ -146,7 +145,7 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return the name of its error, or "".
 
-        ``at``: its position in the write, or negative if the line added or changed it.
+        ``at``: position in the write. Negative: added or changed by the line.
         """
         if at < 0:
             self.score.added_letters += 1

@@ -24,8 +24,8 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes that arrive before the next fault. For a write that is not longer,
-    the caller only subtracts its length. All other writes go through ``carry``.
+    ``whole``: number of bytes before the next fault. A write of at most this length needs only a
+    subtraction from ``whole``, any other ``carry``.
     """
 
     whole: int

@@ -2,8 +2,7 @@
 
 """Scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made from a seed. Many speeds are chosen such that a byte of the frame equals a letter or
-a header byte.
+A scene is made from a seed. Many speeds contain a letter or a header byte.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-A moving robot follows the last motion frame that was written, at once and without slip. So damaged
-commands are invisible to the driver.
+A robot follows the last motion that was written. So damaged commands are invisible to the driver.
 """
 
 import math

@@ -2,8 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board shows a moving robot while the driver drives. Then the set-point decides. A change of the
-board's state is visible after one or two ticks.
+The board shows a moving robot during a drive or with a motion as the set-point. Changes are visible
+after one or two ticks.
 """
 
 import math
@@ -34,7 +34,7 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Results for one kind of receiver on a running board.
 
-Key: held bytes, whether a pause follows them, new bytes. Value: held bytes, frames with their ends.
+Key: held bytes, whether a pause follows, new bytes. Value: held bytes, frames with their ends.
 None: a letter.
 """
 
@@ -74,8 +74,8 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    The beginning without faults is played once. Each ``run`` continues from its end. Trials with
-    the same kind of receiver may share a ``memo``.
+    Each ``run`` begins at the scene's ``faults_from_s``. Trials with the same kind of receiver may
+    share a ``memo``.
     """
 
     def __init__(self, course: Course, board: BoardKind, memo: Memo) -> None:

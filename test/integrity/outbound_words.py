@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parser of the driver's writes, by the layout in the manual alone, without code of the driver.
-
-It knows zeros, control frames and letters.
-"""
+"""Parser of the driver's writes, by the layout in the manual alone, without code of the driver."""
 
 from dataclasses import dataclass
 
@@ -14,11 +11,9 @@ Words = tuple[int, int, int]
 class Items:
     """The control frames and letters in a write.
 
-    ``frames``: the offset of the last byte, the mode and the words of each control frame.
+    ``frames``: the last byte's offset, the mode and the words of each control frame.
 
     ``letters``: the offset and the byte of each letter.
-
-    ``moves``: whether one of the frames is a motion.
 
     ``stops``: whether there are frames, all without motion.
     """

@@ -2,7 +2,7 @@
 
 """The integrity report: ``make integrity`` writes it into docs/internals/integrity.md.
 
-``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: the first seed. The
+``--seconds``: length of a stream. ``--seeds``: number of seeds. ``--first``: first seed. The
 decoder was tuned with seeds from 1000 on. The exit code is 1 when a bound is missed.
 """
 

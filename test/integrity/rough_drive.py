@@ -2,8 +2,7 @@
 
 """Simulated robots that obey, on bad floors and among people, in simulated time.
 
-The motion monitor must not stop them. Each robot has its own motors, controllers, scales, line and
-slope. The commander often changes the way of commanding.
+The motion monitor must not stop them.
 """
 
 import math
@@ -43,9 +42,7 @@ class Outcome:
 
     ``trips``: how and when the motion monitor stopped the robot.
 
-    ``said``: number of each of the driver's messages.
-
-    ``happened``: number of each kind of push, hold or carry.
+    ``said``: number of each message. ``happened``: number of each of HANDS.
     """
 
     seconds: float = 0.0

@@ -83,7 +83,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
     """The last byte of a motion frame is lost. The next write's zeros complete the frame.
 
-    The frame of this write then replaces it.
+    The frame after these zeros replaces it.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(

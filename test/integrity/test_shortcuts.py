@@ -1,9 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of three shortcuts of the decoder: none of them changes the result.
-
-They are the quick loop for calm frames, the path for a single IMU frame, and the reduced trellis.
-"""
+"""Tests of three shortcuts of the decoder: none of them changes the result."""
 
 from collections.abc import Sequence
 from contextlib import suppress

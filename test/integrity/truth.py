@@ -2,8 +2,8 @@
 
 """Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
-It uses the manual's layouts and no code of the driver. The noise is that of an MPU6050 with its
-filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
+No code of the driver is used. The noise of an MPU6050 with its filter on: 46 LSB (acceleration),
+6.5 LSB (gyro).
 """
 
 import math

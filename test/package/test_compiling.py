@@ -2,7 +2,7 @@
 
 """Tests of ``OMNIBOT_DRIVER_COMPILE=1``. If compiling fails, plain Python is installed.
 
-A substitute for mypyc makes one small C module. ``make compiled`` runs mypyc, for a minute.
+A substitute for mypyc makes one small C module, because mypyc takes a minute.
 """
 
 import os

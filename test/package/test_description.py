@@ -55,7 +55,7 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
     """Return the position of a wheel, and the velocity of its centre over the floor, in m/s.
 
-    The lowest point of the rim does not slide.
+    The wheel's lowest point rests on the floor.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -92,7 +92,7 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """The wheels turn at the rates for a twist. Each rolls as fast as its place on the body.
+    """Wheels at the rates for a twist roll as fast as their places on the body.
 
     Only the rolling direction counts, because rollers slide.
     """

@@ -2,8 +2,7 @@
 
 """Tests of the repository's English: phrases that were hard to read are rejected.
 
-Every text file is searched. A phrase may span a line break. Identifiers are not searched, because
-``_`` is a part of a word.
+Every text file is searched, without identifiers. A phrase may span a line break.
 """
 
 import ast

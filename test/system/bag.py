@@ -66,11 +66,11 @@ def _time(duration: Duration) -> QosTime:
 
 
 class Recorder:
-    """Records all topics that a driver publishes. It finds the topics at run time.
+    """Records all topics that a driver publishes. The topics are found at run time.
 
-    ``types``: message type by topic, such as "nav_msgs/msg/Odometry".
+    ``types``: message types, such as "nav_msgs/msg/Odometry".
 
-    ``offered``: the driver's quality of service by topic.
+    ``offered``: the driver's quality of service.
     """
 
     def __init__(self, probe: Probe) -> None:

@@ -3,7 +3,7 @@
 """A drive over a bad serial line: the published messages are compared with the board's frames.
 
 ``python test/system/drive.py SECONDS --lose 0.001`` prints the number of wrong messages, and the
-error of ``odom``. An Imu matches by its values, an Odometry by its displacement's length and turn.
+error of ``odom``.
 """
 
 import argparse
@@ -37,13 +37,13 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    ``imu_sent``, ``odom_sent``: frames that the board sent from the first arrived one on.
+    ``imu_sent``, ``odom_sent``: frames from the first one that arrived.
 
-    ``imu_wrong``, ``odom_wrong``: number of messages that match no frame.
+    ``imu_wrong``, ``odom_wrong``: messages that match no frame.
 
     ``worst_m``, ``worst_rad``: largest error of ``odom`` against the pose of the board.
 
-    ``last_m``, ``last_rad``: error of ``odom`` in the last message.
+    ``last_m``, ``last_rad``: error in the last message.
     """
 
     seconds: float
@@ -75,7 +75,7 @@ class Outcome:
 def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float = 0.0) -> Outcome:
     """Drive for ``seconds``, rest for 2 s, and compare the messages with the board's frames.
 
-    ``lose``, ``burst``, ``flip``: the line's fault rates. The caller must have initialised rclpy.
+    The caller must have initialised rclpy.
     """
     from driver_process import Driver
     from geometry_msgs.msg import Twist
@@ -174,7 +174,7 @@ def trace(
 ) -> list[int | None]:
     """Return the index of the IMU frame for each message, or None if no frame has its values.
 
-    Noise makes each frame unique. The nearest in time is tried first.
+    Noise makes each frame unique.
     """
     found: list[int | None] = []
     at, at_s = -1, stamps_s[0]
@@ -216,7 +216,7 @@ def board_poses(
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
     """Return each delta that the board sent, the pose after it, and the last IMU frame's index.
 
-    A pose is the last one sent plus at most four later, rounded deltas.
+    A pose may contain up to four rounded deltas.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

@@ -2,8 +2,7 @@
 
 """A nursery for driver processes: it imports the driver once and forks a process for each driver.
 
-The imports take most of a start. A forked driver runs the usual ``main`` with its own output,
-environment, arguments and exit code. Tests of the start run a new interpreter.
+Imports take most of a start. Tests of the start itself run a new interpreter.
 """
 
 import atexit
@@ -108,7 +107,7 @@ def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
 def serve(descriptor: int) -> None:
     """Fork a driver for each request that arrives on the socket ``descriptor``.
 
-    Its exit code is written to the pipe that came with the request.
+    The driver's exit code is written to the pipe from the request.
     """
     import omnibot_driver.node  # noqa: F401, which takes most of the time
     from omnibot_driver import boards

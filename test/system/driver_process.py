@@ -32,7 +32,7 @@ class Driver:
     """The driver as a separate process in a namespace, by default an unused one.
 
     ``before``: Python code that runs before the driver, in a new interpreter. Without it, the
-    nursery forks the process.
+    nursery forks.
 
     ``more``: further ROS arguments.
     """

@@ -2,8 +2,8 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. A separate process is
-needed: in Fast DDS, a former client finds nothing without a server.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. In Fast DDS, a former
+client finds nothing without a server. So this is a separate process.
 """
 
 import sys

@@ -2,8 +2,7 @@
 
 """Profile of a board with few features: two wheels and ``cmd_vel``, but no IMU and no pause.
 
-The protocol is the OmniBot's, so a simulated OmniBot can serve. One topic and one service are the
-profile's own.
+A simulated OmniBot can serve. One topic and one service are the profile's own.
 """
 
 from collections.abc import Callable, Mapping

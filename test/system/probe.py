@@ -119,8 +119,7 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again, some seconds later.
 
-        The delay exceeds the driver's stall and ``WARN_EVERY_S``. So the driver logs a second
-        refusal.
+        The delay exceeds the driver's stall and ``WARN_EVERY_S``. So a second refusal is logged.
         """
 
         def publish() -> None:

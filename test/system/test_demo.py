@@ -188,7 +188,7 @@ def read_until_it_drives(process: subprocess.Popen[str]) -> None:
 def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
     """After 20 s the demo ends with code 0. The odometry error is below 10 mm and 2°.
 
-    There are four IMU messages per odometry message. No process is left.
+    No process is left.
     """
     with running_demo(DEMO_SECONDS="20") as (process, mark):
         output, _ = process.communicate(timeout=PATIENCE_S)
@@ -236,7 +236,7 @@ def test_a_robot_without_an_imu_and_without_sideways_motion_is_told_so(
 ) -> None:
     """The demo runs for a robot without an IMU that cannot drive sideways.
 
-    Its text has turns at the corners, no IMU data, and the board's name in the command.
+    The text mentions turns at the corners, and no IMU data.
     """
     real = "-p board:=cart -p port:=/dev/ttyUSB0"
     page = "docs/boards/cart.md"

@@ -84,7 +84,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 ) -> None:
     """A user asks to delete an optional parameter. The driver refuses.
 
-    Every change reads all parameters, so a deleted one would block every change.
+    Every change reads all parameters, so it would fail without this one.
     """
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))
     deleted = [RosParameter(name="gain", value=ParameterValue())]

@@ -67,7 +67,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 ) -> None:
     """The driver's executor is blocked, so a command waits for 2 s. The driver refuses it.
 
-    The age counts from the sending. A goal's stamp has no effect.
+    A recent stamp of a goal has no effect.
     """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)
@@ -280,9 +280,9 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
 def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Under positional control, a user gives a goal 0.25 m ahead in odom. The robot drives to it.
+    """Under positional control, the robot drives to a goal 0.25 m ahead in odom.
 
-    The board's frame has another origin than odom.
+    The board's frame has another origin. Velocity commands are refused.
     """
     board = start_board(
         control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)

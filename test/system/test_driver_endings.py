@@ -47,7 +47,7 @@ driver.LONGEST_END_S = 50.0
 """
 """Code that sets longer time limits for the driver's end.
 
-A busy computer delays the report of a standstill. On an idle computer nothing changes.
+A busy computer delays the board's report of a standstill. The limits do not delay a test.
 """
 
 

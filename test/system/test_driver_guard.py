@@ -187,7 +187,7 @@ def test_a_stamped_command_that_waited_while_the_driver_hung_is_none_either(
 ) -> None:
     """A stamped command is sent while the driver hangs.
 
-    The driver refuses it despite its new stamp.
+    The driver refuses it despite its recent stamp.
     """
     driver: Driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe: Probe = probe_of(driver)

@@ -96,7 +96,7 @@ def test_an_estop_while_the_board_is_unplugged_says_when_it_is_sent(
 ) -> None:
     """The board is unplugged, and a user calls ``~/estop``.
 
-    The answer says that the stop is sent when the port opens.
+    The answer says that the stop will be sent when the port opens.
     """
     link = tmp_path / "omnibot"
     with PtyBoard(SimulatedBoard(), str(link)):

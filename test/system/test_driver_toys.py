@@ -2,7 +2,7 @@
 
 """Tests of two toy boards with the complete driver, on real terminals and sockets.
 
-The toys test the interface for boards. Each is a registered profile.
+The toys are registered profiles, like any board.
 """
 
 import os

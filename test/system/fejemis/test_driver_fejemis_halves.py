@@ -25,7 +25,7 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 ) -> None:
     """One half is unplugged during a drive. The driver stops the half that is still connected.
 
-    The unplugged half is stopped at its return. The brush stays off.
+    The unplugged half is stopped at its return.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):

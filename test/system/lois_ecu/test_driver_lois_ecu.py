@@ -49,7 +49,7 @@ def test_it_drives_and_odometry_tells_how_far(
 ) -> None:
     """The robot drives 1 m and stops when the commands end. Odometry is within 4 cm of the truth.
 
-    With the board's own gains, the robot would swerve.
+    The board's own gains would cause a swerve.
     """
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")
@@ -163,7 +163,7 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
     """A user sets a gain. The driver writes it to the board, and again after a restart.
 
-    Gains that the user has not set are not written.
+    Unset gains are not written.
     """
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)

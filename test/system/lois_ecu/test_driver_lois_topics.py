@@ -118,10 +118,7 @@ def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
 def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_runs(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A user sets a terminal mode and then a drive mode. The topics of each mode appear.
-
-    In either terminal mode the board forwards GPS and compass.
-    """
+    """A user sets a terminal mode and then a drive mode. The topics of each mode appear."""
     ecu = ecu_of("firmware", stack, running=True)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu"))
     probe.wait_for_state("nominal")

@@ -103,9 +103,9 @@ def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[Non
 
 
 def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
-    """The robot drives 1 m and stops when the commands end. The pose in odom is right within 1 cm.
+    """The robot drives 1 m and stops when the commands end.
 
-    The driver publishes battery, ranges and docking.
+    The pose in odom is right within 1 cm.
     """
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
@@ -228,10 +228,9 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """A user changes ``range_maximum`` and ``dock_distance`` at run time.
+    """A user changes ``range_maximum`` (by an integer) and ``dock_distance``.
 
-    The integer 4 is accepted. For 0.1 m, 2 inches are requested: the robot may drive 1.6 times as
-    far.
+    For 0.1 m, 2 inches are requested: the robot may drive 1.6 times as far.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
