@@ -34,7 +34,7 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Results for one kind of receiver on a running board.
 
-Key: held bytes, whether a pause follows, new bytes. Value: held bytes, frames with their ends.
+Key: held bytes, whether a pause follows, new bytes. Value: held bytes, frames by their last byte.
 None: a letter.
 """
 

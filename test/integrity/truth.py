@@ -2,8 +2,8 @@
 
 """Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
 
-No code of the driver is used. The noise of an MPU6050 with its filter on: 46 LSB (acceleration),
-6.5 LSB (gyro).
+The layouts are the manual's, without code of the driver. The noise of an MPU6050 with its filter
+on: 46 LSB (acceleration), 6.5 LSB (gyro).
 """
 
 import math
