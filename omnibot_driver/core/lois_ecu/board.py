@@ -2,10 +2,8 @@
 
 """Adapter that makes a LOIS ECU a ``Board`` of the driver; ``LoisConversation`` does the work.
 
-Odometry is returned ``odom_rate_hz`` times a second. Between two groups of ticks, it is predicted.
-
-Displacement readings show whether the robot obeys its commands, and whether it is at rest. If the
-board's ticks did not show the motion, such a reading is marked as not measured.
+Between two groups of ticks, the odometry is predicted. If no ticks showed a motion, its
+displacement reading is marked as not measured.
 """
 
 import math
@@ -44,11 +42,11 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Time in s after which a reset is repeated. By then, the wheels have come to rest after a stop,
-and at least four groups of ticks have arrived at the usual period."""
+"""Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four groups
+of ticks have arrived."""
 STEADY_S: Final = 0.3
-"""If the tick counts have not changed for this time in s, the driver treats them as steady. The
-time is longer than the usual period of the ticks."""
+"""Tick counts are steady if unchanged for this time in s. It exceeds the usual period of the
+ticks."""
 
 
 class LoisEcuBoard(Board):
@@ -101,8 +99,7 @@ class LoisEcuBoard(Board):
     def shows_standstill(self) -> bool:
         """Whether the board counts both wheels' ticks now.
 
-        Unchanged ticks prove a standstill only while both are counted. The public firmware counts a
-        wheel's ticks only while its RPM target is positive.
+        The public firmware counts a wheel's ticks only while its RPM target is positive.
         """
         return self._ecu.translation.odometry.counting
 
@@ -283,8 +280,8 @@ class LoisEcuBoard(Board):
     def reset(self) -> Packets:
         """Return Stop and the reset command.
 
-        ``due`` repeats both. The repetitions end when the ticks show the reset, when the robot is
-        driven again, or when both were sent ``RESETS`` times.
+        ``due`` repeats both up to ``RESETS`` times, until the ticks show the reset or the robot
+        drives.
         """
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own

@@ -2,14 +2,9 @@
 
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-The two kinds differ in two ways:
-
-- The public firmware sends odometry directly after each group of ticks, with the command byte of
-  the ticks (0x12). A board as in the manual sends odometry with its own command byte (0x20).
-- The public firmware counts ticks only while a wheel is commanded forward, so its counts never
-  fall. A board as in the manual counts in both directions, so its counts can fall.
-
-This module works on changes of the counts and on the order of groups.
+- Public firmware: odometry follows each group of ticks, with their command byte (0x12). Only wheels
+  commanded forward count.
+- Manual: odometry has its own command byte (0x20). Ticks count in both directions.
 """
 
 from typing import Final
@@ -19,18 +14,18 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""A group of odometry with its own command byte (0x20) shows a board as in the manual, if at least
-this number of groups of ticks arrived without odometry directly after them."""
+"""Number of groups of ticks without odometry directly after them. From this number on, odometry
+with its own command byte shows a board as in the manual."""
 UNCOUNTED_M: Final = 0.06
-"""Distance in m, of both wheels together. If wheels roll backward this far and no count falls, the
-driver concludes that ticks do not count backward."""
+"""Distance in m, both wheels added. If wheels roll backward this far and no count falls, ticks do
+not count backward."""
 
 
 class BoardKind:
     """Kind of the board. It selects how the motion filter ``motion`` models the board.
 
-    ``appends``: whether the board sends odometry directly after its ticks, with their command byte.
-    The public firmware does so.
+    ``appends``: whether odometry follows the ticks with their command byte, as in the public
+    firmware.
     """
 
     def __init__(self, motion: MotionFilter) -> None:

@@ -2,11 +2,8 @@
 
 """Changes from one group of odometry (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware computes its odometry from the speeds of both wheels, in whole RPM. While both
-speeds are equal, the public firmware does not change the position. The velocity in 0x20 is that of
-the last tick.
-
-This module works on groups of odometry, without their times.
+The public firmware uses speeds in whole RPM, each from a wheel's last tick. While both are equal,
+the position does not change.
 """
 
 import math
@@ -23,17 +20,14 @@ MOST_RPM: Final = 150.0
 class Told:
     """Changes that a group of odometry (0x20) reports since the group before.
 
-    ``turned_m``: how much farther the right rim rolled than the left rim, in m.
+    ``turned_m``: distance of the right rim minus that of the left rim.
 
-    ``along_m``: distance that the middle of the axle rolled, in m.
+    ``along_m``: distance of the middle of the axle.
 
     ``still``: whether position and heading are unchanged.
 
-    ``same_velocity``: whether the velocity is unchanged. If ``still`` is true too, neither wheel
-    has ticked, or both wheels have the same speed.
-
-    ``speeds_mps``: speeds of the left and right rim at the last tick, rounded down to whole RPM.
-    None if no wheel speeds in whole RPM give the reported velocity.
+    ``speeds_mps``: speeds of the left and right rim, in whole RPM rounded down. None if no whole
+    RPM fit.
     """
 
     turned_m: float

@@ -2,14 +2,8 @@
 
 """Estimation of the delay with which a group of ticks was read, from the board's time in the group.
 
-The clock of the public firmware stops while the board sends. So it falls behind by 4 to 36 % of
-real time. The missing time can be added: the number of sent lines is known, and each line takes
-about 1.2 ms. The clock of a board as in the manual does not stop. Both models of the clock are
-fitted to the last arrivals, and the better fit is used.
-
-Each fit is a straight line below all arrivals, because a read may be late but never early.
-
-This module works on clock counts, numbers of lines and arrival times.
+Two clock models are fitted, and the better one is used: a clock that always runs (manual), and one
+that stops while the board sends (public firmware).
 """
 
 import math
@@ -23,8 +17,7 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored groups. At the usual period, the board sends them in five seconds. In this time,
-a clock with an error of 100 ppm drifts by 0.5 ms."""
+"""Number of stored groups: usually five seconds, in which an error of 100 ppm adds 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s. A longer delay means that the board has restarted, or that its
@@ -34,8 +27,8 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""If two groups arrive within this time in s, the reader had probably paused, and then read both at
-once. Only the last of such groups is stored, because its delay is the smallest."""
+"""Groups that arrive within this time in s were probably read together after a pause. Only the
+last, with the smallest delay, is stored."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -55,8 +48,8 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival time minus board time, both counted from the first group, in s. The first value
-        is for a clock that always runs, the second for a clock that stops while lines are sent."""
+        """Arrival time minus board time since the first group, in s. First for a clock that always
+        runs, then for one that stops while the board sends."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -70,10 +63,9 @@ class BoardTime:
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
-        """Return the delay in s of ticks that arrive at ``now``.
+        """Return the delay in s, at least 0, of ticks that arrive at ``now``.
 
-        The delay is at least zero. The corrected time, ``now`` minus the delay, is never earlier
-        than the corrected time of the previous call.
+        The time ``now`` minus the delay never decreases from call to call.
         """
         late_s = max(min(self._above_s(counts, unit, now), now - self._taken_s), 0.0)
         self._taken_s = now - late_s
@@ -91,6 +83,8 @@ class BoardTime:
         if abs(arrived_s - passed_s) > LATEST_S + 0.5 * arrived_s:
             self.begin()
             return 0.0
+        # The clock of the public firmware stops while the board sends. So the clock falls behind by
+        # 4 to 36 %, about 1.2 ms for each line.
         for index, sending_s in enumerate((0.0, lines * LINE_S)):
             self._behind_s[index] += arrived_s - passed_s - sending_s
             kept = self._kept[index]
@@ -105,13 +99,11 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height of each point above a straight line that touches the points from below.
-
-    The slope of the line is taken from two points: the lowest point of the first half and the
-    lowest point of the second half.
-    """
+    """Return the height of each point above a straight line that touches the points from below."""
     half = len(kept) // 2
     points = list(kept)
+    # A read may be late but never early, so the line lies below all arrivals. Its slope is that
+    # between the lowest points of both halves.
     first_s, first = min(points[:half], key=itemgetter(1))
     second_s, second = min(points[half:], key=itemgetter(1))
     slope = (second - first) / (second_s - first_s)

@@ -2,9 +2,7 @@
 
 """Encoding of all messages as lines, and decoding of commands and of reports with only one line.
 
-Sources: the ECU's manual, and the public firmware for the order of words within a payload.
-
-``groups`` decodes reports with several lines, and ``record_lines`` decodes records.
+Sources: the ECU's manual; the public firmware for the order of words within a payload.
 """
 
 from collections.abc import Callable
@@ -63,9 +61,9 @@ from omnibot_driver.core.lois_ecu.messages import (
 class Form:
     """One kind of command, with its command byte and its class.
 
-    ``payload``: function that converts the fields of a command to a payload.
+    ``payload``: converts the fields of a command to a payload.
 
-    ``command``: function that converts a payload to a command.
+    ``command``: converts a payload to a command.
     """
 
     code: Code

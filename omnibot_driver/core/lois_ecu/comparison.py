@@ -2,17 +2,8 @@
 
 """Correction of the motion filter: comparison of each report with the filter's expectation.
 
-While the board counts the ticks of a wheel, these ticks are exact, and the count is compared.
-
-While the board does not count, the heading in 0x20 (odometry) is compared instead.
-
-The distance in 0x20 is compared only while the two wheel speeds differ. While the speeds are equal,
-the public firmware does not change its position.
-
-The wheel speeds in 0x20 are compared only after a new tick, because the board keeps reporting the
-last speed of a wheel at rest.
-
-This module works on counts and on changes of 0x20, without the robot's pose.
+While the board counts a wheel's ticks, the count is compared. Otherwise, the changes in 0x20
+(odometry) are compared.
 """
 
 import math
@@ -39,38 +30,35 @@ from omnibot_driver.core.lois_ecu.wheel_motion import (
 )
 
 TICKS_AGE_S: Final = 0.005
-"""Assumed time in s from the board's reading of its counters until the last line of the ticks has
-arrived. For odometry, this time is ``ODOMETRY_AGE_S``."""
+"""Assumed time in s from the board's reading of its counters to the arrival of the ticks' last
+line."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""``TICK_VARIANCE``, ``TURN_VARIANCE``, ``ALONG_VARIANCE``: error variances of a count, of the
-heading in 0x20 (odometry) and of the distance in 0x20. All are in squared ticks."""
+"""``TICK_VARIANCE``, ``TURN_VARIANCE``, ``ALONG_VARIANCE``: error variances of a count, and of
+heading and distance in 0x20 (odometry), in squared ticks."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Largest usual difference between a reported and the expected count, in ticks. Above it, the
-filter assumes that the wheel's speed has changed although its set-point has not."""
+"""Residual of a count, in ticks, above which the wheel's speed has changed without a new
+set-point."""
 SAME_TICKS: Final = 0.6
-"""An unchanged count is used only if it differs from the expected count by at least this number of
-ticks. At a smaller difference, the next tick may not be due yet."""
+"""Smallest residual, in ticks, at which an unchanged count is used. At a smaller one, the next tick
+may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP``, ``LEAP_M``: largest difference between a reported and the expected heading, in standard
-deviations and in m at the rims. If a difference exceeds both limits, the heading is discarded: the
-board has added up an old speed while the wheel was at rest."""
+"""``LEAP``, ``LEAP_M``: limits of a heading's residual, in standard deviations and m at the rims.
+Beyond both, the board has added up an old speed."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""``BLIND_M``, ``SWINGING_M``: standard deviation, in m, that is added to a wheel's distance after
-1 m without ticks. ``SWINGING_M`` is used while the wheel's speed oscillates, because the board
-reports an oscillating speed too seldom."""
+"""``BLIND_M``, ``SWINGING_M``: standard deviation in m that 1 m without ticks adds to a wheel's
+distance. The second is for an oscillating speed."""
 SWERVED_M: Final = 0.05
-"""Standard deviation, in m, that is added to the position after 1 m at an oscillating speed. The
-position is then uncertain even if the distances of the wheels are known."""
+"""Standard deviation in m that 1 m at an oscillating speed adds to the position, in addition to
+``SWINGING_M``."""
 EQUAL_RPM: Final = 3.0
-"""While the board reports equal speeds of both wheels, the true speeds are assumed to differ. This
-is the standard deviation of their difference, in RPM."""
+"""Standard deviation, in RPM, of the difference of two speeds that the board reports as equal."""
 
 
 class Comparison:
@@ -100,13 +88,11 @@ class Comparison:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
-        """Correct the filter by a wheel's count.
+        """Correct the filter by ``ticks`` new ticks of a wheel.
 
-        ``ticks``: number of new ticks of the wheel.
+        ``duration_s``: time since the last group.
 
-        ``duration_s``: time since the last group, in s.
-
-        ``late_s``: how much later than usual the ticks arrived, in s.
+        ``late_s``: how much later than usual the ticks arrived.
         """
         motion, estimate = self._motion, self._motion.filter
         wheel, tick_m = motion.wheels[index], motion.tick_m
@@ -150,9 +136,9 @@ class Comparison:
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
         """Correct the filter by the changes of 0x20 (odometry) since the last group.
 
-        ``duration_s``: time since the last group, in s.
+        ``duration_s``: time since the last group.
 
-        ``late_s``: how much later than usual the group arrived, in s.
+        ``late_s``: how much later than usual the group arrived.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
@@ -164,6 +150,7 @@ class Comparison:
                 motion.shift(index, 0.0, part * math.sqrt(min(rolled_m, 1.0)))
                 for state in (X, Y) if swings else ():
                     motion.filter.disturb([(state, 1.0)], SWERVED_M**2 * min(rolled_m, 1.0))
+        # Neither wheel has ticked, or both wheels have the same speed.
         if told.still and told.same_velocity:
             moved = any(told.speeds_mps or ())
             if moved or max(map(abs, shown)) < CREEPING_RPM * motion.rpm_mps:
@@ -178,6 +165,8 @@ class Comparison:
             return
         left, right = (wheel.course.measured_sign for wheel in motion.wheels)
         differ = abs(shown[1] - shown[0]) > DIFFERING_RPM * motion.rpm_mps
+        # The board keeps reporting the last speed of a wheel at rest. So speeds are compared only
+        # after a tick.
         if any(told.speeds_mps) or left * right <= 0 or (differ and told.still):
             for wheel_speed, speed_mps in zip(self._speeds, told.speeds_mps, strict=True):
                 wheel_speed.take(speed_mps, duration_s)
@@ -185,9 +174,9 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Subtract the distance that was estimated for a wheel while it was in fact at rest.
+        """Subtract the distance that was estimated for a wheel while the wheel was at rest.
 
-        ``index``: 0 for the left wheel, 1 for the right wheel.
+        ``index``: 0 left, 1 right.
         """
         self._speeds[index].come_to_rest()
 
@@ -238,6 +227,7 @@ class Comparison:
         motion, estimate = self._motion, self._motion.filter
         residual = told.along_m - estimate.mean[ALONG]
         variance = ALONG_VARIANCE * motion.tick_m**2 + (rate_mps * pause_s) ** 2 / 12
+        # While both wheel speeds are equal, the public firmware does not change its position.
         whole = motion.differing_mps > DIFFERING_RPM * motion.rpm_mps
         beyond = residual * estimate.mean[ALONG] > 0
         unsure = estimate.variance_of([(ALONG, 1.0)]) + variance

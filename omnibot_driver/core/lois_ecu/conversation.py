@@ -2,11 +2,8 @@
 
 """Conversation with a LOIS ECU: received lines become readings, and orders become lines.
 
-The board reports little about the motion of its wheels, so the odometry also depends on the
-commands. Therefore ``wrote`` must be called for all bytes that are sent to the board.
-
-``translation`` explains what the board sends. ``opening`` explains how settings reach the board,
-and ``outbound`` which set-points are sent.
+The odometry depends on the commands. So ``wrote`` must be called for all bytes that are sent to the
+board.
 """
 
 from collections.abc import Sequence
@@ -175,10 +172,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the ticks show that the robot is at rest after a Stop.
 
-        None if they show nothing.
-
-        Ticks show nothing if none arrived recently. They also show nothing after a backward command
-        or RPM 0/0, because the public firmware then does not count ticks.
+        None without recent ticks, and after a backward command or RPM 0/0: the public firmware then
+        counts none.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -258,27 +253,22 @@ class LoisConversation:
     def emergency_stop(self) -> bytes:
         """Return RPM 0/0. In a terminal mode, return nothing.
 
-        The board does not latch an e-stop. So during an e-stop, the driver sends RPM 0/0 and Stop
-        in turn.
-
-        In a terminal mode, the driver sends only Stop, because the public firmware then reads
-        slowly: it forwards each received character to the sensor, at most 480 a second.
+        In a terminal mode, the driver sends only Stop: the public firmware then reads at most 480
+        characters a second.
         """
         return b"" if self._upkeep.change.terminal else self._lines(outbound.EMERGENCY_STOP)
 
     def velocity(self, twist: BodyTwist) -> bytes:
         """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
 
-        If the velocity rounds to zero, return Stop. Raises CommandRefused while a change of mode,
-        or a terminal mode, forbids motion.
+        Stop if it rounds to zero. Raises CommandRefused while a mode or its change forbids motion.
         """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Return the lines that command the rates of the left and right wheel, in rad/s.
 
-        If both rates round to zero, return Stop. Raises CommandRefused while a change of mode, or a
-        terminal mode, forbids motion.
+        Stop if both round to zero. Raises CommandRefused while a mode or its change forbids motion.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")

@@ -2,15 +2,9 @@
 
 """Decoder that turns a stream of bytes into reports.
 
-A line ends with a line feed and begins at the last ``:`` before it. So a line can be decoded even
-if the end of the line before it is lost. Bytes outside of lines are counted and discarded.
-
-A line that lost or gained characters has a wrong length, so it is discarded. Two lines can become
-one valid line only if fourteen characters in a row are lost: the end of the first line and the
-beginning of the second. The checksum would have to be right too.
-
-This module does not read a clock, and no input raises an error. Between calls, the decoder holds
-fewer than ``LONGEST_LINE`` bytes. It looks at each byte a bounded number of times.
+A line ends with a line feed and begins at the last ``:`` before it. This module does not read a
+clock, and no input raises an error. Between calls, the decoder holds fewer than ``LONGEST_LINE``
+bytes.
 """
 
 from dataclasses import dataclass, field
@@ -32,9 +26,7 @@ class DecoderStatistics:
 
     ``lines``: valid lines.
 
-    ``faults``: pieces of input that were discarded, because they were not a line.
-
-    ``groups``: counters of groups of lines.
+    ``faults``: discarded pieces of input that were not a line.
     """
 
     lines: int = 0
@@ -48,11 +40,9 @@ class LoisDecoder:
 
     ``sum_required``: whether lines without a checksum are discarded.
 
-    ``terminal``: whether the board passes on lines of a sensor. Text is then returned as a report,
-    and is not counted as damage.
+    ``terminal``: whether text is a sensor's line, which is reported instead of counted as damage.
 
-    ``times``: arrival times of the reports that the last call returned. The time of a report is
-    that of its last line, which may be earlier than the call.
+    ``times``: arrival time of the last line of each report of the last call.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:
@@ -106,7 +96,7 @@ class LoisDecoder:
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:
-        """Return the reports that ``data`` completes, in the order in which the board sent them.
+        """Return the reports that ``data`` completes, in the order of sending.
 
         With empty ``data``, return the held report if it has waited long enough.
         """
@@ -140,6 +130,8 @@ class LoisDecoder:
         at = text.rfind(BEGIN)
         line = None
         if at >= 0:
+            # A line that lost characters is too short. Two lines become one only if fourteen
+            # characters in a row are lost.
             line = line_of(text[at:] + END, sum_required=self.sum_required)
         if line is None:
             length = len(text) + 1 + before

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states. A past state is restored if a restart of the board is noticed late.
+"""History of a filter's states, to restore one if a restart of the board is noticed late.
 
 This module works on states and times. It does not know what a state means.
 """
@@ -11,8 +11,7 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 
 KEPT: Final = 32
-"""Number of stored states. It is larger than the number of groups that can arrive before a restart
-of the board is noticed."""
+"""Number of stored states: more than the groups that can arrive before a restart is noticed."""
 
 
 class FilterHistory:
@@ -32,11 +31,9 @@ class FilterHistory:
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """Restore the filter's last stored state from ``then_s`` or earlier.
+        """Restore the last stored state from ``then_s`` or earlier, else the oldest one.
 
-        If all stored states are later, restore the oldest one.
-
-        Return the time of the restored state in s. Return None if no state is stored.
+        Return the time of the restored state in s. None if no state is stored.
         """
         if not self._kept:
             return None

@@ -10,7 +10,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 def pose_covariance(motion: SparseFilter, turn: float) -> Covariance:
     """Return the covariance of x, y and yaw.
 
-    ``turn``: change of the yaw, in rad, if the right wheel rolls 1 m farther than the left wheel.
+    ``turn``: yaw in rad for each m that the right wheel rolls farther than the left.
     """
     matrix = motion.covariance
     left, right = WAY, PER_WHEEL + WAY

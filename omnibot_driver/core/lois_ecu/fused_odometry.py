@@ -18,16 +18,13 @@ at rest."""
 class FusedOdometry:
     """Estimated odometry of the robot at the time ``stamp_s``.
 
-    ``pose``, ``covariance``: in the odometry frame.
-
-    ``twist``: in the body frame.
+    ``pose``, ``covariance``: in the odometry frame. ``twist``: in the body frame.
 
     ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
 
     ``displacement``: motion since the previous estimate, in the robot's axes.
 
-    ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate, in
-    m. They are computed for wheels of nominal size.
+    ``wheel_ways_m``: distances of the board's left and right wheel since then, at nominal size.
     """
 
     stamp_s: float

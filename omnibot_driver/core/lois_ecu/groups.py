@@ -1,26 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assembly of reports that take several lines.
+"""Assembly of reports that take several lines: a marker line, then lines with values.
 
-Such a report is a group: a marker line, then lines with values. A group is returned complete or not
-at all. A lost line makes a group too short. A repeated line makes it too long, and a line of
-another group interrupts it. So usually, only the next line shows whether the group is complete.
-
-A group is returned at once with its last line if two conditions are met:
-
-- No line equals the line before it. So no line was received twice.
-- The values can follow those of the last group.
-
-Any other group is held until the next line comes, or until no line has come for ``QUIET_S``. After
-such a silence, a held group of a valid length is returned. A shorter group continues to wait,
-because its other lines may be read late. It is discarded if the next lines come almost a period
-later, because those lines may belong to the next group.
-
-The command byte 0x12 has two kinds of groups: ticks have 3 lines after the marker, and the odometry
-that the public firmware sends directly after the ticks has 6. A count of -1 looks like a marker.
-The number of lines shows whether such a line is a count or a marker.
-
-Records are assembled in ``record_lines``. This module works on lines and arrival times.
+A group is returned complete or not at all. Records are assembled in ``record_lines``. This module
+works on lines and arrival times.
 """
 
 import math
@@ -52,13 +35,15 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group of a valid length is regarded as complete. The board sends the
-lines of a group 1.2 ms apart, and a reader usually delivers them within this time."""
+"""Silence in s after which a group of a valid length is complete. The board sends a group's lines
+1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest allowed pause within a group, as a fraction of the time between the markers of the
-previous group and of this group. The pause limit is at least ``QUIET_S`` and at most ``LATE_S``."""
+"""Longest pause within a group, as a fraction of the time between the last two markers. The limit
+is at least ``QUIET_S`` and at most ``LATE_S``."""
 
+# Lines after the marker. The public firmware sends odometry (6 lines) with the command byte of the
+# ticks (3 lines).
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
     Code.TICKS: (3, 6),
@@ -68,8 +53,7 @@ _LONGEST: Final = 10
 
 GroupReport = Ticks | BoardOdometry | GpsPosition
 Timed = tuple[float, Report]
-"""Arrival time of a report's last line in s, and the report. A report that was held is returned
-later than it arrived."""
+"""Arrival time of a report's last line in s, and the report."""
 
 
 class Assembler:
@@ -77,8 +61,6 @@ class Assembler:
 
     Call ``add`` for each line, ``damage`` for characters that are not a line, and ``rest`` while
     nothing arrives.
-
-    ``statistics``: the counters to increase.
     """
 
     def __init__(self, statistics: GroupStatistics) -> None:
@@ -111,7 +93,7 @@ class Assembler:
     def resolves_at(self) -> float:
         """Time at which a held group is returned if nothing follows it.
 
-        The time is infinity if no group is held, or if the held group may be unfinished.
+        Infinity if no group is held, or if the held group may be unfinished.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -135,6 +117,7 @@ class Assembler:
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             self._record.cut_off()
+            # After such a pause, the line may belong to the next group.
             late = now - self._at > self._late_s.get(code, LATE_S)
             found: list[Timed] = self._end(now) if late else []
             if payload == MARKER and not self._may_be_minus_one(code):
@@ -206,6 +189,9 @@ class Assembler:
             self._payloads.append(payload)
         if not self._may_be_complete():
             return []
+        # A group is complete at its last line if no line came twice and its values can follow the
+        # last group. Any other group waits for the next line or for ``QUIET_S``: a line may be lost
+        # or repeated.
         if any(map(eq, self._payloads, self._payloads[1:])) or MARKER in self._payloads:
             return []
         group = _group(code, self._payloads)

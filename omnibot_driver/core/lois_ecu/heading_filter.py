@@ -2,13 +2,7 @@
 
 """Filter of compass headings that rejects the false headings of the public firmware near north.
 
-The firmware averages three headings of 0 to 359 degrees as plain numbers. For 359, 1 and 1 it
-reports 120, and for 359, 359 and 1 it reports -121.
-
-The filter compares each heading with the last accepted heading. The heading is accepted if it has
-turned by about the same angle as the odometry. Any other heading is accepted only when
-``SURE_AFTER`` further headings agree with it. Even then, a heading of about 120 or -120 degrees is
-rejected if the robot should face north.
+The firmware averages three headings of 0 to 359 degrees as plain numbers: 359, 1 and 1 give 120.
 
 This module works on degrees and the odometry's yaw.
 """
@@ -18,8 +12,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""``NEAR_DEG``, ``NEAR_PART``: allowed error of a heading. It is ``NEAR_DEG`` degrees, plus the
-fraction ``NEAR_PART`` of the angle by which the odometry has turned."""
+"""``NEAR_DEG``, ``NEAR_PART``: allowed error of a heading, in degrees, plus a fraction of the
+odometry's turn."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -36,8 +30,7 @@ class HeadingFilter:
     def forget(self) -> None:
         """Forget all headings.
 
-        The first heading after that is rejected. The second is accepted if it agrees with the
-        first.
+        The next heading is rejected. The second is accepted if it agrees with the first.
         """
         self._last: tuple[float, float] | None = None
         self._other: tuple[float, float] | None = None
@@ -60,6 +53,9 @@ class HeadingFilter:
 
         ``yaw_rad``: yaw of the odometry when the heading arrived.
         """
+        # A heading is accepted if it turned like the odometry, or when ``SURE_AFTER`` further
+        # headings agree. If the robot should face north, headings of about ±120 degrees are always
+        # rejected.
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0
             return True

@@ -2,9 +2,8 @@
 
 """One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
 
-A line is ``:<command><payload><checksum>\\n``, with 14 characters. The checksum is the XOR of the
-first eleven characters. The board can be set to accept lines without a checksum (12 characters),
-but it always sends a checksum.
+``:<command><payload><checksum>\\n`` has 14 characters, or 12 to a board without checksums. The
+board always sends checksums.
 
 This module knows the layout only, not what a command means.
 """
@@ -55,8 +54,8 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
     """Parse the characters of one line, from ``:`` to the line feed. None if they are not valid.
 
-    A carriage return before the line feed is accepted. If ``sum_required`` is false, the line may
-    lack the checksum. But if the line has a checksum, it must be right in any case.
+    A carriage return before the line feed is accepted. A checksum must be right even if
+    ``sum_required`` is false.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END
@@ -71,9 +70,9 @@ def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
 
 
 def from_pair(left: int, right: int) -> int:
-    """Return the payload that contains two 16-bit words, the left one first.
+    """Return the payload that contains two 16-bit words, signed or unsigned, the left one first.
 
-    Each word may be signed or unsigned. Raises FrameError if a number does not fit into 16 bits.
+    Raises FrameError if a number does not fit into 16 bits.
     """
     if not (-0x8000 <= left <= 0xFFFF and -0x8000 <= right <= 0xFFFF):
         raise FrameError(f"{left} and {right} do not fit into two 16-bit words")

@@ -2,8 +2,7 @@
 
 """Prediction of the wheel speeds that the firmware measured last, and of their effect on 0x20.
 
-The motion filter calls this module in each of its steps. The module works on the states of the
-filter, without reports.
+The motion filter calls this module in each of its steps.
 """
 
 import math
@@ -26,20 +25,15 @@ if TYPE_CHECKING:
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
 """``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
-that 0x20 (odometry) misses when a wheel starts."""
+that 0x20 misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that 0x20 (odometry) misses while a wheel turns
-faster than ``FAST_RPM``. The firmware delays ticks while it sends. It gives no speed to a tick that
-comes soon after a delayed one."""
+"""Variance, in squared ticks per s, of the motion that 0x20 misses above ``FAST_RPM``. A tick soon
+after one that sending delayed gets no speed."""
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
     """Predict the speeds that the firmware measured last, and the resulting changes of 0x20.
-
-    The firmware updates 0x20 (odometry) at each tick of either wheel. It uses the speed that it
-    measured last for each wheel. So while only one wheel rolls, 0x20 combines the present speed of
-    this wheel with an old speed of the wheel at rest.
 
     ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
     """
@@ -61,6 +55,8 @@ def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, floa
         if speed > FAST_RPM * motion.rpm_mps:
             variance = LOST_TICKS * motion.tick_m**2 * dt
             step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))
+        # At each tick of either wheel, 0x20 uses the last measured speeds of both. So while one
+        # wheel rests, its old speed is used.
         fresh = speed / (abs(before[0]) + abs(before[1]))
         shown = fresh * speed + (1 - fresh) * new[base + HELD] - motion.rounded_mps(index)
         if shown > 0.0:

@@ -2,9 +2,7 @@
 
 """All messages of the manual's table as values. ``codec`` turns them into lines and back.
 
-A message from the host is a ``Command``, and a message from the ECU is a ``Report``. Some command
-bytes are used for both. Units are in the names. Counts are converted to SI units where they are
-used.
+The host sends ``Command``, the ECU sends ``Report``. Some command bytes are used for both.
 
 Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23.
 """
@@ -85,7 +83,7 @@ class TerminalMode(IntEnum):
 
     ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no checksum.
 
-    In all other modes, the board forwards a serial input and sends no messages of its own.
+    Other modes: a forwarded serial input, without the board's own messages.
     """
 
     HOST = 0
@@ -188,8 +186,7 @@ class SetTerminalMode:
 class Reset:
     """A command that resets the board.
 
-    According to the manual, a reset affects controllers, interfaces and counters. The public
-    firmware resets only the ticks.
+    Manual: controllers, interfaces and counters. Public firmware: only the ticks.
     """
 
 
@@ -266,8 +263,8 @@ class Heading:
 class Ticks:
     """Encoder ticks of both wheels since the board started or was reset. They are signed.
 
-    ``time_counts``: time of sending by the board's clock, in ns according to the manual, but in ms
-    in the public firmware. It wraps at 2³².
+    ``time_counts``: the board's time of sending, in ns (manual) or ms (public firmware). It wraps
+    at 2³².
     """
 
     time_counts: int
@@ -281,8 +278,7 @@ class BoardOdometry:
 
     The velocities may be NaN or infinite.
 
-    ``appended``: whether the group came directly after a group of ticks, with the command byte of
-    the ticks.
+    ``appended``: whether the group came directly after ticks, with their command byte.
     """
 
     x_m: float
@@ -298,12 +294,11 @@ class BoardOdometry:
 class Record:
     """A complete record with as many samples as were requested.
 
-    ``left``, ``right``: samples of the left and the right wheel. A record of headings has only
+    ``left``, ``right``: samples of both wheels. A record of headings, in degrees, has only
     ``left``.
 
-    An RPM sample is the time from one tick to the next, in the board's unit (``COUNT_S`` in
-    ``record_request``). A torque sample is a 12-bit value of an analogue-digital converter. A
-    heading sample is in degrees.
+    RPM: times from tick to tick in ``record_request.COUNT_S``. Torque: 12-bit values of the
+    converter.
     """
 
     kind: RecordKind

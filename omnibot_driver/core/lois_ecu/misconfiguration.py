@@ -2,10 +2,8 @@
 
 """Advice on a misconfiguration, found in the settings or in received bytes that form no valid line.
 
-Received bytes can show another board or a wrong setting. Advice from bytes is given only while
-valid lines do not arrive. At any time, there is at most one piece of advice.
-
-This module works on bytes and settings, without times.
+Advice from bytes is given only while valid lines do not arrive. This module works on bytes and
+settings, without times.
 """
 
 import re
@@ -29,11 +27,11 @@ OWN_GAINS: Final = (
     " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run `calibrate step`, or set these"
     " parameters"
 )
-"""Advice if the user has not set all gains. The numbers in the text are from 150 forward drives
-with the compiled firmware and correct wheel sizes."""
+"""Advice if the user has not set all gains. Its numbers are from 150 forward drives with the
+compiled firmware."""
 LOOK_AT: Final = 600
-"""Number of bytes without a valid line after which advice is given. The board sends at least 70
-bytes per second."""
+"""Number of bytes without a valid line before advice is given. The board sends at least 70 bytes
+per second."""
 
 _LINE: Final = re.compile(rb":[0-9a-fA-F]+\r?\n")
 _NMEA: Final = re.compile(rb"[$!][A-Z]{2}[A-Z]{3},")

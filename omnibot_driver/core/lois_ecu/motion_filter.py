@@ -2,29 +2,9 @@
 
 """Kalman filter of the motion of both wheels, and of the values by which the board reports it.
 
-The filter has these states for each wheel:
+Distances and speeds are for wheels of nominal size; left and right are those of the board.
 
-``WAY``, ``SPEED``, ``PUSH``: distance, speed and acceleration.
-
-``COUNT``: ticks that the board should have counted.
-
-``HELD``: speed that the firmware measured last.
-
-``BIAS``: systematic error of the speed.
-
-``EXCESS``: fraction by which the wheel rolls backward faster than its set-point.
-
-The filter has these states for the body:
-
-``X``, ``Y``: position.
-
-``TURN``, ``ALONG``: expected changes of heading and distance in 0x20 (odometry).
-
-The errors of all states are correlated with the error of the position. So each report of the board
-also corrects the position.
-
-Left and right are those of the board. Distances and speeds are for wheels of nominal size. This
-module works on commands and the firmware's counters, without messages.
+This module works on commands and the firmware's counters, without messages.
 """
 
 import math
@@ -58,29 +38,26 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts. If more time has passed, only the last
-part of it is predicted."""
+"""Longest time in s that one call of ``advance`` predicts. Of a longer time, only the end is
+predicted."""
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
-"""Assumed standard deviation of the time at which a command takes effect, in periods of the speed
-controller."""
+"""Assumed standard deviation of the time at which a command takes effect, in controller periods."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
-"""``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the fraction of an RPM by which
-the firmware rounds a measured speed down."""
+"""``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the firmware's rounding down of a
+measured speed, in RPM."""
+# While a wheel rolls backward, the firmware lowers the target with each tick until the controller's
+# next step. A feed-forward may make the wheel much faster still.
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: fraction by which a wheel that rolls backward is faster than
-its set-point, as mean and standard deviation.
+"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: fraction of the set-point that a wheel exceeds backward.
 
-``EXCESS_CHANGE``: standard deviation that is added after a change of the set-point.
+``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
 
-Each constant has two values: for the board's own gains, and for gains that the user set.
-
-The wheel is faster because the firmware lowers the target with each tick until the controller's
-next step. A feed-forward may make the wheel much faster still.
+First value: the board's own gains. Second value: the user's gains.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
@@ -89,9 +66,7 @@ ROLLING_MPS: Final = 1e-6
 class MotionFilter:
     """Estimate of the wheels' motion and the body's pose.
 
-    ``tick_m``: distance that a wheel rolls in one tick, in m.
-
-    ``rpm_mps``: speed of a wheel's rim at one RPM, in m/s.
+    ``rpm_mps``: speed of a wheel's rim at one RPM.
 
     ``turn_sign``: -1 if the board's left wheel is the robot's right wheel, otherwise 1.
 
@@ -99,23 +74,20 @@ class MotionFilter:
 
     ``holds``: whether the board keeps the last measured speed of a wheel at rest.
 
-    ``tuned``: whether the speed controllers have gains that the user set.
-
-    Some wheels are halted soon after a change of their set-point. Such a wheel did not yet roll at
-    the modelled speed, and perhaps rolled in the other direction. So the filter adds an error to
-    the wheel's distance. The standard deviation of this error is the change of speed times
-    ``UNSETTLED_S[tuned]``.
+    ``tuned``: whether the user set the speed controllers' gains.
     """
 
     def __init__(self) -> None:
+        # ``wheel_motion`` lists the states. Their errors are correlated with that of the position,
+        # so each report also corrects the position.
         self.filter = SparseFilter(STATES)
         self.wheels = (Wheel(0), Wheel(PER_WHEEL))
         self.tick_m = self.rpm_mps = self.track_m = self.turn_sign = 1.0
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference between the measured speeds of both wheels since the last reset of
-        this attribute, in m/s."""
+        """Smallest difference of both measured speeds since this attribute was last reset, in
+        m/s."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 
@@ -174,15 +146,15 @@ class MotionFilter:
             at_s = end_s
 
     def restart(self, then_s: float) -> None:
-        """Restore the state at the time ``then_s`` of a restart. Discard later estimates.
+        """Restore the state at the time ``then_s`` of the board's restart.
 
-        A restarted board does not drive its wheels, so the wheels coast. If ticks count in both
-        directions, the counts have restarted at zero and show how far the wheels coasted. Otherwise
-        this distance is estimated, and the set-points are forgotten.
+        Later states are discarded.
         """
         kept_s = self.history.go_back(then_s)
         if kept_s is None:
             return
+        # A restarted board does not drive, so the wheels coast. Signed counts restart at zero and
+        # show how far. Otherwise the distance is estimated.
         powered_s = max(min(then_s - kept_s, LONGEST_STEP_S), 0.0)
         for index, wheel in enumerate(self.wheels):
             speed = self.speed_mps(index)
@@ -204,10 +176,7 @@ class MotionFilter:
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
         """Add an error to a wheel's distance, and to all states that depend on that distance.
 
-        ``stddev_m``: standard deviation of the error.
-
-        ``counted``: whether the board counted the wheel's ticks when the error arose, even if it
-        does not count them now.
+        ``counted``: whether the board counted the wheel's ticks when the error arose.
         """
         wheel = self.wheels[index]
         terms = self._doubted(index)
@@ -246,6 +215,8 @@ class MotionFilter:
                 continue
             speed = self.speed_mps(index)
             if cleared:
+                # A wheel that halts soon after a new set-point did not yet roll at the modelled
+                # speed. So its distance gets an error.
                 if self.holds and not self.signed:
                     unsettled_s = UNSETTLED_S[self.tuned]
                     self.filter.disturb(doubted, (unsettled_s * wheel.unsettled_mps) ** 2)
@@ -268,8 +239,8 @@ class MotionFilter:
     def _begin_biases(self) -> None:
         """Reset the biases.
 
-        For a wheel that is driven by a duty, the bias is a relative error of its speed. For other
-        wheels, the bias is the rounding of the measured speed, in m/s.
+        In duty mode, a bias is a relative error of the speed. Otherwise, it is the rounding of the
+        measured speed, in m/s.
         """
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:

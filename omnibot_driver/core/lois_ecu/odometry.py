@@ -2,12 +2,8 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-Counts of ticks are exact, but the public firmware counts only while a wheel is commanded forward.
-At other times, ``motion_filter`` computes from the commands how the wheels should move.
-``comparison`` corrects the result by 0x20 (the board's odometry).
-
-The reports do not show wrong wheel sizes or slip. ``size_errors`` estimates how much these change
-the pose.
+While the public firmware does not count ticks, ``motion_filter`` predicts and ``comparison``
+corrects by 0x20.
 
 Time is an argument. All times are arrival times in s.
 """
@@ -40,8 +36,8 @@ LATE_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, until a better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""After the last report, the pose is predicted for this number of tick periods, or for
-``UNHEARD_S`` s if that is longer. After a longer silence, the board may be off."""
+"""After the last report, the pose is predicted for this number of tick periods, at least for
+``UNHEARD_S`` s."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
@@ -106,10 +102,7 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """Which wheels are assumed to be at rest although they are commanded to turn backward.
-
-        The first value is for the left wheel, the second for the right one.
-        """
+        """Whether the left and the right wheel are assumed at rest despite a backward command."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 
@@ -169,7 +162,7 @@ class LoisOdometry:
     def stalled(self, wheels: tuple[bool, bool]) -> None:
         """Record which wheels have stalled.
 
-        A stalled wheel is assumed to have been at rest since its reported speed last changed.
+        A stalled wheel has been at rest since its reported speed last changed.
         """
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:
@@ -182,7 +175,7 @@ class LoisOdometry:
 
         The list is empty for the first ticks of a connection.
 
-        ``late_s``: how much later than usual the ticks arrived, in s.
+        ``late_s``: how much later than usual the ticks arrived.
         """
         before, from_s = self._ticks, self._at_s
         if now > max(self._heard_at_s, self._lost_s) + self._unheard_s > -math.inf:
@@ -208,11 +201,11 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """Process odometry: 0x20, or odometry that the board sent directly after ticks (0x12).
+        """Process odometry: 0x20, or odometry directly after ticks (0x12).
 
-        The odometry corrects the next predictions and the next estimate.
+        It corrects the next predictions and estimates.
 
-        ``late_s``: how much later than usual the odometry arrived, in s.
+        ``late_s``: how much later than usual the odometry arrived.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
@@ -247,12 +240,7 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors that arise during a long silence.
-
-        Possibly, a Stop did not reach the board, and each wheel continued at its speed. The next
-        values of 0x20 (odometry) are compared with the present ones, not with those before the
-        silence.
-        """
+        """Add the errors of a long silence: if a Stop was lost, the wheels rolled on."""
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:
             self._advance(heard_s + self._unheard_s)
@@ -260,6 +248,7 @@ class LoisOdometry:
             self._motion.shift(index, 0.0, speed_mps * (now - heard_s))
         self._at_s = self._heard_at_s = now
         self._lost_s = -math.inf
+        # The next 0x20 is compared with the present state, not with that before the silence.
         self._comparison.begin_odometry()
 
     def _advance(self, now: float) -> None:

@@ -2,24 +2,8 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-All settings are sent in ``ROUNDS`` rounds. The pause between two rounds is longer than the time for
-which the board cannot receive. Two things together confirm the settings: the ticks arrive with the
-requested period, and a date arrives. Each round requests one date, because the board sends no dates
-after a boot. Further rounds follow until the settings are confirmed. They wait while the robot
-drives, because writing a gain resets the firmware's controller.
-
-A request for one date ends the board's periodic sending of dates. So if the user has set a period
-of the date, the requests end with the first answer, and the following rounds restore the period.
-Later, ``ask_date`` requests the date if the GPS works but the date is unknown.
-
-Other commands (``write``) are also sent while the robot drives, but at least ``AFTER_MOTION_S``
-after a motion command. They remain queued after a restart of the board and after a change of
-settings.
-
-A board in an unexpected terminal mode, or with an unexpected checksum setting, is silent or ignores
-commands. ``recovery`` restores the mode by a line that is sent with and without a checksum. Each
-write of the terminal mode overwrites the setting "left short correction", so the driver writes this
-setting again afterwards.
+All settings are sent in ``ROUNDS`` rounds. Further rounds follow until two things confirm them:
+ticks with the requested period, and a date. ``write`` queues other commands.
 """
 
 import math
@@ -45,26 +29,21 @@ from omnibot_driver.core.lois_ecu.messages import (
 from omnibot_driver.core.lois_ecu.set_points import SetPoints
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
+# The pause between two rounds is longer than the time for which the board cannot receive.
 ROUNDS: Final = 5
 ROUND_S: Final = 0.15
 LINE_S: Final = 0.02
+# For up to 13 ms, the board may receive nothing. Without this pause, the beginning of a motion
+# command and the end of another line could form a new motion command.
 AFTER_MOTION_S: Final = 0.015
-"""Shortest time in s from a motion command to a command that is not a setting.
-
-For up to 13 ms, the board may receive nothing. In this time, it could miss the end of a motion
-command and the beginning of the next line. The remaining parts could then form another motion
-command. If the motion command comes second, a mixture of both lines is harmless.
-
-This constant is shorter than the time between two set-points. So other commands are sent even while
-set-points are sent at the highest rate.
-"""
+"""Shortest time in s from a motion command to a command that is not a setting. It is shorter than
+the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group to the next round of settings, or to the next request for the date. The
-times are used in turn. While the board sends a group, it receives nothing. With a fixed time, this
-could happen at each attempt."""
+"""Times in s, used in turn, from a group to the next round or request for the date. At a fixed
+time, the board could send at each attempt and receive nothing."""
 CONFIRMED_WITHIN: Final = 0.35
-"""Largest allowed difference between the measured and the requested period of the ticks, as a
-fraction of the requested period. A larger difference does not confirm the settings."""
+"""Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
+period."""
 DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two requests for an unknown date."""
 MOST_ROUNDS: Final = 40
@@ -86,15 +65,15 @@ class SettingsWriter:
         self._in_period = self._answered = False
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
-        """Commands that are not settings, each with the earliest time at which it may be sent."""
+        """Commands that are not settings, each with its earliest time. They survive a restart of
+        the board."""
         self._rounds_left = 0
         self._round_at_s = math.inf
         self._date_asked_at_s, self._dates_asked = -math.inf, 0
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
-        """Whether the terminal mode was written. This overwrites the setting "left short
-        correction"."""
+        """Whether the terminal mode was written. This overwrites "left short correction"."""
 
     @property
     def confirmed(self) -> bool:
@@ -118,7 +97,7 @@ class SettingsWriter:
 
     @property
     def _waits(self) -> bool:
-        """Whether settings wait because the robot drives."""
+        """Whether settings wait because the robot drives. Writing a gain resets the controller."""
         return self._points.driving and self._rounds >= ROUNDS
 
     @property
@@ -178,6 +157,8 @@ class SettingsWriter:
         """Record that a date arrived. The date shows that the board obeys requests."""
         if self._rounds and not self._answered:
             self._answered = True
+            # A request for one date ended the periodic sending. The following rounds restore the
+            # period.
             if self._dates_come_periodically:
                 self._rounds_left = max(self._rounds_left, ROUNDS - 1)
 
@@ -204,8 +185,7 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return all commands. Each round begins with another command.
 
-        A round may last exactly as long as the time from one group to the next. In a fixed order,
-        the board would then miss the same line in each round.
+        In a fixed order, a board that sends a group once a round could always miss the same line.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order
@@ -220,6 +200,7 @@ class SettingsWriter:
             yield SetTerminalMode(TerminalMode.HOST_WITHOUT_SUM)
         if self.overwritten or not settings.with_sum:
             yield self._left_short_correction()
+        # The board sends no dates after a boot. So each round requests one date.
         if not (self._answered and self._dates_come_periodically):
             yield SetPeriod(Stream.GPS_DATE, PERIOD_ONCE)
         yield WriteSetting(Setting.RPM_LOW_PASS, settings.low_pass)
@@ -230,16 +211,15 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether the user has set a period of the date.
-
-        A request for one date would end the periodic sending.
-        """
+        """Whether the user has set a period of the date. A request would end the sending."""
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:
         """Return the lines that restore the mode of a board that is silent or does not obey."""
         self.overwritten = True
         mode = TerminalMode.HOST if self.settings.with_sum else TerminalMode.HOST_WITHOUT_SUM
+        # The mode is sent with and without a checksum, because the board's setting may be
+        # unexpected.
         back = SetTerminalMode(mode)
         correction = encode_command(self._left_short_correction(), with_sum=self.settings.with_sum)
         return (

@@ -1,26 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines that make the robot move and stop, for a board that loses characters and complete lines.
-
-Damage almost never changes a line into another valid line. The firmware checks the checksum and the
-number of characters from the last ``:`` to the line feed. So a line that lost characters is too
-short. Two lines become one only if fourteen characters in a row are lost (twelve without checksum):
-the end of the first line and the beginning of the second. While the board sends a group, it
-receives nothing for 13 ms. Set-points are at least 18 ms apart, so such a gap cannot remove both
-the end of a line and the beginning of the next.
-
-Stop is duty 0/0. In the firmware, duty 0/0 and RPM 0/0 both remove the power with the controller's
-next step. But duty 0/0 keeps the firmware's RPM target. So after a drive forward, the board
-continues to count ticks while the robot rolls out, and the counts can prove the standstill. RPM 0/0
-ends the counting and clears the measured speed.
-
-After a Stop, the firmware's controller still uses the last measured speed of a wheel at rest. A
-slower set-point in the same direction would never start the wheel. So RPM 0/0 precedes the first
-set-points after a Stop.
-
-The emergency stop is RPM 0/0. While the emergency stop is latched, RPM 0/0 and Stop are sent in
-turn.
-"""
+"""Lines that make the robot move and stop, for a board that loses characters and complete lines."""
 
 from typing import Final
 
@@ -32,20 +12,29 @@ from omnibot_driver.core.lois_ecu.messages import (
     SetRpm,
 )
 
+# Duty 0/0 and RPM 0/0 both remove the power with the controller's next step. But duty 0/0 keeps the
+# RPM target. So after a drive forward, the board continues to count ticks, which can prove the
+# standstill. RPM 0/0 ends the counting and clears the measured speed. While the emergency stop is
+# latched, RPM 0/0 and Stop are sent in turn.
+# Damage almost never changes a line into another valid line. Two lines become one only if fourteen
+# characters in a row are lost (twelve without checksum): the end of one line and the beginning of
+# the next. The board receives nothing for at most 13 ms, and set-points are at least 18 ms apart.
 STOP: Final = SetDuty(0, 0)
 EMERGENCY_STOP: Final = SetRpm(0, 0)
 MOST_RPM: Final = 50
 """Largest allowed set-point in RPM. The firmware does not drive faster."""
 MOST_PERCENT: Final = 100
+# After a Stop, the controller still uses the last measured speed of a wheel at rest. Without RPM
+# 0/0, a slower set-point in the same direction would never start the wheel.
 CLEARED_TIMES: Final = 3
-"""After a Stop, RPM 0/0 is sent before each of this number of set-points. One RPM 0/0 would be
-enough, but lines may be lost."""
+"""Number of set-points after a Stop that RPM 0/0 precedes. One would be enough, but lines may be
+lost."""
 
 
 def saturated(pair: tuple[float, float], most: float) -> tuple[tuple[int, int], bool]:
     """Return the pair, rounded and limited to ±``most``, and whether a value was beyond this limit.
 
-    If a value is beyond the limit, both values are multiplied by the same factor.
+    The ratio of both values is kept.
     """
     fastest = max(map(abs, pair))
     scale = most / fastest if fastest > most else 1.0

@@ -2,8 +2,7 @@
 
 """Plausibility of a complete group of lines: its values, and their change since the last group.
 
-A group that cannot follow the last accepted group is set aside. If the next group can follow the
-group that was set aside, the board was restarted or reset. The next group is then accepted.
+Two groups that fit each other, but not the last accepted one, show a restart or reset.
 
 This module works on values and arrival times.
 """
@@ -15,8 +14,8 @@ from typing import Final, Generic, Literal, TypeVar
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
 
 FASTEST_TICKS_PER_S: Final = 300.0
-"""Largest plausible rate of ticks: that of a wheel with 60 ticks per turn at five turns per second.
-This is six times the highest speed of the firmware."""
+"""Largest plausible rate of ticks: 60 ticks per turn at five turns per second, six times the
+firmware's highest speed."""
 TICKS_MARGIN: Final = 30
 FASTEST_MPS: Final = 5.0
 FASTEST_RADPS: Final = 20.0
@@ -30,11 +29,10 @@ SLOWEST_CLOCK: Final = 0.5
 """Lowest plausible rate of the board's clock, as a fraction of real time. The clock stops while the
 board sends."""
 SURE_AFTER: Final = 2
-"""A comparison of two successive groups of ticks shows the unit of the board's clock. This number
-of further comparisons must confirm the unit."""
+"""Number of further comparisons that must confirm the unit of the board's clock."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest time in s between two groups of ticks that can show the unit of the board's clock. Over
-a shorter time, arrival times are too inexact."""
+"""Shortest time in s between two groups that can show the clock's unit. Arrival times are
+inexact."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -52,8 +50,7 @@ def wrapped(difference: int) -> int:
 class Gate(Generic[Group]):
     """Check of each group against the last accepted group.
 
-    ``reachable(before, after, duration_s)``: function that returns whether the values of ``before``
-    can become those of ``after`` within ``duration_s``.
+    ``reachable(before, after, duration_s)``: whether ``before`` can become ``after`` in this time.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:

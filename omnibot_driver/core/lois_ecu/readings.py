@@ -16,8 +16,7 @@ from omnibot_driver.core.readings import DisplacementReading
 class FixReading:
     """GPS position in degrees, north and east positive.
 
-    ``valid``: whether the GPS knows its position and the date. The GPS sends 0/0 while it does not
-    know its position.
+    ``valid``: whether the GPS knows its position and the date. Without a position, it sends 0/0.
     """
 
     latitude_deg: float

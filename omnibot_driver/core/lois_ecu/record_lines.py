@@ -43,8 +43,8 @@ class GroupStatistics:
 class RecordAssembler:
     """Assembler of the lines of a record.
 
-    Call ``add`` for each line of the record, ``cut_off`` when another message comes, and ``damage``
-    when characters come that do not form a line.
+    Call ``add`` for each line of the record, ``cut_off`` for another message, and ``damage`` for
+    other characters.
     """
 
     def __init__(self, statistics: GroupStatistics) -> None:
@@ -97,8 +97,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The end of a torque record looks like a sample of two motors without current. So such a line
-        is accepted as the end only after all samples.
+        The end of a torque record looks like a sample without current, so all samples must come
+        first.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

@@ -2,10 +2,8 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-The repetitions end when the record begins to arrive. Each request makes the board start the record
-again, so all repetitions are sent within a short time.
-
-This module also detects whether the record arrives or fails.
+Each request restarts the record. So repetitions come soon, and end when the record begins to
+arrive.
 """
 
 import math
@@ -32,12 +30,10 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s at which the request is sent, counted from the first request. The intervals are longer
-than the time in which the board receives nothing. The intervals are not multiples of the board's
-usual periods."""
+"""Times of sending in s since the first request. The intervals outlast a pause of the board's
+reception, and are not multiples of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Time unit, in s, of the samples of an RPM record. The key is the unit of the board's time in 0x12
-(ticks). In the public firmware, both units differ from those in the manual."""
+"""Time unit, in s, of an RPM record's samples, by the unit of the time in 0x12 (ticks)."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
@@ -87,11 +83,9 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings, with the result of the request if it is known now.
 
-        The result is the record, or the reason why the record will not come. While the record
-        arrives, the result is a ``RecordComes``.
+        While the record arrives, a ``RecordComes`` is added.
 
-        ``prevented``: why the board will not send the record, as a sentence. Empty if the record
-        may still come.
+        ``prevented``: why the record cannot come, as a sentence. Empty if it may.
         """
         if self.kind is None:
             return found

@@ -2,11 +2,8 @@
 
 """Corrections of one wheel by the speeds that a LOIS ECU reports for it.
 
-A reported speed is that of the wheel's last tick, and the board keeps it until the next tick. So it
-is a new measurement only on three conditions: the wheel has ticked since the last report, this tick
-was not delayed while the board sent, and the wheel is not at rest.
-
-This module works on reported speeds and the motion filter, without messages.
+A reported speed is that of the last tick. It is old if the wheel rests or has not ticked, and wrong
+if the board's sending delayed the tick.
 """
 
 import math
@@ -17,39 +14,32 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Assumed age in s of odometry when its last line arrives. The values are from the time at which
-the first line began, and a line of 14 characters takes 1.2 ms."""
+"""Assumed age in s of odometry when its last line arrives. The values are from the beginning of the
+first line."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, above which the filter assumes that its own estimate is wrong.
-Noise is rarely that large."""
+"""Residual, in standard deviations, above which the filter doubts its own estimate."""
 FASTER_RPM: Final = 2.5
-"""Lowest reported speed in RPM that is used. At a lower speed, the wheel may have been at rest
-between the last two ticks."""
+"""Lowest reported speed in RPM that is used. A slower wheel may have rested between its last two
+ticks."""
 LONGEST_PAUSE_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""Largest plausible change of a wheel's speed between two reports: ``JUMP_RPM``, plus
-``JUMP_RPM_PER_S`` for each s between them. A larger change shows a tick that was delayed while the
-board sent something else."""
+"""``JUMP_RPM``, ``JUMP_RPM_PER_S``: largest plausible change of speed between two reports, plus a
+part for each s. A larger change shows a delayed tick."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""Largest plausible difference between a reported and the expected speed: ``STRAY_RPM``, plus the
-fraction ``STRAY_PART`` of the expected speed. The limit applies to a wheel with a constant
-set-point and gains that the user set. A single larger difference comes from a delayed tick, or from
-the tick after it."""
+"""``STRAY_RPM``, ``STRAY_PART``: largest plausible residual of a steady wheel's speed, plus a
+fraction of the expected speed. Only for gains that the user set."""
 COASTED_TICKS: Final = 1.0
-"""Number of ticks to subtract from the distance of a wheel that has come to rest. The distance
-since its reported speed last changed is subtracted too. The wheel rolls less far than its last
-reported speed suggests."""
+"""Ticks to subtract from the distance of a wheel that came to rest. It rolls less far than its last
+speed suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""Fraction of the time between two reports for which an unexpected change of speed is assumed to
-have lasted."""
+"""Fraction of the time between two reports for which an unexpected change of speed lasts."""
 UNSEEN_PART: Final = 0.6
-"""While the reports show no tick of a wheel, the integral of its controller is assumed to be at
-most this fraction of ``WINDUP_M``."""
+"""Largest assumed integral of a wheel's controller without ticks, as a fraction of ``WINDUP_M``."""
 
 
 class ReportedSpeed:
@@ -75,8 +65,8 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel has come to rest, and subtract the distance that it did not roll.
 
-        The wheel was at rest since its reported speed last changed. If it has not turned since it
-        was commanded to start, it was at rest since that command.
+        The wheel was at rest since its reported speed last changed or, without motion, since its
+        start command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:

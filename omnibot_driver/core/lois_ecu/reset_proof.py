@@ -2,8 +2,7 @@
 
 """Proof, by the tick counts, that the board has obeyed a reset.
 
-A count near zero proves nothing by itself. The count may have been near zero before the reset, or a
-wheel may have rolled back.
+A count near zero is not enough: it may have been near zero before.
 
 This module works on counts and times.
 """
@@ -16,14 +15,14 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Largest assumed number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""Number of ticks that no wheel can roll between a reset and the next counts. If the counts fall by
-this number, the board has obeyed the reset."""
+"""Number of ticks that no wheel can roll between a reset and the next counts. A fall by this number
+proves the reset."""
 STEADY_TICKS: Final = 3
-"""Smallest count that proves a reset by changing to zero while the wheels are at rest. Backlash of
-the gears can change only smaller counts to zero."""
+"""Smallest count whose change to zero at rest proves a reset. Backlash of the gears explains
+smaller changes."""
 UNPROVED_S: Final = 2.5
-"""Longest time in s to wait for a proof. The reset is repeated until then. Sometimes no proof is
-possible, for example if the counts were zero before the reset."""
+"""Longest time in s to wait for a proof while the reset is repeated. After counts of zero, no proof
+is possible."""
 
 
 class ResetProof:
@@ -32,8 +31,6 @@ class ResetProof:
     ``before``: counts when the reset was sent, None if unknown.
 
     ``steady``: whether these counts had not changed for some time.
-
-    ``remark``: sentence on what was not proved.
     """
 
     def __init__(self, before: Ticks | None, *, steady: bool) -> None:
@@ -42,12 +39,9 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Record that the reset is repeated.
+        """Record that the reset is repeated. Replace ``before`` if the new counts can prove more.
 
-        Replace ``before`` if the present counts can prove more.
-
-        Counts of wheels at rest can prove more than counts of rolling wheels. While the wheels
-        still roll, the present counts can prove no more than the first counts.
+        Only counts of wheels at rest can prove more.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
@@ -56,8 +50,7 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the reset now.
 
-        The counts must be near zero. In addition, they must prove the reset, or ``UNPROVED_S`` must
-        have passed.
+        The counts must be near zero, and either prove the reset or ``UNPROVED_S`` must have passed.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -2,12 +2,10 @@
 
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-For a wheel at rest, the public firmware keeps reporting the speed of the last tick. A wheel slows
-down before it comes to rest, so this speed is usually 5 to 17 RPM. The board also repeats the speed
-of a wheel that rolls steadily. But that speed did not fall just before.
+For a wheel at rest, the public firmware repeats the last speed: 5 to 17 RPM, after a fall. A steady
+wheel repeats its speed without a fall.
 
-This module works on the speeds that the board reports, one for each group, and on the time between
-them.
+This module works on reported speeds and the time between them.
 """
 
 from collections import deque
@@ -16,9 +14,8 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""The last reported speed of a wheel that came to rest lies between ``SLOWEST_RPM`` and
-``FASTEST_RPM``. A wheel with a lower speed is starting. A wheel with a higher speed ticks once more
-before it is at rest."""
+"""``SLOWEST_RPM``, ``FASTEST_RPM``: range of the last reported speed of a wheel that came to rest.
+A slower wheel is starting, a faster one ticks once more."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -31,7 +28,8 @@ FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that the wheel is at rest. The index is how often its speed was repeated.
+"""Probabilities that the wheel is at rest, by the number of repetitions of its speed. They were
+counted on the public firmware.
 
 ``FAST``: after a fall to a speed above ``FAST_RPM``.
 
@@ -41,10 +39,7 @@ TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 
 ``NEAR``: after a smaller fall.
 
-``TUNED``: after any of these falls, with gains that the user set. With such gains, a wheel rarely
-comes to rest without a Stop, and often rolls at a steady speed after an overshoot.
-
-The probabilities were counted on the public firmware.
+``TUNED``: after any fall, with gains that the user set.
 """
 
 
@@ -81,9 +76,9 @@ class RestingWheel:
     def tell(self, rpm: float, since_s: float, *, tuned: bool = False) -> None:
         """Process a reported speed, without its sign.
 
-        ``since_s``: time since the speed before was reported, in s.
+        ``since_s``: time since the last reported speed.
 
-        ``tuned``: whether the controller has gains that the user set.
+        ``tuned``: whether the user set the controller's gains.
         """
         self._pass(since_s)
         if abs(rpm - self._told_rpm) < SAME_RPM:

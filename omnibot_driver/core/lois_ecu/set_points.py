@@ -30,7 +30,7 @@ class SetPoints:
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 
-    ``moved_at_s``: time at which a motion command was last sent.
+    ``moved_at_s``: time of the last motion command.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

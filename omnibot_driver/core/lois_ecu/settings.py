@@ -17,8 +17,8 @@ DriveMode = Literal["rpm", "duty"]
 USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
     {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 )
-"""Periods in ms that the odometry needs. With shorter periods, the board would send for a larger
-part of the time. While it sends, it cannot receive."""
+"""Periods in ms that the odometry needs. While the board sends, it cannot receive, so shorter
+periods harm."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,20 +33,16 @@ class LoisEcuSettings:
 
     ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
 
-    ``low_pass``: 0..1, the fraction of a change of the set-point that each step of the speed
-    controller applies. Until it is written to the board, the wheels never turn in RPM mode.
+    ``low_pass``: 0..1, fraction of a new set-point that each controller step applies. Before its
+    writing, no wheel turns in RPM mode.
 
     ``written``: further settings that the user wants on the board.
 
-    ``periods_ms``: periods of the messages that the board sends periodically. The periods of other
-    messages are not changed.
+    ``periods_ms``: periods of the board's messages. Other messages keep theirs.
 
     ``with_sum``: whether lines to the board have a checksum.
 
     ``declination_rad``: declination of magnetic north, east positive.
-
-    ``odom_rate_hz``: rate at which the odometry is published. Between two groups of ticks, the
-    odometry is predicted.
     """
 
     wheel_radius_m: float = 0.13

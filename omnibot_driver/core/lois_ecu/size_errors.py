@@ -2,9 +2,8 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-Each of these errors is constant during a drive. So the yaw error grows, and the pose error is soon
-not proportional to its cause. Therefore the same drive is computed with each error, once positive
-and once negative. The spread of the resulting poses is the covariance.
+The same drive is computed with each error, once positive and once negative. The spread of the poses
+is the covariance.
 
 This module works on distances of the wheels.
 """
@@ -21,7 +20,7 @@ wheels."""
 WHEEL_SCALE: Final = 0.01
 WHEEL_SLIP: Final = 0.005
 """``WHEEL_SCALE``, ``WHEEL_SLIP``: standard deviations of a wheel's relative size, and of the
-fraction of both wheels' distances that is lost by slip."""
+fraction of both wheels' distances lost by slip."""
 
 
 class SizeErrors:
@@ -29,6 +28,8 @@ class SizeErrors:
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)
+        # Each error is constant during a drive, so the pose error soon is not proportional to its
+        # cause.
         self._factors = [
             (1 + sign * spread * left, 1 + sign * spread * right)
             for left, right in (
@@ -44,8 +45,7 @@ class SizeErrors:
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
         """Continue all copies of the drive by the given distances of the wheels.
 
-        ``track_m``: track width; negative if the wheels are swapped, so that the robot turns the
-        other way.
+        ``track_m``: track width; negative if the wheels are swapped.
         """
         self._believed = _moved(self._believed, left_m, right_m, track_m)
         self._places = [

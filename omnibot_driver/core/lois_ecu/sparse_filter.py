@@ -2,9 +2,7 @@
 
 """Kalman filter of a few states, in plain numbers, without a matrix library.
 
-Most rows of the transition matrix are those of the identity matrix. A measurement depends on one to
-three states. Rows and measurements are given as their non-zero terms, so that a step takes little
-time.
+Rows of the transition matrix and measurements are given as their non-zero terms, to save time.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,11 +22,9 @@ class SparseFilter:
         self.covariance = [[0.0] * states for _ in range(states)]
 
     def propagate(self, rows: Mapping[int, Terms]) -> None:
-        """Propagate the covariance by a transition.
+        """Propagate the covariance by a transition. The caller changes the mean.
 
         ``rows``: the rows of the transition matrix that differ from the identity matrix.
-
-        The mean is not changed, because the transition of the mean may be non-linear.
         """
         half = _applied(rows, self.covariance)
         whole = _applied(rows, [list(column) for column in zip(*half, strict=True)])
@@ -37,8 +33,7 @@ class SparseFilter:
     def disturb(self, terms: Terms, variance: float) -> None:
         """Add an error with the given variance.
 
-        ``terms``: the states that the error changes, each with the factor by which the error acts
-        on it.
+        ``terms``: the states that the error changes, each with its factor.
         """
         covariance = self.covariance
         for i, a in terms:

@@ -2,17 +2,8 @@
 
 """Detection of a wheel that is commanded to turn, but is at rest and may never start by itself.
 
-The public firmware's controller continues to use the last measured speed of a wheel at rest. If
-this speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
-
-Ticks show whether a wheel turns forward. For a wheel that should turn backward, 0x20 (odometry)
-shows whether it is at rest. While the other wheel is at rest too, the pose in 0x20 does not change.
-While the other wheel turns, 0x20 repeats the same speed for the wheel at rest.
-
-The board also repeats the speed of a wheel that rolls steadily. But that speed is not far above the
-set-point: far above the set-point, the controller gives no power, so the wheel would slow down.
-There are two exceptions. A feed-forward gives power at any speed. A saturated controller may keep
-full power until RPM 0/0 restarts it. The wheel is then faster than any wheel that comes to rest.
+Ticks show forward motion, 0x20 (odometry) backward motion. RPM 0/0 makes a stalled wheel start
+again.
 
 This module works on set-points, reports and times.
 """
@@ -25,23 +16,23 @@ from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.resting import FASTEST_RPM
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
+# The public firmware's controller keeps using the last measured speed of a wheel at rest. If this
+# speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
 STALLED_S: Final = 2.0
-"""Time in s without a sign of motion after which a wheel is regarded as stalled. With the
-firmware's own gains, a wheel starts in half of this time."""
+"""Time in s without motion after which a wheel is stalled. With the firmware's gains, a wheel
+starts in half of it."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. A repeated
-speed beyond both limits is the last speed of a wheel at rest. A wheel that rolls backward exceeds
-its set-point by at most 10 % and one RPM."""
+"""``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. Beyond both, a
+repeated speed is that of a wheel at rest."""
 UNLIKE: Final = 1.15
-"""Largest assumed difference between two wheels that roll backward, as a factor. For each wheel,
-speed is divided by set-point, and the two results are compared."""
+"""Largest assumed ratio, between two wheels that roll backward, of speed divided by set-point."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
-"""Smallest number of groups without a sign of motion after which a wheel is regarded as stalled. On
-a bad line few groups arrive, so the time ``STALLED_S`` alone is not enough."""
+"""Smallest number of groups without motion after which a wheel is stalled. On a bad line, few
+groups arrive."""
 
 
 class StallWatch:
@@ -49,8 +40,8 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``saturated``: for each wheel, whether its controller possibly gives full power. If so, the
-    wheel rolls although its reported speed does not change.
+    ``saturated``: for each wheel, whether it may roll at full power although its reported speed is
+    unchanged.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -59,8 +50,8 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.saturated = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of groups since ``_seen_at`` that could have shown its motion, but
-        did not."""
+        """For each wheel: number of groups since ``_seen_at`` that could have shown motion, but did
+        not."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
@@ -84,9 +75,7 @@ class StallWatch:
         now: float,
         resting: tuple[bool, bool] = (False, False),
     ) -> None:
-        """Process a report.
-
-        Ticks show a wheel's forward motion, and odometry shows its backward motion.
+        """Process a report: ticks show forward motion, and odometry backward motion.
 
         ``resting``: which wheels the motion filter assumes to be at rest.
         """
@@ -126,14 +115,17 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        A repeated speed is old if the other wheel's speed has changed, or if the repeated speed is
-        far above the set-point.
+        A repeated speed is old if the other wheel's speed has changed, or far above the set-point.
         """
         if told is None or self._told is None:
             return False
         same = [abs(a - b) < SAME_MPS for a, b in zip(told, self._told, strict=True)]
         if abs(told[wheel]) <= SAME_MPS or not same[wheel]:
             return False
+        # Far above the set-point, the controller gives no power. So a wheel that rolls would slow
+        # down, and a repeated speed is that of a wheel at rest. Exceptions: a feed-forward gives
+        # power at any speed, and a saturated controller may keep full power until RPM 0/0 restarts
+        # it.
         too_fast = self._too_fast(wheel, told)
         fastest_mps = FASTEST_RPM * self.settings.rim_mps_per_rpm
         self.saturated[wheel] |= too_fast and abs(told[wheel]) > fastest_mps

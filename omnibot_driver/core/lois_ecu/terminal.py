@@ -2,12 +2,8 @@
 
 """Changes of the terminal mode, and the standstill that is needed before a change of any mode.
 
-In a terminal mode, the board forwards a sensor's lines and sends no messages of its own. It still
-obeys set-points, but does not report motion. In such a mode, the public firmware does not report
-presses of the e-stop button either. So the robot is stopped first, and is not driven until the
-board's own messages arrive again.
-
-A mode is written repeatedly until the received data shows that the board obeys.
+In a terminal mode, the board obeys but reports neither motion nor its e-stop button. So the robot
+is stopped first.
 
 This module works on modes and times.
 """
@@ -22,8 +18,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which the driver sends Stop if it cannot see whether the robot is at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""For this time in s after a mode is written, reports that the board sent earlier may still
-arrive."""
+"""For this time in s after a mode is written, earlier reports may still arrive."""
 
 
 class ModeChange:
@@ -35,8 +30,8 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The sensor's mode that was written to the board. None after the board's own messages have
-        arrived again."""
+        """The sensor's mode that was written. None once the board's own messages have arrived
+        again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None

@@ -2,10 +2,7 @@
 
 """Translation of a LOIS ECU's reports to readings in SI units.
 
-This module also detects a restart of the board: the ticks are near zero again, or the board's clock
-has gone back.
-
-This module works on reports, without lines.
+This module also detects a restart of the board. It works on reports, without lines.
 """
 
 import math
@@ -38,17 +35,15 @@ from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
 UNKNOWN_FROM_YEAR: Final = 38
-"""Year of the century. A date in this year or later shows that the GPS receiver does not know the
-date."""
+"""Year of the century from which a date shows that the GPS receiver does not know the date."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""``RESTARTED_TICKS``, ``RESTARTED_TICKS_PER_S``: largest number of ticks by which wheels can roll
-back between two groups. It is a constant plus a number for each s between the groups. If the counts
-fall towards zero by more, the board has restarted."""
+"""``RESTARTED_TICKS``, ``RESTARTED_TICKS_PER_S``: largest fall of the counts by rolling back, plus
+a number for each s. A larger fall shows a restart."""
 CONTRADICTED_S: Final = 1.0
-"""If the decoder has forgotten the unit of the board's clock, the clock cannot confirm the time
-since the last ticks. The wheels are then assumed to have rolled back for at most this time in s."""
+"""Longest assumed time in s of rolling back while the unit of the board's clock is forgotten. The
+clock then cannot confirm the time since the last ticks."""
 
 
 class Translation:
@@ -223,20 +218,16 @@ class Translation:
 
 
 def _is_date(date: GpsDate) -> bool:
-    """Return whether the GPS receiver knows the date.
+    """Return whether the GPS receiver knows the date. Otherwise it sends zeros or e.g. 1980.
 
-    While the receiver does not know the date, it sends zeros, or the beginning of its calendar,
-    such as 1980. Dates from 2038 on are not accepted, because their seconds do not fit into a ROS
-    time.
+    Dates from 2038 on do not fit into a ROS time.
     """
     return bool(date.month and date.day) and date.year < UNKNOWN_FROM_YEAR
 
 
 def _days_since_1970(year: int, month: int, day: int) -> int:
-    """Return the number of days since 1970 in the Gregorian calendar.
-
-    The computation uses years that begin in March, so that the leap day is the last day of a year.
-    """
+    """Return the number of days since 1970 in the Gregorian calendar."""
+    # Years begin in March, so that the leap day is the last day of a year.
     year, month = (year, month - 3) if month > 2 else (year - 1, month + 9)
     leap_days = year // 4 - year // 100 + year // 400
     return 365 * year + leap_days + (153 * month + 2) // 5 + day - 1 - 719468

@@ -2,8 +2,7 @@
 
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-The schedule covers settings, the terminal mode, requests for records, and RPM 0/0 after a Stop. It
-also covers the recovery of a board that is silent or ignores commands.
+It also recovers a board that is silent or ignores commands.
 
 This module combines the classes for these tasks. It does not know what the board sends.
 """

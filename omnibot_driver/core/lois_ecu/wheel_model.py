@@ -2,8 +2,8 @@
 
 """Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
-The public firmware stores an RPM target for each wheel. Ticks are counted only while the target is
-positive. The measured speed has the sign of the target.
+The public firmware counts a wheel's ticks only while its RPM target is positive. The measured speed
+has the target's sign.
 
 This module works on set-points and times.
 """
@@ -17,8 +17,8 @@ HEARD_S: Final = 0.008
 """Assumed time in s from the writing of a line until the board has read it."""
 STEP_S: Final = 0.2
 FIRMWARE_STEP_S: Final = 0.091
-"""``STEP_S``, ``FIRMWARE_STEP_S``: period of the speed controller in s, according to the manual and
-in the public firmware."""
+"""``STEP_S``, ``FIRMWARE_STEP_S``: period of the speed controller in s, in the manual and in the
+public firmware."""
 
 CommandKind = Literal["rpm", "duty"]
 
@@ -27,8 +27,7 @@ CommandKind = Literal["rpm", "duty"]
 class _Effect:
     """Effect that a command has on a wheel at the time ``at_s``.
 
-    ``halts``: whether the firmware sets its RPM target to zero. If not, it carries out the command
-    with ``kind`` and ``speed_mps``.
+    ``halts``: whether the RPM target becomes zero, instead of ``kind`` and ``speed_mps``.
     """
 
     at_s: float
@@ -42,8 +41,7 @@ class WheelModel:
 
     ``kind``, ``target_mps``: the command that the motor follows now.
 
-    ``hidden_mps``: the firmware's RPM target. A duty command does not change it at once, but each
-    tick at a negative duty lowers it.
+    ``hidden_mps``: the firmware's RPM target. A negative duty lowers it with each tick.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -51,8 +49,8 @@ class WheelModel:
         self.target_mps = 0.0
         self.hidden_mps = 0.0
         self.step_s = step_s
-        """Period of the speed controller in s. A command takes effect with the controller's next
-        step, which comes after half a period on average."""
+        """Period of the speed controller in s. A command takes effect after half a period on
+        average."""
         self._effects: deque[_Effect] = deque(maxlen=128)
         self._heard: tuple[CommandKind, float] = ("rpm", 0.0)
         self._rpm_mps = 0.0

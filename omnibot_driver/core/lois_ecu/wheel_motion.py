@@ -2,11 +2,7 @@
 
 """Motion of a wheel under its commands, as a step of the motion filter.
 
-A wheel coasts without power, follows a duty, or is driven by the board's speed controller. The
-controller uses the last measured speed. The public firmware does not set this speed to zero when
-the wheel stops, so a wheel at rest may get little power, or none.
-
-The user's gains and motors are unknown, so the assumed noise is large.
+A wheel coasts without power, follows a duty, or is driven by the board's speed controller.
 
 This module works on commands and the states of one wheel.
 """
@@ -20,22 +16,21 @@ from omnibot_driver.core.lois_ecu.wheel_model import WheelModel
 WAY, SPEED, PUSH, COUNT, HELD = range(5)
 PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
-m, and the speed in m/s that was measured last."""
+m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 """States of the body: position, and the turn and distance that 0x20 (odometry) should show.
 
-``BIAS`` and ``EXCESS`` are indices of two states each, one for each wheel. ``BIAS`` is a systematic
-error of the speed. ``EXCESS`` is the fraction by which the wheel rolls backward faster than its
-set-point.
+``BIAS``, ``EXCESS``: two indices each, by wheel. Error of the speed, and fraction by which a wheel
+rolls backward faster than its set-point.
 """
 STATES: Final = 18
 
 CONTROL_RATE: Final = 2.0
-"""Assumed rate in 1/s at which the controller brings a wheel to its target speed, without overshoot
-(critically damped)."""
+"""Assumed rate in 1/s at which the controller reaches a target speed, critically damped."""
+# The user's gains and motors are unknown, so the assumed noise is large.
 PUSH_PER_SPEED: Final = 2.2
-"""Assumed standard deviation of a wheel's acceleration. The unit is m/s² for each m/s by which
-target and speed have recently differed."""
+"""Assumed standard deviation of a wheel's acceleration, in m/s² for each m/s of the recent speed
+error."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that the ground adds to a speed, in (m/s)² per s."""
@@ -45,17 +40,15 @@ DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""``COASTING_S``, ``DRY_MPS2``: time constant in s, and deceleration by dry friction in m/s², of a
-wheel without power."""
+"""``COASTING_S``, ``DRY_MPS2``: time constant in s, and deceleration by dry friction, of a wheel
+without power."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
-"""After its set-point has changed sign, a wheel is assumed to roll on in the old direction for at
-most this time in s."""
+"""Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Assumed time in s for which a wheel's speed differed from the model before the wheel was halted.
-The first value is for the board's own gains, with which the speed oscillates. The second value is
-for gains that the user set."""
+"""Assumed time in s for which a wheel deviated from the model before its halt. First for the
+board's own gains, then for the user's."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -69,8 +62,8 @@ class Step:
 
     ``new``: means of the states after the step.
 
-    ``unsure_mps``: for each wheel, the standard deviation of the measured speed that its controller
-    uses. The key is the index of the wheel's first state.
+    ``unsure_mps``: standard deviation of each wheel's last measured speed, by the wheel's first
+    state.
 
     ``rows``: changed rows of the transition matrix.
 
@@ -89,16 +82,15 @@ class Wheel:
 
     ``base``: index of the wheel's first state in the filter.
 
-    ``blind``: whether the wheel has moved, or has had a target, while the board did not count its
-    ticks. The user of this class clears the flag.
+    ``blind``: whether the wheel moved or had a target while uncounted. The caller clears the flag.
     """
 
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m that the wheel had rolled when it last certainly turned, or when it began
-        to follow a command. Motion that was estimated since then may have to be subtracted."""
+        """Distance in m when the wheel last certainly turned, or began a command. Later estimated
+        motion may have to be subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:
@@ -107,8 +99,8 @@ class Wheel:
         self.restless_mps = 0.0
         """Largest recent difference between target and speed, in m/s. It decays with time."""
         self.unsettled_mps = 0.0
-        """Difference between target and speed when the set-point last changed, in m/s. It decays
-        with time."""
+        """Difference between target and speed at the last new set-point, in m/s. It decays with
+        time."""
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
@@ -118,10 +110,10 @@ class Wheel:
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """``rolled_mps``, ``rolled_s``: speed in m/s when the controller was last reset, and time
+        """``rolled_mps``, ``rolled_s``: speed in m/s at the last reset of the controller, and time
         in s since then."""
         self.locked = False
-        """Whether the wheel is at rest without power, because the last measured speed exceeds its
+        """Whether the wheel rests without power, because the last measured speed exceeds its
         target."""
         self.rests = False
         """Whether the wheel is at rest. A repeated measured speed has shown this."""
@@ -214,6 +206,8 @@ class Wheel:
     def _controlled(self, step: Step, target_mps: float, *, holds: bool) -> None:
         v, push, dt, new = self.base + SPEED, self.base + PUSH, step.dt, step.new
         sign = math.copysign(1.0, target_mps)
+        # The controller uses the last measured speed. The public firmware does not set this speed
+        # to zero when the wheel stops. So a wheel at rest may get little power, or none.
         seen, factor = (self.base + HELD, sign) if holds else (v, 1.0)
         lacking = sign * target_mps - sign * factor * new[seen]
         self.locked = holds and not new[v] and lacking + 2 * step.unsure_mps[self.base] <= 0.0
