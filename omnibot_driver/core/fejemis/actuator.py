@@ -2,10 +2,8 @@
 
 """Repeats the motion lines (``rc``) to both boards.
 
-``Encoder`` limits the drive board's speed while the front wheel has not reached its angle. Each new
-angle of the wheel may allow more speed. So while the speed is limited, this module sends the motion
-lines again after each new angle, in addition to the usual repetition. Lines without checksums are
-also sent again after each new angle, so that a damaged line is soon replaced.
+While the speed is limited or lines lack checksums, each new angle of the front wheel repeats them
+too.
 
 The module knows when a line is due; it does not know what the line contains.
 """
@@ -58,7 +56,7 @@ class PairStream(SetpointStream):
     def angle_told(self, angle_rad: float, now: float) -> bool:
         """Receive the front wheel's angle in rad; return whether a new fault of the wheel is found.
 
-        The fault is that the wheel does not follow its commanded angle.
+        The fault: the wheel does not follow its commanded angle.
         """
         if self.driving and self._pair.restless:
             self._said_at = -math.inf

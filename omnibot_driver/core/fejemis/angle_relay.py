@@ -2,15 +2,7 @@
 
 """Writes the front wheel's angle as a line for the drive board, so that damage is detected.
 
-**Lines with a checksum.** If a line loses two characters whose codes add up to 99, its checksum
-stays correct. So the driver rounds the angle, by at most half a degree, to digits without such a
-pair. The rounding error is added to the next angle, so the mean of the angles is correct. Some
-angles to the right need a minus sign and a ``6``, which are such a pair. If both are lost, the
-board reads an angle of less than 10° to the left.
-
-**Lines without a checksum.** The board detects no loss. So the driver sends whole degrees. A whole
-number never becomes larger if a digit is lost, so the board never reads more than 90°. Beyond 90°,
-the board would drive its inner wheel faster than the outer one.
+A board must never read more than 90°: it would drive its inner wheel faster than the outer one.
 """
 
 import math
@@ -28,11 +20,8 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Largest angle to the left, in degrees, that undetected damage to a line is allowed to produce.
-
-A text is avoided if undetected damage could produce a larger angle to the left, or an angle to the
-right.
-"""
+"""Largest angle to the left, in degrees, that undetected damage to a line may produce. Texts with
+worse damage are avoided."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
@@ -46,6 +35,8 @@ class AngleRelay:
         """Return the ``fwl`` line for the angle; ``sums``: whether the caller adds a checksum."""
         angle_deg = math.degrees(angle_rad)
         wanted_deg = angle_deg + self._owed_deg
+        # Without a checksum, the board detects no loss. A whole number never grows if a digit is
+        # lost.
         text = _with_sum(round(10 * wanted_deg)) if sums else b"%d" % round(wanted_deg)
         self._owed_deg = max(-MOST_OWED, min(MOST_OWED, wanted_deg - float(text)))
         return b"fwl " + text
@@ -54,8 +45,7 @@ class AngleRelay:
 def heard_instead(text: str) -> Iterator[float]:
     """Yield each number that a board may read after an undetected loss of two characters.
 
-    The loss is undetected if the checksum of ``text`` stays correct. If the remaining text is not a
-    number, the result is 0.
+    0 stands for a remaining text that is not a number.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
@@ -64,6 +54,9 @@ def heard_instead(text: str) -> Iterator[float]:
 
 
 @lru_cache(maxsize=4000)
+# A checksum does not detect the loss of two characters whose codes add up to 99. So the angle is
+# rounded, by at most half a degree, to digits without such a pair. Some angles to the right need
+# ``-`` and ``6``, such a pair. If both are lost, the board reads less than 10° to the left.
 def _with_sum(tenths: int) -> bytes:
     across = ""
     for off in range(ROUNDED + 1):

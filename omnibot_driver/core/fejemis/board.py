@@ -2,16 +2,7 @@
 
 """The Fejemis as a ``Board`` of the driver: its two Teensy boards appear as one robot.
 
-This module connects the parts of the package and writes the lines of stop, start and pause. Each
-part is one file:
-
-- ``ports.py`` finds out which board is at which port.
-- ``inbound.py`` receives all messages, and ``translation.py`` converts them to readings.
-- ``encoder.py`` converts orders to motion lines.
-- ``watch.py`` stops the robot if a board is silent or its data is too old.
-- ``obedience.py`` checks whether the drive board obeys.
-- ``upkeep.py`` keeps both boards sending and configured.
-- ``services.py`` has the user's other requests, such as brush and lift.
+This module connects the parts of the package and writes the lines of stop, start and pause.
 """
 
 import math
@@ -44,7 +35,7 @@ class FejemisBoard(Board):
 
     ``services``: the user's requests that only a Fejemis has, such as brush and lift.
 
-    ``settings``: the user's settings; they may be replaced at any time.
+    ``settings``: may be replaced at any time.
     """
 
     def __init__(self, settings: FejemisSettings) -> None:
@@ -164,11 +155,7 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def silence(self) -> None:
-        """Handle the silence of both boards.
-
-        The mode becomes unknown, brush and lift are switched off, and the driver subscribes to all
-        data again.
-        """
+        """Handle the silence of both boards: switch brush and lift off, and subscribe again."""
         self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:
             half.subscribe_again()
@@ -177,8 +164,7 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The guard process may already have switched them off during the stall. The driver did not
-        read during the stall, so this time is not regarded as silence of the boards.
+        The guard process may have done so. The stall is not regarded as silence of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
@@ -284,7 +270,7 @@ class FejemisBoard(Board):
     def start(self) -> Packets:
         """Return a Stop and then ``start``; return no packets during an e-stop.
 
-        After ``start`` the board may obey its last motion command again. So the Stop comes first.
+        Stop comes first, because after ``start`` the board may obey its last motion command again.
         """
         if self._obedience.estopped:
             return NO_PACKETS
@@ -308,7 +294,7 @@ class FejemisBoard(Board):
     def last_words(self) -> tuple[Packets, Packets]:
         """Return two alternatives for the guard process: Stop, or an emergency stop and then Stop.
 
-        Both alternatives also switch brush and lift off.
+        Both also switch brush and lift off.
         """
         return self.wake(), self.emergency_stop() + self.stop()
 

@@ -2,8 +2,7 @@
 
 """Parses one line of text into a message.
 
-A line is rejected as damaged if a field is missing, or if a number is outside the range that the
-boards can measure. Extra fields are ignored, because newer firmware adds fields.
+A line is damaged if a field is missing or a number out of range. Newer firmware may add fields.
 
 The module knows keywords, fields and ranges; it does not know checksums or other lines.
 """

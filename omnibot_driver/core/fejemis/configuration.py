@@ -2,14 +2,7 @@
 
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
-**Writing.** After a write, the driver reads the values back. It repeats the write until the board
-reports the wanted values, at most ``TRIES`` times. The board may round the numbers that it reports,
-and rounding could hide a small difference. So the driver writes all values once to each new or
-restarted board, and changed values once after a change by the user.
-
-**Reading.** A number is accepted after two equal readings in a row. A single reading is not enough,
-because 1 in 99 damaged lines has a correct checksum. The driver computes the robot's geometry from
-these numbers.
+A number is accepted after two equal readings: 1 in 99 damaged lines has a correct checksum.
 
 The module knows which line requests which numbers; it does not know when the robot stands still.
 """
@@ -34,10 +27,7 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
     "drive": (b"confi", b"gyrooi", b"accoi", b"magoi", b"cpdrivei"),
     "front": (b"fwoi", b"cpsteeri", b"iri"),
 }
-"""Lines that request the configuration of each board.
-
-``confs`` is not in the list, because it is a subscribed stream.
-"""
+"""Lines that request the configuration of each board. ``confs`` is a subscribed stream instead."""
 ON: Final[Mapping[Role, tuple[Written, ...]]] = {
     "drive": (Written.WHEELS, Written.STEERING, Written.MAGNETOMETER, Written.ACCELEROMETER),
     "front": (Written.STEERING, Written.FRONT_WHEEL, Written.INFRARED, Written.STEERING_GAINS),
@@ -45,10 +35,7 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Largest relative difference between a written number and the number that is read back.
-
-The numbers may differ because boards print few digits.
-"""
+"""Largest relative difference between a written number and its reading. Boards print few digits."""
 DIGIT: Final = 6e-4
 
 
@@ -78,6 +65,8 @@ class Configuration:
         self._next_at = -math.inf
         self._tries = 0
         self._new = True
+        # Boards report rounded numbers, so a small difference may be hidden. Each new board gets
+        # all values.
         self._unsent = set(self.written)
 
     def configure(self, written: Mapping[Written, tuple[float, ...]]) -> None:
@@ -155,8 +144,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        The board rounds the numbers that it reports. So if the reported numbers agree with the
-        user's values, or are not known yet, the exact values of the user are returned.
+        Boards round their numbers. So the user's exact values are returned if the board's agree or
+        are unknown.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

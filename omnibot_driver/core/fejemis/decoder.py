@@ -2,15 +2,10 @@
 
 """Splits the bytes from one board into lines, checks the lines, and counts the damaged ones.
 
-**Checksums.** The manual shows lines without checksums, but the public host programs send and
-expect them. With the setting ``auto``, the decoder accepts both kinds until the first heartbeat
-shows which kind the board uses. After that, the decoder accepts only lines of this kind.
-
-**Decimals.** The boards print each number with a fixed count of decimals. If the decimals of a line
-differ from earlier lines with the same keyword, the line is damaged (``forms.py``).
+With ``auto``, the first heartbeat decides whether lines need checksums.
 
 The decoder does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
-bytes between calls, and looks at each byte a bounded number of times.
+bytes between calls.
 """
 
 from dataclasses import dataclass
@@ -25,10 +20,7 @@ from omnibot_driver.core.fejemis.sums import without_sum
 LONGEST_LINE: Final = 200
 """Largest accepted length of a line in characters: the size of the boards' own buffers."""
 CHANGED_AFTER: Final = 2
-"""How many heartbeats in a row prove that the board began or ceased to send checksums.
-
-A single heartbeat may be damaged.
-"""
+"""How many heartbeats in a row prove that the board began or ceased to send checksums."""
 
 
 @dataclass(slots=True)
@@ -51,8 +43,8 @@ class FejemisDecoder:
 
     ``changed``: whether the board began or ceased to send checksums. The caller resets this flag.
 
-    ``doubtful``: whether the last line did not agree with ``sums``. Until a line agrees again, the
-    driver sends lines without checksums to the board.
+    ``doubtful``: whether the last line contradicts ``sums``. Lines to the board then carry no
+    checksum.
 
     ``contradicted``: whether the last line contradicts the setting ``line_sums``.
     """

@@ -2,9 +2,7 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-Whenever the caller sends packets, it also passes them to ``meaning``. From these packets, the
-encoder learns which angle the front wheel must reach, and whether the drive board's speed is
-limited.
+Sent packets must be passed to ``meaning``: it notes the front wheel's target and the speed limit.
 
 The module knows geometry and lines; it does not know when lines are sent.
 """
@@ -85,8 +83,7 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        They are sent again while the speed is limited. Without checksums, they are always sent
-        again, so that a damaged line is replaced after 15 ms.
+        Without checksums, this replaces a damaged line after 15 ms.
         """
         return self.held or not self._pair.with_sums
 
@@ -112,8 +109,7 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the body twist that ``packets`` command at the present front angle.
 
-        The encoder also notes that ``packets`` are sent. If ``packets`` are not the last motion
-        that ``encode`` returned, they are regarded as a stop, and the twist is zero.
+        Called for sent packets. All but the last result of ``encode`` are regarded as a stop.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -2,9 +2,8 @@
 
 """Checks that the front wheel follows its commanded angle, and refuses motion if it does not.
 
-After a first fault, motion is refused until the wheel has moved. After a second fault within 60 s,
-motion is refused until the user calls ~/start. Without this refusal, a node that continues to send
-commands would move the robot again and again, for a second each time.
+After a first fault, motion is refused until the wheel moves; after a second within 60 s, until
+~/start.
 
 The module knows angles and times; it does not know lines or speeds.
 """
@@ -13,10 +12,7 @@ import math
 from typing import Final
 
 FOLLOWS_WITHIN_S: Final = 1.0
-"""Time in s within which the front wheel must come nearer to its commanded angle.
-
-If the wheel comes no nearer within this time, it has a fault.
-"""
+"""Longest time in s for which the front wheel may come no nearer to its commanded angle."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
 """Tolerated deviation of the front wheel from its commanded angle, in rad, while the robot drives.
@@ -61,10 +57,7 @@ class Follower:
         self._angle_rad, self._within_rad = angle_rad, within_rad
 
     def look(self, angle_rad: float, now: float) -> bool:
-        """Receive the measured angle in rad; return whether a new fault of the wheel is found.
-
-        The fault is that the wheel does not follow its commanded angle.
-        """
+        """Receive the measured angle in rad; return whether a new fault of the wheel is found."""
         if self.refusal == UNTIL_IT_MOVES and abs(angle_rad - self._stuck_rad) > MOVED_RAD:
             self.refusal = ""
         if self._angle_rad is None or self.refusal:
@@ -78,6 +71,7 @@ class Follower:
             self._since, self._from_rad = now, angle_rad
         if now - self._since <= FOLLOWS_WITHIN_S:
             return False
+        # Otherwise a node that keeps commanding would move the robot for a second again and again.
         second = now - self._fault_at < AGAIN_WITHIN_S
         self.refusal = UNTIL_START if second else UNTIL_IT_MOVES
         self._fault_at, self._stuck_rad = now, angle_rad

@@ -2,9 +2,8 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A board prints all lines of one kind in the same form. So a line in another form has lost or gained
-characters. After three lines in a row with the same new form, this form replaces the learnt one. A
-kind of line whose form keeps changing is no longer checked.
+A line in another form has lost or gained characters. A new form is accepted after three lines in a
+row.
 
 The module knows forms; it does not know the meaning of a line.
 """
@@ -14,11 +13,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: how many lines in another form end the check of their kind.
-
-The count begins again after every ``OF`` lines of the kind. ``VARIES`` is for lines with a correct
-checksum. Such lines are rarely damaged, so fewer of them prove that the board varies the form.
-"""
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: how many of ``OF`` lines in another form end the check of
+their kind. With correct checksums, fewer suffice."""
 OF: Final = 24
 
 Form = tuple[int, ...]

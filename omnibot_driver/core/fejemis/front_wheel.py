@@ -16,10 +16,7 @@ HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all bits except the frame counter."""
 SICK_LINES: Final = 3
-"""How many lines in a row must report a fault before the sensor is regarded as faulty.
-
-A single line may be damaged.
-"""
+"""How many lines in a row must report a fault before the sensor is regarded as faulty."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
 """Jump of the angle, in degrees, that is accepted in addition to a motion at ``FASTEST_DEGPS``."""
@@ -80,8 +77,8 @@ class FrontWheel:
     def drives_by_rad(self) -> float:
         """Angle in rad that is relayed to the drive board, limited to ±90°.
 
-        According to the manual's equations, the drive board would drive its inner wheel faster than
-        the outer one if the angle were larger.
+        At a larger angle, the board would drive its inner wheel faster than the outer one (manual's
+        equations).
         """
         return max(-math.pi / 2, min(math.pi / 2, self.angle_rad))
 
@@ -105,11 +102,7 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Return whether the wheel can have reached the angle.
-
-        Return True also for a jump that two angles in a row confirm: the previous angle was
-        rejected, and this angle is near it.
-        """
+        """Return whether the wheel can have reached the angle, or two angles confirm a jump."""
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

@@ -2,8 +2,7 @@
 
 """One of the two Teensy boards, called a half: its identity, its data streams and its silence.
 
-The driver subscribes to the board's streams. If a stream does not arrive, the driver subscribes
-again: either the subscription was lost, or the board has restarted and forgotten it.
+If a stream does not arrive, the driver subscribes again.
 
 The module knows lines and times; it does not know what a message is used for.
 """
@@ -36,8 +35,7 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-``confs`` is a stream, although its numbers rarely change. The request ``confsi`` would be
-dangerous: without its last letter, it is a command that sets the geometry to zero.
+``confs`` must not be requested: ``confsi`` without its last letter sets the geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
@@ -47,10 +45,8 @@ AGAIN_S: Final = 0.5
 ASK_AGAIN_S: Final = 0.1
 """Time in s between two requests for the heartbeat, while the board may have restarted."""
 MANY: Final = 30
-"""How many damaged or unknown lines per second are tolerated before the user is notified.
-
-A board sends a few hundred lines per second.
-"""
+"""How many damaged or unknown lines per second are tolerated. A board sends a few hundred lines per
+second."""
 SILENT_S: Final = 1.5
 """Silence in s after which a board is regarded as gone."""
 _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
@@ -64,10 +60,6 @@ class Half:
     ``restarted``: whether the board has restarted. The caller resets this flag.
 
     ``heard_at``: time in s of the last valid line.
-
-    If the ``NEEDED`` stream pauses, the board may have restarted, and the line that reports the
-    restart may be lost. So the half is ``unsure`` until a heartbeat shows that the board's time has
-    continued.
     """
 
     def __init__(self, line_sums: LineSums) -> None:
@@ -102,7 +94,11 @@ class Half:
 
     @property
     def unsure(self) -> bool:
-        """Whether the board may have restarted, and so may lack the user's settings."""
+        """Whether the board may have restarted, and so may lack the user's settings.
+
+        True after a pause of the ``NEEDED`` stream, until a heartbeat shows that the board's time
+        continues.
+        """
         return self._unsure_at is not None
 
     @property
@@ -113,9 +109,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        This order matters, because a message can change the half: if it shows a restart, the half
-        forgets the earlier times of the board. Messages with an implausible board time are left
-        out. Poses before the first heartbeat are left out too.
+        A message can change the half: after a restart, earlier times of the board are forgotten.
+        Messages with an implausible time are left out.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

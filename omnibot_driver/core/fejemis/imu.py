@@ -2,12 +2,7 @@
 
 """Computes when the board took each sample of its IMU, and converts the sample to SI units.
 
-The gyro and acceleration lines carry no time. The board takes a sample every ``PERIOD_S`` of its
-own clock, and sends both lines together. So the time of a sample is a start time (the phase) plus a
-whole number of periods. The module finds both from the arrival times, by two rules:
-
-- A sample cannot arrive before its own time.
-- A sample that arrives after a pose is not older than the pose.
+The lines carry no time: time = phase + a whole number of ``PERIOD_S``.
 
 The module knows pairs of lines and times; it does not know how the pairs are found
 (``imu_pairs.py``).
@@ -26,8 +21,7 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Interval between the arrivals of two late samples, in periods, above which a sample was lost.
 
-A sample is late if it arrives a period or more after its time. Late samples that waited for a
-stalled host arrive together. If late samples do not arrive together, an earlier sample was lost.
+Samples that waited for a stalled host arrive together.
 """
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s in which the board sends all lines of one control cycle."""
@@ -67,13 +61,11 @@ class ImuSamples:
         return ImuReading(self.forces, self.rates)
 
     def sampled_s(self, arrived_s: float, not_before_s: float, skipped: int) -> float:
-        """Return when the board took the next sample, as a time of the board's clock in s.
+        """Return when the board took the next sample, in s of the board's clock.
 
-        ``arrived_s``: when the sample arrived, as a time of the board's clock.
+        ``arrived_s``: arrival by that clock. ``not_before_s``: last pose before.
 
-        ``not_before_s``: time of the last pose that arrived before the sample.
-
-        ``skipped``: how many incomplete samples were left out before this one.
+        ``skipped``: incomplete samples left out before.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -82,6 +74,7 @@ class ImuSamples:
         since_s, self._arrived_s = arrived_s - self._arrived_s, arrived_s
         self._count += 1 + skipped
         time_s = self._phase_s + self._count * PERIOD_S
+        # A sample that arrives after a pose is not older than the pose.
         lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S
         if delay_s < -PERIOD_S / 2:

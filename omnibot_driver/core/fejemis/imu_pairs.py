@@ -2,23 +2,8 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-The lines carry neither time nor number. Every ``PERIOD_S``, the board sends both lines of a sample
-in one cycle, always in the same order. A first line and the next second line form a pair if no
-other gyro or acceleration line comes between them, even if the second line is late.
-
-A pair is false if its lines are of different samples. This happens if the second line of one sample
-and the first line of the next sample are both lost. Three observations show a false pair:
-
-- A line of another kind comes between its two lines, and this kind does not usually come there.
-- The second line comes ``PAIR_WITHIN_S`` or more after the first. Such a pair waits for the next
-  pose. The times of two poses tell how many samples lie between them.
-- The next pose comes in the same read, and shows that lines are missing since the previous pose. So
-  a pair is returned only at this pose, or at the end of the read.
-
-One false pair remains undetected: its lines come less than ``PAIR_WITHIN_S`` apart because they are
-late, and the read that completes the pair has no later pose.
-
-Some samples are left out at the beginning, until the order of the two lines is known.
+A pair is false if its lines are of different samples: both lines between them were lost. Until the
+order of the two lines is known, samples are left out.
 """
 
 import itertools
@@ -32,33 +17,28 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 Kind = Literal["gyro", "acc"]
 
 PERIOD_S: Final = 0.01
+# The lines carry neither time nor number. Every ``PERIOD_S``, the board sends both lines of a
+# sample in one cycle, always in the same order. Three observations show a false pair: a line of
+# another kind between its lines that usually does not come there; a long pause between its lines,
+# so that it waits for the next pose; the next pose, if lines are missing since the previous pose.
+# One kind remains undetected: both lines are late, but close together, and no later pose is in the
+# read.
 PAIR_WITHIN_S: Final = 0.005
 """Longest time in s between the two lines of a pair that needs no further evidence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``: smallest evidence in s that proves the order of the two lines.
-``SUREST_S``: largest evidence that is stored.
-
-The first line of a sample is the one with the longer pauses before it. So the evidence is the sum
-of the pauses before gyro lines, minus the sum of the pauses before acceleration lines.
-"""
+"""``KNOWN_S``, ``SUREST_S``: smallest evidence in s that proves the order of the two lines, and
+largest that is stored."""
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that is added to a pause if a line of another kind comes during the pause.
-
-Such a line shows that a control cycle has ended in the pause.
-"""
+"""Evidence in s that is added to a pause in which another kind of line comes. Such a line ends a
+cycle."""
 PATIENCE: Final = 60
-"""How many pauses are measured before the order is decided even with weak evidence.
-
-If the board sends both lines half a period apart, the evidence stays weak.
-"""
+"""How many pauses are measured before weak evidence decides, e.g. of lines half a period apart."""
 MOST: Final = 10
 """Largest magnitude of the numbers in ``_outside``."""
 UNPOSED: Final = 20
-"""How many gyro or acceleration lines may come while a pair waits for the next pose.
-
-After more lines, the pair is rejected.
-"""
+"""How many gyro or acceleration lines may come while a pair waits for a pose. More reject the
+pair."""
 
 
 @dataclass(slots=True)
@@ -100,10 +80,8 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """Evidence for the order of the lines, in s.
-
-        It is positive if gyro lines come first, and negative if acceleration lines do.
-        """
+        """Pauses before gyro lines minus pauses before acceleration lines, in s. Positive: gyro
+        lines come first."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -128,8 +106,7 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
 
-        If lines of this kind do not usually come within a pair, the present pair has lost its
-        second line.
+        If it usually comes outside of pairs, the present pair has lost its second line.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -159,7 +136,7 @@ class ImuPairs:
     def take(self) -> list[Pair | Oriented]:
         """Return the pairs that are no longer doubtful, and the orientations, in order of arrival.
 
-        The caller calls this after a pose and at the end of a read.
+        Called after a pose and at the end of a read.
         """
         taken: list[Pair | Oriented] = []
         while self._queue:

@@ -2,8 +2,8 @@
 
 """Handles all messages: passes each message to the parts that use it, and keeps the robot's mode.
 
-If a message shows a restart or a fault of a board, or if a board pauses, the module stops the
-robot. The module knows messages and times; it does not know how lines are written.
+It stops the robot at a restart, fault or pause of a board. The module knows messages and times; it
+does not know how lines are written.
 """
 
 from collections.abc import Callable
@@ -20,10 +20,8 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""A function that receives the front wheel's angle in rad, and the time in s.
-
-It returns whether a new fault is found: the wheel does not follow its commanded angle.
-"""
+"""A function that receives the front wheel's angle in rad and the time in s. It returns whether the
+wheel newly fails to follow its target."""
 
 
 class Inbound:
@@ -31,8 +29,7 @@ class Inbound:
 
     ``mode``: nominal while both boards send data and the drive board obeys.
 
-    ``relay_rad``: the front wheel's angle in rad that is still to be relayed to the drive board, or
-    None.
+    ``relay_rad``: angle that must still be relayed to the drive board, or None.
     """
 
     def __init__(

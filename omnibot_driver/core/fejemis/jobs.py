@@ -2,13 +2,7 @@
 
 """Runs the user's requests other than motion, one at a time, and checks whether they succeed.
 
-The boards do not acknowledge these requests. So each job has its own proof:
-
-- A calibration has succeeded when the new offsets are read twice with the same result. One reading
-  is not enough, because 1 in 99 damaged answers has a correct checksum.
-- Loading has succeeded when the configuration is read after the request.
-- Saving cannot be checked. The job only waits until both boards have sent a heartbeat after the
-  request.
+The boards do not acknowledge these requests, so each job has its own proof.
 
 The module does not read a clock.
 """
@@ -23,9 +17,9 @@ from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, Whe
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
-"""The reason for refusing motion, brush and lift after the user has requested a power-off."""
+"""The reason for refusing motion, brush and lift after a requested power-off."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
-"""Pairs of digits whose codes add up to 99. A checksum does not detect the loss of both digits."""
+"""Pairs of digits whose codes add up to 99: a checksum does not detect the loss of both."""
 WITHIN_S: Final = 8.0
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
@@ -60,8 +54,7 @@ class Jobs:
 
     ``powering_off``: whether the drive board will soon cut the power.
 
-    ``reload``: whether the boards may have loaded another configuration. The caller must then read
-    it again, and reset this flag.
+    ``reload``: whether the configuration must be read again. The caller resets this flag.
     """
 
     def __init__(self) -> None:
@@ -104,7 +97,7 @@ class Jobs:
 
         ``token``: identifies the job in its result.
 
-        ``delay_s``: for a power-off, the time until the board cuts the power.
+        ``delay_s``: time until a power-off.
         """
         if self.job is not None:
             raise RequestRefused(
@@ -134,7 +127,7 @@ class Jobs:
     def restarted(self, role: Role) -> None:
         """End the running job as failed, because the board ``role`` has restarted.
 
-        A power-off concerns only the drive board. It continues if the front board has restarted.
+        A power-off continues if the front board has restarted.
         """
         if role == "front" and self.job is Job.POWER_OFF:
             return
@@ -153,7 +146,7 @@ class Jobs:
     def begin(self) -> None:
         """End the running job as failed, because the connection is new.
 
-        A requested power-off stays in force, because the board may already have received it.
+        A power-off stays in force, because the board may already have received it.
         """
         self.cancel("the port was lost meanwhile; call again once it is back")
 
@@ -199,6 +192,7 @@ class Jobs:
         if isinstance(message, Heartbeat):
             self._heard.add(role)
             late = now - self._begun_at > SAID * AGAIN_S
+            # Saving cannot be checked. The job only waits for a heartbeat of both boards.
             if job is Job.SAVE and late and {"drive", "front"} <= self._heard:
                 self._finish(True, "save request sent to both boards; they do not confirm it")
             elif job is Job.POWER_OFF and late and role == "drive":
@@ -216,6 +210,7 @@ class Jobs:
             self._offsets(job, message.numbers, now)
 
     def _offsets(self, job: Job, numbers: tuple[float, ...], now: float) -> None:
+        # One reading is not enough, because 1 in 99 damaged answers has a correct checksum.
         once, self._once = self._once, numbers
         if numbers != once:
             return

@@ -2,10 +2,8 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Brush and lift run only if the user requests it. The lift never runs longer than requested, because
-each line for the lift contains the run time. An e-stop, a pause or a lost board switches brush and
-lift off. The board does not acknowledge lines, so lines for the brush and the lights are sent
-several times.
+An e-stop, a pause or a lost board switches brush and lift off. Each lift line limits its run time.
+Other lines are repeated, because the board acknowledges none.
 """
 
 import math
@@ -22,24 +20,18 @@ BRUSH_AGAIN_S: Final = 1.0
 """Period in s at which ``brush 1`` is repeated while the brush is on, because a line may be lost.
 """
 PACE_S: Final = 0.05
-"""Shortest time in s between two lift lines, or between two light lines.
-
-If the user commands more often, only the newest command is sent.
-"""
+"""Shortest time in s between two lift lines, or two light lines. Only the newest command is
+sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest allowed ratio of the voltage that is sent to the wanted voltage.
-
-If the checksum would not detect damage to a line with the wanted voltage, a lower one is sent.
-"""
+"""Smallest ratio of the sent to the wanted voltage. A lower voltage is sent if a checksum would not
+detect damage."""
 LEAST_TIME_S: Final = 0.04
 
 
 class Machine:
     """State of brush, lift and lights.
-
-    ``brush``: whether the brush is on.
 
     ``volts``: voltage of the lift in V; 0 when its run time is over.
 
@@ -53,12 +45,8 @@ class Machine:
         self._lift_line = b""
         """The line for the lift that is still to be sent; empty if there is none."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """``_lift_at``: time in s at which to send ``_lift_line``.
-
-        ``_lift_again_at``: time in s from which the next line for the lift may be sent.
-
-        ``_lift_until``: time in s at which the lift stops.
-        """
+        """Times in s: to send ``_lift_line``, earliest for the next lift line, and end of the
+        lift's motion."""
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf

@@ -2,8 +2,8 @@
 
 """The messages that the two boards send: one class for each kind of line.
 
-The numbers are in the boards' units: degrees, m/s², µT, V, A, m, s. A message that is only shown in
-diagnostics is a ``Status`` or ``Words``.
+Units are the boards': degrees, m/s², µT, V, A, m, s. ``Status`` and ``Words`` are only shown in
+diagnostics.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,7 @@ from omnibot_driver.core.values import value
 class Heartbeat:
     """``hbt``: the heartbeat of a board.
 
-    ``state``: on the drive board, the variable rcSource. It is -1 while the board ignores motion
-    commands.
+    ``state``: rcSource on the drive board, -1 while it ignores motion commands.
     """
 
     time_s: float
@@ -149,7 +148,7 @@ class WheelConfiguration:
 class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
 
-    According to the board's help text, the distance comes first. Some boards send the track first.
+    By the help text, the distance comes first. Some boards send the track first.
     """
 
     first_m: float

@@ -2,16 +2,9 @@
 
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
-Only some numbers can be written in this way (``numerals.py``). But neither board needs both numbers
-of its line exactly:
-
-- The front board computes the wheel's angle from the ratio of speed and turn rate.
-- The drive board computes the speed of the outer wheel. It is the root of the sum of the squares of
-  both numbers, with the sign of the speed.
-
-Several lines give the wanted angle or speed exactly enough. Of these, the module takes the one that
-is nearest to the command. It also avoids lines in which a lost line end or a lost digit of the
-checksum could hide a lost character (``outbound.py``).
+Neither board needs both numbers exactly: the front board uses their ratio, the drive board the root
+of their squares. Of the safe lines (``numerals.py``, ``outbound.py``), the nearest to the command
+is taken.
 """
 
 import math
@@ -25,26 +18,22 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Speed in m/s below which the front board's line contains the speed 0 and only a turn.
-
-Only few numbers near such small speeds can be written.
-"""
+"""Speed in m/s below which the front board's line has speed 0. Few such small numbers can be
+written."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""
 ANGLE_COST: Final = 1e4
-"""Cost of an angle error of 1 rad in the choice among several lines.
-
-For comparison: the cost is 1 for a number that is e (2.718) times as large as commanded.
-"""
+"""Cost of an angle error of 1 rad. For comparison: a number e times as large as commanded costs
+1."""
 SLOWEST: Final = 30.0
 """The speed in the drive board's line is 0, or at least the outer wheel's speed divided by this."""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """
 Candidate = tuple[float, str, str]
-"""A possible line: its cost, and the texts of speed (m/s) and turn rate (degrees/s) without signs.
-"""
+"""A possible line: its cost, and the texts of speed (m/s) and turn rate (degrees/s) without
+signs."""
 
 
 @lru_cache(maxsize=512)

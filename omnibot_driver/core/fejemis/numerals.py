@@ -2,12 +2,8 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-There are pairs of characters whose loss a checksum does not detect: ``1`` and ``2``, ``0`` and
-``3``, ``.`` and ``5``, ``-`` and ``6``. Each motion line contains a ``2``, the source of the
-command, so the numbers contain no ``1``. They can contain ``0`` and ``.``, so they contain neither
-``3`` nor ``5``. In a line with a minus sign, they contain no ``6``.
-
-So some values cannot be sent. The largest gap in each power of ten is like that from .0999 to .200.
+Unsafe pairs: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, ``-`` and ``6``. So some values
+cannot be sent, e.g. from .0999 to .200.
 """
 
 from bisect import bisect_left, bisect_right
@@ -17,20 +13,17 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: limits of the numbers, as powers of ten.
-
-The first digit of a number counts 10**p, where p is at least ``SMALLEST`` and less than
-``LARGEST``.
-"""
+"""``SMALLEST``, ``LARGEST``: range of the first digit's power of ten, without ``LARGEST``."""
 
 
 @cache
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all numbers that can be sent safely, in rising order, and the text of each number.
 
-    They lie between 0.0001 and 10000. ``negative``: whether the line has a minus sign. If it has,
-    the numbers contain no ``6``, because a checksum does not detect the loss of ``-`` and ``6``.
+    ``negative``: whether the line has a minus sign, so that the numbers contain no ``6``.
     """
+    # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
+    # ``5``.
     digits = "024789" if negative else "0246789"
     mantissas = [
         first + second + third for first in digits[1:] for second in digits for third in digits
@@ -47,8 +40,7 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
     """Return the number of ``numerals`` that is nearest to a positive ``number``, with its text.
 
-    ``down``: whether the result must not be larger than ``number``. If all numbers are larger, the
-    smallest one is returned.
+    ``down``: whether the result must not exceed ``number``, unless all numbers do.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)

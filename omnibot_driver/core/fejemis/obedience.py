@@ -2,13 +2,11 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-The driver sends ``stop`` to the board for a pause and also for its own e-stop. So the heartbeat
-alone does not tell a pause from an e-stop. After the release of an e-stop, the driver sends
-``start`` until the heartbeat shows that the board obeys. A pause remains until the user calls
-~/start.
+A pause and the driver's e-stop both send ``stop``. After the e-stop's release, ``start`` is
+repeated; a pause lasts until ~/start.
 
-The module knows times and rcSource; it does not know lines. rcSource is a number in the heartbeat:
-the source of the commands that the board obeys.
+The module knows times and rcSource, the source of the commands that the board obeys; it does not
+know lines.
 """
 
 import math
@@ -25,8 +23,6 @@ class Obedience:
     """Whether the drive board obeys, and why not.
 
     ``source``: the last rcSource; None before the first.
-
-    ``estopped``: whether the driver's e-stop is latched.
 
     ``pause_said``: whether the user has requested a pause since the last start.
     """
@@ -68,7 +64,7 @@ class Obedience:
     def release(self, now: float) -> None:
         """Release the driver's e-stop; ``start`` becomes due if the board obeyed before the e-stop.
 
-        After a requested pause, ``start`` does not become due.
+        Not after a requested pause.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf

@@ -2,18 +2,8 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-**Why both are needed.** Poses in steps of 1 mm every 20 ms give speeds in steps of 0.05 m/s. The
-wheel speeds are finer, but do not add up exactly. So a displacement is the motion that the wheel
-speeds give between two poses, corrected towards the newer pose.
-
-**Large differences.** If lines were lost, or a wheel turned quickly, the wheel speeds and the two
-poses differ by more than rounding explains. Then the displacement is the difference of the poses.
-If the excess is small, the displacement is the mean of this difference and the wheels' motion.
-
-**Rejected poses.** A pose is rejected if the last pose and the wheel speeds do not explain it. The
-next pose is accepted if it agrees with the rejected pose, and the robot can have reached it. If the
-robot cannot have reached it, the board may have begun a new frame (command ``enc0``). This is
-assumed as soon as ``NEW_FRAME`` poses in a row agree with the pose before them.
+Poses in steps of 1 mm every 20 ms give speeds in steps of 0.05 m/s. Wheel speeds are finer, but do
+not add up exactly. So a displacement is the wheels' motion, corrected towards the newer pose.
 """
 
 import math
@@ -24,23 +14,15 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between pose and wheel speeds that one displacement corrects.
-
-The fraction applies if rounding explains the difference.
-"""
+"""Fraction of the difference between pose and wheel speeds that one displacement corrects, if
+rounding explains the difference."""
 ROUNDINGS: Final = 1.5
-"""Largest difference that rounding explains, in units of the last digit of the line.
-
-Each of two poses is wrong by up to half a unit. The rotation by the heading mixes the errors of
-both axes.
-"""
+"""Largest difference that rounding explains, in units of the last digit. Each pose is wrong by half
+a unit, and the rotation mixes both axes."""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
-"""``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose, in m and rad.
-
-It is the deviation from the pose to which the wheel speeds lead. ``SPEED_UP_MPS2`` is the
-acceleration for which a larger deviation is accepted.
-"""
+"""``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose from the wheels' motion, in m
+and rad. ``SPEED_UP_MPS2`` adds to it."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -99,8 +81,7 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement up to ``pose``; every 0.2 s, return also a PoseReading.
 
-        The PoseReading is the sum of all displacements, including those that a later check of the
-        driver rejects.
+        The PoseReading sums all displacements, even those that the driver rejects later.
         """
         displacement = self.pose(pose, now)
         if displacement is None:
@@ -114,7 +95,7 @@ class PoseOdometry:
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
         """Return the displacement up to ``pose``; None for the first pose and for a rejected pose.
 
-        The first pose after a restart of the board gives a displacement of 0.
+        After a restart of the board, the first displacement is 0.
         """
         before = self._pose
         if before is None:
@@ -146,6 +127,8 @@ class PoseOdometry:
         if seconds < LEAST_S or not _possible(way, seconds):
             self._agreed = 0
             return None
+        # Two rejected poses agree. If the robot cannot have reached the second, the board may have
+        # begun a new frame (command ``enc0``).
         since_s = pose.time_s - self._pose.time_s
         whole = log_of(self._told.way_to(_place(pose)))
         self._agreed += 1
@@ -187,6 +170,8 @@ class PoseOdometry:
             return way
         off = way - rolled
         digit_m = 10.0**-decimals
+        # If rounding does not explain the difference, lines were lost, or a wheel turned quickly.
+        # Then the poses decide; if the excess is small, the mean.
         if off.way_m > ROUNDINGS * digit_m or abs(off.yaw_rad) > ROUNDINGS * YAW_DIGIT_RAD:
             return (
                 way if off.way_m > 3.0 * digit_m or abs(off.yaw_rad) > 0.005 else _half(rolled, way)

@@ -2,21 +2,8 @@
 
 """Adds checksums to lines for the boards, and checks whether damage to a line is detected.
 
-The checksum is a sum modulo 99. So it does not detect two lost characters whose codes add up to 99
-or 198: ``0`` and ``3``, ``1`` and ``2``, ``.`` and ``5``, ``-`` and ``6``. A motion line must not
-contain both characters of a pair (``motion_lines.py``).
-
-Two more kinds of damage may remain undetected, depending on the value of the checksum. So the
-digits of a motion line are chosen to get a safe checksum:
-
-- **A lost line end** joins two lines. If one certain character is lost too, the joined line is
-  accepted: the character whose code equals the sum of the second line with its prefix. So this sum
-  must not be the code of ``;`` or of a character in numbers. If no digits of the line avoid this,
-  the driver sends an empty line before it. The boards ignore empty lines.
-- **A lost digit of the checksum** is undetected if one certain character is lost too. So this
-  character must not occur in numbers.
-
-No characters are added to a line itself, because a board may compare the whole line with ``stop``.
+The checksum does not detect two lost characters whose codes add up to 99 or 198. A motion line must
+not contain both (``motion_lines.py``).
 """
 
 from functools import lru_cache
@@ -38,6 +25,8 @@ def line(text: bytes, *, sums: bool) -> bytes:
     """Return the bytes of one line with its line end; ``sums``: whether to add the checksum."""
     if not sums:
         return text + b"\n"
+    # The boards ignore empty lines. The line itself stays as it is: a board may compare it with
+    # ``stop``.
     before = b"" if robust(text) else b"\n"
     return before + with_sum(text) + b"\n"
 
@@ -61,6 +50,10 @@ def robust(text: bytes) -> bool:
 
     The second loss is a line end or a digit of the checksum.
     """
+    # A lost line end joins two lines. The joined line is accepted if the character whose code is
+    # the sum of the second line with its prefix is lost too. So this sum must not be the code of
+    # ``;`` or of a character in numbers. After a lost digit of the checksum, one other lost
+    # character is undetected too. So this character must not occur in numbers.
     total = sum_of(text)
     tens, ones = divmod(total, 10)
     as_second = (ord(";") + 2 * ord("0") + tens + ones + total - 1) % MODULUS

@@ -2,13 +2,7 @@
 
 """Writes ``rc`` lines without a checksum, so that undetected damage has little effect.
 
-An ``rc`` line contains a source (``2``), a speed and a turn rate. If the source or a space is lost,
-each later number takes the place of the number before it. The drive board uses only the root of the
-sum of the squares of speed and turn rate. So the driver sends this root as the speed, and 0 as the
-turn rate. If these numbers move forward by one place, the 0 becomes the speed: the line is a stop.
-
-One risk remains: the line may lose its decimal point, or a digit after it. The board obeys such a
-line until the next one, which follows with the next angle of the front wheel.
+A lost decimal point, or digit after it, stays undetected until the next line.
 """
 
 import math
@@ -26,6 +20,8 @@ def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
     The board computes the turn from the angle of the front wheel.
     """
+    # The line has a source (``2``), a speed and a turn rate. The board uses only the root of the
+    # sum of squares. If the source or a space is lost, the 0 becomes the speed: the line is a stop.
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
         return STOP

@@ -24,10 +24,8 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
 }  # fmt: skip
 """Requests for each board. They are sent in this order, again and again."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Requests that are sent only with a checksum.
-
-Without their last letter, they would be commands to the servo.
-"""
+"""Requests that are sent only with a checksum. Without their last letter, they command the
+servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1
 

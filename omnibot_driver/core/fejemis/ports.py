@@ -2,9 +2,8 @@
 
 """Finds out which of the two boards (halves) is at which port, and addresses lines to them.
 
-The boards are identified by their heartbeats, so the ports may be swapped. A board that is not
-identified receives only lines that stop or switch off something. Such a line goes to each port
-where the board may be.
+Heartbeats identify the boards. An unidentified board only gets lines that stop or switch off
+something.
 
 The module knows identities and ports; it does not know the meaning of a line.
 """

@@ -37,11 +37,7 @@ class SteeringReading:
 class OrientedImuReading:
     """The board's orientation, with the turn rates and the specific force of the last IMU sample.
 
-    ``orientation``: quaternion x, y, z, w.
-
-    ``angular_velocity``: in rad/s.
-
-    ``specific_force``: in m/s².
+    ``orientation``: quaternion x, y, z, w. Other units: rad/s, m/s².
     """
 
     orientation: Quaternion
@@ -64,7 +60,7 @@ class BatteryReading:
 
     ``cells``: number of cells; 0 if unknown.
 
-    ``low``: whether the voltage per cell is below the limit of the settings.
+    ``low``: whether a cell is below the limit of the settings.
     """
 
     volts: float

@@ -18,10 +18,7 @@ from omnibot_driver.core.fejemis.told import Told
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 STOPS_WITHIN_S: Final = 0.5
-"""Time in s that a moving robot gets to stop before a configuration is loaded.
-
-The driver sends Stop when the user requests the loading.
-"""
+"""Time in s that a moving robot gets to stop before a configuration is loaded."""
 NO_DATA: Final = "no data from the boards; check their power and cables"
 
 

@@ -20,10 +20,7 @@ class Written(Enum):
     WHEELS = "confw", 5
     """Radii of the left and right wheel in m, gear, encoder ticks per revolution, track in m."""
     STEERING = "confs", 2
-    """Track in m, then the distance from the axle to the steered wheel in m.
-
-    The driver writes both numbers to both boards.
-    """
+    """Track in m, then the distance from the axle to the steered wheel in m, for both boards."""
     FRONT_WHEEL = "fwoffset", 2
     """Offset of the front wheel's angle in degrees, then 1 if the angle is inverted, else 0."""
     INFRARED = "irc", 4

@@ -21,9 +21,7 @@ def figures(
 ) -> BoardFigures:
     """Return counters and other values for diagnostics; the counters continue over all connections.
 
-    ``source``: the drive board's rcSource.
-
-    ``trouble``: why the robot must not be driven.
+    ``source``: rcSource. ``trouble``: why the robot must not be driven.
     """
     return BoardFigures(
         rates_hz={"IMU": 100.0, "Odometry": 50.0},

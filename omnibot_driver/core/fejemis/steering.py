@@ -2,14 +2,8 @@
 
 """Converts a body twist into commands for both boards.
 
-**Scale.** The command ``rc`` has a speed v and a turn rate w, but the drive board does not obey
-both. It drives its outer wheel at the speed sqrt(v² + w²), and turns about a centre that follows
-from the *measured* front angle. So the driver multiplies v and w by (`|v|` + `|w|`·B/2) / sqrt(v² +
-w²), where B is the track. Then the root equals the speed that the outer wheel needs.
-
-**Speed limit.** While the front wheel moves to its angle, the drive board gets a lower speed. So
-the body moves and turns hardly faster than commanded. For a turn on the spot, the drive board stops
-until the front wheel has reached its angle.
+While the front wheel moves to its angle, the drive board gets a lower speed, or 0 for a turn on the
+spot.
 
 The module knows geometry and angles; it does not know lines.
 """
@@ -26,11 +20,8 @@ ACROSS_RAD: Final = math.radians(85.0)
 """Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: deviations of the front wheel from its target, in rad.
-
-Up to ``ALIGNED_RAD``, a turn on the spot may begin, and other motion has full speed. Up to
-``STILL_ALIGNED_RAD``, a turn on the spot continues.
-"""
+"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: deviations of the front wheel up to which a turn on the
+spot may begin, or continue. Other motion has full speed up to the first."""
 GIVEN_RAD: Final = math.radians(5.0)
 """Deviation of the front wheel, in rad, whose effect on the body's motion is tolerated."""
 
@@ -46,8 +37,6 @@ class Steered:
     ``angle_rad``: the angle that the front wheel must reach.
 
     ``twist``: the body's motion at the present front angle.
-
-    ``whole``: whether ``part`` is 1, so that the speed is not limited.
     """
 
     speed_mps: float
@@ -76,6 +65,9 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 def scale(twist: BodyTwist, track_m: float) -> float:
     """Return the factor by which both numbers of an ``rc`` command are multiplied; 1 for a stop."""
+    # The drive board drives its outer wheel at sqrt(v² + w²), and turns about a centre that follows
+    # from the measured front angle. The factor makes the root equal to the speed that the outer
+    # wheel needs.
     root = math.hypot(twist.vx_mps, twist.yaw_rate_radps)
     return outer_mps(twist, track_m) / root if root else 1.0
 
@@ -117,7 +109,7 @@ def steer(
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
     """Return the body's twist at a speed of the outer wheel and an angle of the front wheel.
 
-    The equations are those of the manual. A negative ``outer_mps`` means backward.
+    Manual's equations. A negative ``outer_mps`` means backward.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)

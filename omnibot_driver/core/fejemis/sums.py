@@ -2,9 +2,8 @@
 
 """The checksum in front of a line, ``;NN``, by which a board detects most damaged lines.
 
-NN is the sum of the codes of all characters from 0x20 on, modulo 99, plus 1. The checksum does not
-detect 1 in 99 damaged lines. It never detects the loss of a ``c`` (code 99), or of two characters
-whose codes add up to 99.
+It misses 1 in 99 damaged lines, a lost ``c`` (code 99), and two lost characters whose codes add up
+to 99.
 
 The module knows characters; it does not know the meaning of a line.
 """

@@ -2,9 +2,8 @@
 
 """Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-A line may arrive late, but not early. So if arrival times are plotted over the Teensy's time, the
-clock is the straight line just below them (``core/timing/clock_fit.py``). If the time in a line is
-far from this clock, the line was damaged or the board has restarted.
+Lines arrive late, never early: the clock is the line just below all arrivals
+(``core/timing/clock_fit.py``). docs/internals/time.md explains why.
 """
 
 from collections.abc import Sequence
@@ -15,24 +14,15 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest time in s by which a line may seem to arrive before it was sent.
-
-If it seems to arrive even earlier, the board time in the line is implausible.
-"""
+"""Longest time in s by which a line may seem to arrive early. Beyond it, the board time is
+implausible."""
 LATE_S: Final = 1.0
-"""Longest plausible delay of a line in s, even if the host was busy.
-
-If the delay seems longer, the board time in the line is implausible.
-"""
+"""Longest plausible delay of a line in s, even if the host was busy."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: when implausible times in a row begin a new clock.
-
-At least ``AGAIN`` such times must arrive, over at least ``AGAIN_AFTER_S``. Between them, the board
-time and the arrival time must advance equally, within ``AGREE_S``. Lines that arrive in a shorter
-time may only have waited for a stalled host.
-"""
+"""``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: implausible times in a row that begin a new clock:
+their least number, least duration, and largest disagreement with the arrivals."""
 SMALLEST_STEP_S: Final = 1e-6
 
 
@@ -102,6 +92,7 @@ class TeensyClock:
             self._odd, self._odds = (board_s, now), 1
             return False
         self._odds += 1
+        # Lines that arrive in a shorter time may only have waited for a stalled host.
         if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
         self.restarted = board_s < self._last_s  # not if earlier lines were late
@@ -116,8 +107,8 @@ class TeensyClock:
 class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
-    The object is a ``ReadingClock``. For each kind of reading, the timestamps increase. A timestamp
-    is not later than the call.
+    It is a ``ReadingClock``. Timestamps of one kind of reading increase, and are never later than
+    the call.
     """
 
     skew_ppm = 0.0
@@ -135,8 +126,7 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``.
 
-        The timestamp is changed in two cases: it is after ``now``, or it is not after the last
-        timestamp of the same kind of reading.
+        It is at most ``now``, and after the last timestamp of the same kind of reading.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         stamp_s = min(stamp_s, now)

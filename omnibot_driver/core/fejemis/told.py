@@ -2,8 +2,7 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in ``TELL_EVERY_S``.
 
-A notice that also makes the driver stop the robot is always passed on. If its text was shown
-recently, the notice is passed on with an empty text.
+A notice that stops the robot is always passed on, if necessary with an empty text.
 """
 
 import math

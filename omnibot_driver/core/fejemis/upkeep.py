@@ -2,8 +2,7 @@
 
 """Keeps both boards sending and configured, and runs the user's requests other than motion.
 
-The module combines the parts for subscriptions, polls, configuration, jobs, brush, lift and lights.
-It collects their lines, and passes messages to them.
+The module combines subscriptions, polls, configuration, jobs, brush, lift and lights.
 """
 
 from typing import Final
@@ -26,8 +25,6 @@ class Upkeep:
     """Upkeep of both boards.
 
     ``machine``: brush, lift and lights of the front board.
-
-    ``jobs``: the running job.
 
     ``configurations``, ``polls``: one entry for each board, by its role.
     """
