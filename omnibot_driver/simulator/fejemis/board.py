@@ -2,14 +2,13 @@
 
 """The two simulated Teensys and their robot, which advance in steps of a millisecond.
 
-The module takes bytes, advances by ticks of ``tick_s``, and returns bytes. The same settings and
-input give the same output. The module knows which Teensy is at which port, and when a fault occurs.
-It must not know commands.
+The same settings and input give the same output. It knows which Teensy is at which port, and when a
+fault occurs. It must not know commands.
 
-The manual does not say some things, so the module assumes:
+Not in the manual, but assumed:
 
 - An ``rc`` command stays in effect until the next one.
-- A Teensy that restarts switches its motors off and forgets its subscriptions.
+- A restart switches a Teensy's motors off and ends its subscriptions.
 - The front wheel stays where it is until an ``rc`` command comes.
 """
 
@@ -29,10 +28,6 @@ STEPS_PER_TICK = 2
 
 class SimulatedFejemis:
     """A simulated Fejemis with the common interface of simulated boards.
-
-    ``drive``, ``front``: the two Teensys.
-
-    ``vehicle``: the robot that they move.
 
     ``tick``: number of ticks since construction.
     """
@@ -74,8 +69,8 @@ class SimulatedFejemis:
     def befall(self, half: str, what: str) -> None:
         """Apply the fault ``what`` to one Teensy now.
 
-        ``what`` is a name in ``FAULTS``. For the front Teensy, it may also be one in
-        ``SENSOR_FAULTS``. Raises KeyError for an unknown fault.
+        ``what``: a name in ``FAULTS``, or in ``SENSOR_FAULTS`` for the front. Raises KeyError
+        otherwise.
         """
         allowed(half)[what](self.half(half))
 

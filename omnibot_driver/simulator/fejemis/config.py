@@ -11,15 +11,8 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
 """Factory parameters of the steering controller: the manual's P-Lead controller.
 
-The order is that of the help text:
-
-* use, Kp;
-* the integrator: useI, taui, ilimit;
-* a 1;
-* the forward lead filter: useLeadf, tz, tp, where tp is alpha * tau_d;
-* the backward lead filter: useLeadb, tz, tp;
-* the pre-filter: usePre, tz, tp;
-* the limit of the output: useULim, Ulim.
+In the order of the help text: use, Kp; useI, taui, ilimit; a 1; useLeadf, tz, tp = alpha * tau_d;
+useLeadb, tz, tp; usePre, tz, tp; useULim, Ulim.
 """
 
 WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
@@ -30,8 +23,9 @@ class DriveConfig:
     """Configuration of the drive Teensy.
 
     ``wheel_base_m``: distance between the driving wheels, as the odometry uses it.
-    ``confs_m``: geometry for the turning control: the distance B between the driving wheels, and
-    the distance F from the axle to the steered wheel.
+
+    ``confs_m``: the same distance B for the turning control, and F from the axle to the steered
+    wheel.
     """
 
     number: int
@@ -54,8 +48,7 @@ class FrontConfig:
 
     ``confs_m``: B and F, as on the drive Teensy. The steering uses only F.
 
-    ``ir``: raw readings of the two infrared sensors, in the order A1, B1, A2, B2. A is the reading
-    at 13 cm, B the reading at 50 cm.
+    ``ir``: raw readings of sensor 1 at 13 cm and 50 cm, then those of sensor 2.
 
     ``steering``: parameters of the steering controller, in the order of ``cpsteer``.
     """

@@ -2,8 +2,7 @@
 
 """The two distance sensors of the drive Teensy. They face a wall across the x axis.
 
-The time-of-flight sensor always measures. The sonar measures only when it is triggered. The module
-knows only the robot's pose.
+The sonar measures only when it is triggered. The module knows only the robot's pose.
 """
 
 from math import cos

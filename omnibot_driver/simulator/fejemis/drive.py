@@ -31,7 +31,7 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command.
 
-    ``off_at_s``: time at which the Teensy cuts the power; None if no power-off is requested.
+    ``off_at_s``: when the Teensy cuts the power, or None.
     """
 
     version = 110
@@ -185,7 +185,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     def velocity(self) -> tuple[float, float]:
         """Return the speeds of the left and the right wheel in m/s.
 
-        The firmware measures the time between two encoder ticks, so the speeds are not quantised.
+        They are not quantised: the firmware measures the time between two ticks.
         """
         (left, right), (left_m, right_m) = self.vehicle.radps, self.config.radii_m
         return left * left_m, right * right_m

@@ -33,14 +33,11 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     The caller may set these faults of the angle sensor:
 
-    ``diagnosis``: the diagnosis bits without the frame counter.
-
-    ``error_flags``: the error flags.
+    ``diagnosis``: the diagnosis bits without the frame counter. ``error_flags``: the error flags.
 
     ``frozen``: whether the sensor repeats its last angle.
 
-    ``absent``: whether the sensor is missing. If it is, the angle is 0, and the diagnosis says that
-    the magneto core loops have not finished.
+    ``absent``: whether it is missing. The angle is then 0, with unfinished magneto core loops.
     """
 
     version = 100

@@ -25,8 +25,7 @@ class Imu:
 
     ``orientation``: roll, pitch and yaw in rad.
 
-    ``calibrated``: if a calibration has just ended, the new offsets for the configuration;
-    otherwise None.
+    ``calibrated``: new offsets if a calibration has just ended, otherwise None.
     """
 
     def __init__(self, settings: FejemisSettings, vehicle: Vehicle) -> None:

@@ -2,8 +2,7 @@
 
 """Settings of the two simulated Teensys and their robot: sizes, firmware, planned faults.
 
-The manual, the public host programs and related firmware differ, and the manual leaves some things
-open. ``Firmware`` has one switch for each such point.
+``Firmware`` has one switch for each point that the manual leaves open or its sources contradict.
 """
 
 from dataclasses import dataclass, field
@@ -19,35 +18,29 @@ WHEEL_BASE_M = 0.40
 class Firmware:
     """Variant of the firmware. Each switch decides one point on which the sources differ.
 
-    ``sums``: lines carry the checksum ``;NN`` and are checked, as with the public host programs. If
-    False, lines carry no checksum, as in the manual. A line that begins with ``;`` is then an
-    unknown command.
-    ``reverse``: angle of the front wheel when the robot drives backward. ``mirrored``: the angle at
-    which the robot drives forward along the same curve. ``clamped``: 90° to the left or right.
+    ``sums``: lines carry the checksum ``;NN`` and are checked (host programs). If False, neither
+    (manual).
+
+    ``reverse``: front angle for driving backward. ``mirrored``: that of the same curve forward.
+    ``clamped``: ±90°.
 
     ``timed_velocity``: ``vel`` begins with the time.
 
-    ``acceleration_in_g``: ``acc`` is in g, not in m/s².
-
     ``tilt``: ``pose`` has a fifth number.
 
-    ``carriage_return``: lines end with a carriage return and a line feed.
-
-    ``start_resumes``: after ``start``, the last ``rc`` command is in effect again, even if it came
-    while the Teensy was stopped.
+    ``start_resumes``: after ``start``, the last ``rc`` command takes effect, even one sent while
+    stopped.
 
     ``confirms``: a command after ``!`` is confirmed, as in newer related firmware.
 
-    ``shows_source``: the heartbeat of the drive Teensy shows the source of the last ``rc`` command.
-    If False, it shows only 10 or -1.
+    ``shows_source``: the drive's heartbeat shows the source of the last ``rc``, not only 10 or -1.
 
     ``single_precision``: times are float32, so after an hour they advance in steps of 0.2 ms.
 
-    ``says_start``: a boot ends with the line ``# Starting main loop``. If False, a boot looks to
-    the host as if this line was lost.
+    ``says_start``: a boot ends with the line ``# Starting main loop``.
 
-    ``exact_words``: a command without numbers is recognised only if its line contains nothing else,
-    not even a space. Related firmware compares ``stop`` in this way.
+    ``exact_words``: commands without numbers must be the whole line, without a space, as in related
+    firmware.
     """
 
     sums: bool = True
@@ -70,9 +63,7 @@ class Fault:
 
     ``at_s``: when the fault occurs, in s after construction.
 
-    ``half``: the Teensy, ``drive`` or ``front``.
-
-    ``what``: name of the fault in ``faults.py``.
+    ``half``: ``drive`` or ``front``. ``what``: a name in ``faults.py``.
     """
 
     at_s: float
@@ -88,39 +79,28 @@ class FejemisSettings:
 
     ``slip``: standard deviation, in m, of a wheel's random error of distance after 1 m.
 
-    ``motor_lag_s``: time constant of a driving wheel's speed.
+    ``motor_lag_s``, ``servo_lag_s``: time constants of a wheel's and the servo's speed.
 
     ``ticks``: encoder ticks per revolution of the motor.
 
     ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
 
-    ``servo_degps``: speed of the servo at its full command, 1000. With this speed, the manual's
-    controller crosses over at 12 rad/s.
-
-    ``servo_lag_s``: time constant of the servo's speed.
+    ``servo_degps``: speed at the full command, 1000. The manual's controller then crosses over at
+    12 rad/s.
 
     ``sensor_zero_deg``: zero offset of the angle sensor. The factory configuration corrects it.
 
-    ``angle_noise_deg``, ``gyro_noise_dps``, ``accel_noise_mps2``: standard deviations of the noise.
-
     ``gyro_bias_dps``, ``accel_bias_mps2``: biases that a calibration must find.
 
-    ``clock_ppm``: errors of the two crystals, first that of the drive Teensy.
+    ``clock_ppm``, ``ids``: crystal errors and heartbeat numbers, first those of the drive Teensy.
 
-    ``boot_s``: duration of a boot.
-
-    ``uptime_s``: how long the Teensys have run at construction. If this is longer than ``boot_s``,
-    they have booted.
+    ``uptime_s``: running time at construction. Beyond ``boot_s``, the Teensys have booted.
 
     ``swapped``: whether the drive Teensy is at the second port.
-
-    ``ids``: the numbers of the Teensys in their heartbeats, first that of the drive Teensy.
 
     ``lose_inbound``: probability that a byte to a Teensy is lost.
 
     ``front_m``: distance from the start to a wall in front.
-
-    ``faults``: planned faults, in any order.
     """
 
     firmware: Firmware = field(default_factory=Firmware)

@@ -2,8 +2,8 @@
 
 """The common part of both Teensys: lines, clock, subscriptions, identity, configuration memory.
 
-A control cycle takes a millisecond of the Teensy's own clock. This module knows the parts of the
-manual that both Teensys share. It must not know what either Teensy measures or moves.
+A control cycle takes a millisecond of the Teensy's own clock. This module must not know what either
+Teensy measures or moves.
 """
 
 import struct
@@ -52,7 +52,7 @@ class Teensy(Generic[C]):
 
     ``silent``: whether the Teensy obeys, but sends nothing.
 
-    ``hung``: whether the Teensy neither obeys nor sends. The motors keep the last outputs.
+    ``hung``: whether it neither obeys nor sends. The motors keep the last outputs.
 
     ``unplugged``: whether the cable is unplugged. The Teensy continues to run.
 

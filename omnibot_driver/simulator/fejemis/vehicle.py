@@ -2,8 +2,8 @@
 
 """The robot that the two Teensys move: driving wheels, servo of the steered wheel, lift, brush.
 
-This module knows speeds and angles, and the pose that results from them. It must not know the
-Teensys or their lines.
+This module knows speeds, angles and the resulting pose. It must not know the Teensys or their
+lines.
 """
 
 from dataclasses import dataclass
@@ -33,9 +33,7 @@ class TrueState:
 class Servo:
     """The servo that turns the steered wheel. It takes a new command every 25 ms.
 
-    Its speed follows the command with a lag.
-
-    ``command``: wanted speed, -1000 to 1000.
+    ``command``: wanted speed, -1000 to 1000. The speed follows with a lag.
 
     ``angle_deg``: angle of the wheel, positive to the left.
     """
@@ -80,14 +78,11 @@ class Lift:
 class Vehicle:
     """The robot with its true state.
 
-    ``truth``: pose and motion.
-
     ``turns``: revolutions of the left and the right wheel since construction.
 
     ``wanted_radps``: speeds that the controllers of the two wheels must reach.
 
-    ``powered``: whether the controllers drive the wheels. Without power, the wheels coast to a
-    stop.
+    ``powered``: whether the controllers drive the wheels. Otherwise, the wheels coast to a stop.
 
     ``held``: for each wheel, whether it is blocked by hand.
     """
@@ -164,8 +159,8 @@ def wheel_speeds(
 ) -> tuple[float, float]:
     """Return the speeds of the left and the right wheel in m/s, by the manual's turning control.
 
-    The outer wheel gets ``v2 = sqrt(v² + w²)`` with the sign of ``v``. The inner wheel gets ``v1 =
-    v2 - v2 B / d`` with ``d = f / tan(theta) + B / 2``.
+    Outer: ``v2 = sqrt(v² + w²)`` with the sign of ``v``. Inner: ``v1 = v2 - v2 B / d``, ``d = f /
+    tan(theta) + B / 2``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

@@ -2,9 +2,8 @@
 
 """Reads and writes lines of text as a Teensy does, by the manual and public programs.
 
-With checksums, a line begins with ``;NN``: 1 plus the sum, modulo 99, of all later characters from
-the space (0x20) upward. Numbers are parsed as C's ``strtof`` parses them. This module must not know
-the meaning of a command.
+Checksum ``;NN``: 1 plus the sum, modulo 99, of all later characters from the space (0x20) upward.
+Numbers are parsed as by C's ``strtof``. This module must not know the meaning of a command.
 """
 
 import re

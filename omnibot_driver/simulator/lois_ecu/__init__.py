@@ -2,8 +2,8 @@
 
 """The LOIS ECU in software, as its manual describes it or as its public firmware behaves.
 
-This package shares no code with the driver. An error in shared code would affect both, and tests
-would not find it. ``SimulatedLois`` reads no clock and no port.
+This package must share no code with the driver: tests would not find a shared error.
+``SimulatedLois`` reads no clock and no port.
 """
 
 from omnibot_driver.simulator.lois_ecu.board import CHANNELS, SimulatedLois

@@ -2,12 +2,8 @@
 
 """The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
-The simulation takes bytes, advances by ``tick_s``, and returns bytes. The same settings and input
-give the same output.
-
-Where the manual says nothing, these assumptions are made. Set-points never expire. Encoder ticks
-are signed and wrap at 2³². A press of the e-stop button is reported and sets the set-points to
-zero. So does a release of the button.
+The same settings and input give the same output. Not in the manual: set-points never expire, ticks
+wrap at 2³², and the e-stop button zeroes set-points when pressed and released.
 
 This module knows the manual's table of messages and, through ``Quirks``, the public firmware. It
 does not know ports or real time.
@@ -42,7 +38,6 @@ class SimulatedLois:
 
     tick: number of ticks of 10 ms since construction.
     commands: valid lines that the board processed, newest last.
-    pressed: whether the e-stop button is pressed.
     motors: the true left and right motor.
     wheels: the left and right wheel as the board measures them.
     """

@@ -24,14 +24,11 @@ STALE_S = 0.25
 class WheelChannel:
     """One wheel of the board, with its encoder counter and its speed controller.
 
-    ``corrections``: factors for the durations of the short and the long level of the encoder.
+    ``corrections``: factors for the durations of the encoder's short and long level.
     ``steps``: encoder edges per turn.
     ``ticks``: encoder ticks, as 0x12 reports them.
-    ``rpm``: measured speed in RPM, an integer.
-    ``exact_rpm``: measured speed in RPM, with fraction.
-    ``duty_percent``: duty of the motor, -100..100.
+    ``rpm``, ``exact_rpm``: measured speed, as an integer and with fraction.
     ``open_loop``: whether a duty is commanded, not a speed.
-    ``record``: the samples taken.
     ``record_left``: number of samples still to take.
     """
 
@@ -62,9 +59,7 @@ class WheelChannel:
     def edge(self, at_s: float, is_long: bool, direction: int) -> None:
         """Process one edge of the encoder. Its interrupt is served at ``at_s``.
 
-        ``is_long``: whether a long level ended.
-
-        ``direction``: 1 forward, -1 backward.
+        ``is_long``: whether a long level ended. ``direction``: 1 forward, -1 backward.
         """
         quirks = self._quirks
         if not quirks.ticks_of_forward_targets:
@@ -95,7 +90,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this rule. The quirk ``keeps_speed_of_stalled_wheel`` disables it.
+        The manual implies this. ``keeps_speed_of_stalled_wheel`` disables it.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0

@@ -84,15 +84,13 @@ class Motor:
 
 
 class Encoder:
-    """An encoder disc, on which short and long levels alternate.
-
-    A period is one short and one long level.
+    """An encoder disc, on which short and long levels alternate. Both together are a period.
 
     ``steps``: edges per turn.
 
     ``short``: length of the short level, as a fraction of a period.
 
-    ``noise``: standard deviation of the length of a level, as a fraction of half a period.
+    ``noise``: standard deviation of a level's length, as a fraction of half a period.
     """
 
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
@@ -107,8 +105,8 @@ class Encoder:
     def turn(self, turns: float) -> tuple[float, bool, int] | None:
         """Turn the disc. Return the edge that passed the sensor, or None.
 
-        The edge is given by three values: its time as a fraction of the step, whether a long level
-        ended, and the direction (1 forward, -1 backward).
+        An edge: time as a fraction of the step, whether a long level ended, direction (1 forward,
+        -1 backward).
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
@@ -150,12 +148,9 @@ class Gains:
 class SpeedController:
     """The board's speed controller, with measured and target RPM as input and a duty as output.
 
-    Its transfer function is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised with the
-    trapezoidal rule. The coefficients are for steps of ``NOMINAL_STEP_S``, even if the true step
-    differs. An output beyond 100 % does not enter the state (anti-windup). If the signs of output
-    and target differ, the output becomes zero.
-
-    The firmware adds a low-pass filter of the target, and a feed-forward.
+    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), by the trapezoidal rule for steps of
+    ``NOMINAL_STEP_S``, whatever the true step. The firmware adds a low-pass filter of the target,
+    and a feed-forward.
     """
 
     def __init__(self, gains: Gains) -> None:
@@ -185,6 +180,7 @@ class SpeedController:
         weighed -= (tn - half_s) * self._errors[1]
         kept = 2 * td * self._outputs[0] - (td - half_s) * self._outputs[1]
         output = (gains.kp * half_s / tn * weighed + kept) / (td + half_s)
+        # An output beyond 100 % does not enter the state (anti-windup).
         if abs(output) < 100.0:
             self._outputs = (output, self._outputs[0])
         self._errors = (error, self._errors[0])

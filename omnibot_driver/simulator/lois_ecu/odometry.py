@@ -51,11 +51,8 @@ class DocumentedOdometry:
 class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
 
-    The RPMs are integers.
-
     ``stands``: whether the position does not change while both RPMs are equal.
-    ``divides``: whether the displacement is divided by the time since the last tick even if this
-        time is zero. The velocity is then NaN or infinite. If False, the velocity does not change.
+    ``divides``: whether to divide by a time of zero, for a velocity of NaN or infinity.
     ``slow``: whether each count of the timer takes 0.7 % too long.
     """
 

@@ -31,8 +31,7 @@ class Fix:
 def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> Fix:
     """Return the fix ``x_m`` east and ``y_m`` north of ``start`` (latitude, longitude in degrees).
 
-    ``utc_s``: time in s since 2000-01-01. For simplicity, each year has 365 days, and each month
-    31.
+    ``utc_s``: time in s since 2000-01-01, with 365 days a year and 31 a month.
     """
     latitude = start[0] + y_m / METRES_PER_DEGREE
     longitude = start[1] + x_m / (METRES_PER_DEGREE * cos(radians(start[0])))
@@ -53,8 +52,7 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether the readings are averaged as plain numbers. If they are, the mean is
-    wrong near north.
+    ``over_north``: whether it averages plain numbers, wrongly near north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

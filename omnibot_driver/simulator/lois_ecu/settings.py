@@ -2,8 +2,7 @@
 
 """Settings of a simulated LOIS ECU and its robot: nominal values, deliberate errors, firmware.
 
-``Quirks`` are the deviations of the public firmware from the manual, with one switch each. So a
-driver can be tested against the manual, the firmware, or a single deviation.
+``Quirks`` has one switch for each deviation of the public firmware from the manual.
 """
 
 from dataclasses import dataclass, fields
@@ -17,34 +16,28 @@ class Quirks:
     Numbers such as 0x12 are the manual's command numbers.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
-    odometry_stands_at_equal_speeds: the position in 0x20 does not change while both integer RPMs
-        are equal.
-    velocity_may_be_nan: two ticks within one count of the timer cause a division by zero. The
-        velocity in 0x20 is then NaN or infinite.
+    odometry_stands_at_equal_speeds: the position in 0x20 stays while both integer RPMs are equal.
+    velocity_may_be_nan: two ticks within one timer count divide by zero. 0x20 has NaN or infinity.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
     keeps_speed_of_stalled_wheel: a wheel without ticks keeps its last measured speed.
     duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
-    reverse_runs_fast: a negative duty of the speed controller also lowers the target by 1 at each
-        tick, until the next control step.
-    low_pass_starts_at_zero: the low-pass filter of the target has gain 0. So the wheels do not
-        follow an RPM target until 0x23 is written.
+    reverse_runs_fast: a negative duty of the controller does so too, until the next control step.
+    low_pass_starts_at_zero: wheels ignore RPM targets until 0x23 is written.
     extra_settings: the settings 0x21 to 0x23 exist.
     appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
-    clock_stops_while_sending: the clock of the board stops while a message or record is sent.
-    deaf_while_sending: of the characters that arrive while the board sends, all but the first are
-        lost.
+    clock_stops_while_sending: the board's clock stops while a message or record is sent.
+    deaf_while_sending: only the first character that arrives meanwhile is kept.
     deaf_while_counting: at each tick the board receives nothing for 0.2 ms.
-    button_waits_while_sending: a press switches the motors off only after the message or record in
-        progress is sent.
+    button_waits_while_sending: a press stops the motors only after the present message or record.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
-    terminal_mode_zeroes_correction: every write of 0x11 overwrites the correction factor of the
-        left encoder's short levels, in effect with zero.
+    terminal_mode_zeroes_correction: each 0x11 overwrites the left short correction, in effect with
+        0.
     button_is_lost_in_terminal_mode: in a terminal mode, a press of the button is not reported.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
-    terminal_passes_input_on: characters from the host are forwarded to the sensor at the sensor's
-        baud rate (9600, 4800). The board reads no further input until they are forwarded.
+    terminal_passes_input_on: input goes to the sensor, at its 9600 or 4800 baud, before more is
+        read.
     one_ball_in_six_seconds: 0x19 is ignored within 6 s of the previous ball.
     gps_is_ignored: GPS position, time and date are zeros.
     headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
@@ -55,9 +48,8 @@ class Quirks:
     lenient_hex: a line with a field that is not hexadecimal is obeyed if its checksum is right.
     limits_rpm: targets beyond 50 RPM are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
-    slow_timer: a timer count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
-    slow_boot: the board does not react for 2 s after power-up. Input that arrives in this time is
-        read afterwards.
+    slow_timer: a count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
+    slow_boot: the board does not react for 2 s after power-up, and reads earlier input then.
     """
 
     ticks_of_forward_targets: bool = False
@@ -106,9 +98,8 @@ QUIRKS: dict[Firmware, Quirks] = {"documented": DOCUMENTED, "firmware": FIRMWARE
 class MotorSettings:
     """A first-order motor with dry friction.
 
-    rpm_per_percent: speed in RPM for each percent of duty beyond the dead zone.
+    rpm_per_percent: for each percent of duty beyond the dead zone.
     dead_zone_percent: duty below which the motor has no torque.
-    time_constant_s: time constant of the speed.
     friction_rpm_per_s: additional deceleration without power.
     second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
     backlash_turns: play between motor and encoder, in turns of the wheel.
@@ -127,13 +118,12 @@ class MotorSettings:
 class LoisSettings:
     """The board, its robot, and its position on Earth.
 
-    wheel_radius_m, track_m, steps: nominal geometry. ``steps`` are encoder edges per turn.
+    steps: nominal encoder edges per turn.
     wheel_radius_scale, track_scale: true value divided by nominal value.
     slip: standard deviation, in m, of a wheel's random error of distance after 1 m.
-    load_percent: standard deviation, in percent of duty, of the load from the ground. Its
-        correlation time is 0.5 s.
-    mark_noise: standard deviation of the distance between adjacent encoder marks, as a fraction of
-        half a period.
+    load_percent: standard deviation of the ground's load in percent of duty; it changes within 0.5
+        s.
+    mark_noise: standard deviation of the distance of adjacent encoder marks, in half periods.
     start_latitude_deg, start_longitude_deg: position of x = y = 0. The x axis points east.
     compass_period_s: time between two compass readings.
     heading_noise_deg: standard deviation of each raw heading.

@@ -16,7 +16,6 @@ class Uart:
 
     ``loses``: whether it keeps only the first byte that arrives while interrupts are off.
     received: all bytes that were sent to the port.
-    lost_bytes: number of bytes that were lost.
     input: characters that were received but not read yet.
     """
 
@@ -82,7 +81,7 @@ class Uart:
     def send(self, sent: bytearray) -> bool:
         """Send for one step of 1 ms, and append the sent bytes to ``sent``.
 
-        Return whether interrupts are switched on again. The caller must then call ``hear_kept``.
+        Return whether interrupts are on again. The caller must then call ``hear_kept``.
         """
         self._out_credit = min(self._out_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
         while self._sending and self._out_credit >= 1.0:

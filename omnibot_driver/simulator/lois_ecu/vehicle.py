@@ -28,7 +28,7 @@ class TrueState:
 class Edge:
     """An edge that the encoder of a wheel gives at ``at_s``.
 
-    index: 0 for the left wheel, 1 for the right wheel.
+    index: 0 left, 1 right.
     is_long: whether a long level ended.
     direction: 1 forward, -1 backward.
     """
@@ -42,9 +42,8 @@ class Edge:
 class Vehicle:
     """The robot. ``truth``: its true pose and motion.
 
-    ``corrections``: for each encoder, the board's factors for the durations of the short and the
-    long level. The levels of the simulated encoder have exactly the lengths for which these factors
-    are right.
+    ``corrections``: the board's factors for each encoder's short and long level. The levels fit
+    these factors exactly.
     """
 
     def __init__(

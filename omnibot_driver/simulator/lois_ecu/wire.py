@@ -2,8 +2,7 @@
 
 """The protocol as the board encodes and decodes it, from the manual and the public firmware.
 
-A line is ``:``, two hexadecimal digits of command, eight of payload, two of checksum, and a line
-feed. The checksum is the XOR of all characters before it.
+``:``, 2 hexadecimal digits of command, 8 of payload, 2 of checksum (XOR of all before), line feed.
 
 This module shares no code with the driver. It does not know what a command means.
 """
@@ -59,9 +58,7 @@ class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
     ``checks``: whether lines have a checksum.
-    ``lenient``: whether fields are read as C's strtol reads them. strtol accepts space, sign and
-        prefix, and stops at the first character that is not a digit. If ``lenient`` is false, such
-        characters make the line invalid.
+    ``lenient``: whether fields are read as by C's strtol: with space, sign, prefix, and other ends.
     """
 
     def __init__(self, *, lenient: bool) -> None:
