@@ -54,10 +54,11 @@ def heard_instead(text: str) -> Iterator[float]:
 
 
 @lru_cache(maxsize=4000)
-# A checksum does not detect the loss of two characters whose codes add up to 99. So the angle is
-# rounded, by at most half a degree, to digits without such a pair. Some angles to the right need
-# ``-`` and ``6``, such a pair. If both are lost, the board reads less than 10° to the left.
 def _with_sum(tenths: int) -> bytes:
+    # A checksum does not detect the loss of two characters whose codes add up to 99. So the angle
+    # is rounded, by at most half a degree, to digits without such a pair. Some angles to the right
+    # need ``-`` and ``6``, such a pair. If both are lost, the board reads less than 10° to the
+    # left.
     across = ""
     for off in range(ROUNDED + 1):
         for near in (tenths + off, tenths - off)[: 2 if off else 1]:

@@ -2,8 +2,7 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A line in another form has lost or gained characters. A new form is accepted after three lines in a
-row.
+A line in another form is damaged, unless three in a row have the same new form.
 
 The module knows forms; it does not know the meaning of a line.
 """

@@ -2,8 +2,8 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-Unsafe pairs: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``, ``-`` and ``6``. So some values
-cannot be sent, e.g. from .0999 to .200.
+Unsafe pairs of characters: ``12``, ``03``, ``.5``, ``-6``. So some values cannot be sent, e.g. from
+.0999 to .200.
 """
 
 from bisect import bisect_left, bisect_right

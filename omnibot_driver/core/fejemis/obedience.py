@@ -2,8 +2,8 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-A pause and the driver's e-stop both send ``stop``. After the e-stop's release, ``start`` is
-repeated; a pause lasts until ~/start.
+A pause and the driver's e-stop both send ``stop``. Only after an e-stop, the driver itself sends
+``start``.
 
 The module knows times and rcSource, the source of the commands that the board obeys; it does not
 know lines.

@@ -2,8 +2,8 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-Poses in steps of 1 mm every 20 ms give speeds in steps of 0.05 m/s. Wheel speeds are finer, but do
-not add up exactly. So a displacement is the wheels' motion, corrected towards the newer pose.
+Poses are coarse: a step of 1 mm in 20 ms is 0.05 m/s. Wheel speeds do not add up exactly. So the
+wheels' motion is corrected towards the newer pose.
 """
 
 import math
@@ -171,7 +171,7 @@ class PoseOdometry:
         off = way - rolled
         digit_m = 10.0**-decimals
         # If rounding does not explain the difference, lines were lost, or a wheel turned quickly.
-        # Then the poses decide; if the excess is small, the mean.
+        # Then the poses decide; if the excess is small, the mean of both.
         if off.way_m > ROUNDINGS * digit_m or abs(off.yaw_rad) > ROUNDINGS * YAW_DIGIT_RAD:
             return (
                 way if off.way_m > 3.0 * digit_m or abs(off.yaw_rad) > 0.005 else _half(rolled, way)

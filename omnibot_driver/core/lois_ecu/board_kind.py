@@ -2,8 +2,8 @@
 
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-- Public firmware: odometry follows each group of ticks, with their command byte (0x12). Only wheels
-  commanded forward count.
+- Public firmware: odometry follows each group of ticks, with their command byte (0x12). Ticks count
+  only while a wheel is commanded forward.
 - Manual: odometry has its own command byte (0x20). Ticks count in both directions.
 """
 

@@ -26,8 +26,7 @@ class Told:
 
     ``still``: whether position and heading are unchanged.
 
-    ``speeds_mps``: speeds of the left and right rim, in whole RPM rounded down. None if no whole
-    RPM fit.
+    ``speeds_mps``: speeds of the left and right rim. None if no whole RPM give the velocity.
     """
 
     turned_m: float

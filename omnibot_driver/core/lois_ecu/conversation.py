@@ -172,8 +172,7 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the ticks show that the robot is at rest after a Stop.
 
-        None without recent ticks, and after a backward command or RPM 0/0: the public firmware then
-        counts none.
+        None if they show nothing: without recent ticks, after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:

@@ -54,8 +54,8 @@ class HeadingFilter:
         ``yaw_rad``: yaw of the odometry when the heading arrived.
         """
         # A heading is accepted if it turned like the odometry, or when ``SURE_AFTER`` further
-        # headings agree. If the robot should face north, headings of about ±120 degrees are always
-        # rejected.
+        # headings agree. If the robot should face north, headings of about ±120 degrees are
+        # rejected even then.
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0
             return True

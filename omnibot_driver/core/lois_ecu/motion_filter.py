@@ -2,9 +2,8 @@
 
 """Kalman filter of the motion of both wheels, and of the values by which the board reports it.
 
-Distances and speeds are for wheels of nominal size; left and right are those of the board.
-
-This module works on commands and the firmware's counters, without messages.
+Distances and speeds are for wheels of nominal size; left and right are the board's. This module
+works on commands and the firmware's counters, without messages.
 """
 
 import math

@@ -39,8 +39,8 @@ AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting. It is shorter than
 the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s, used in turn, from a group to the next round or request for the date. At a fixed
-time, the board could send at each attempt and receive nothing."""
+"""Times in s from a group to the next round or date request, used in turn. At one fixed time, the
+board might always be sending."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
 period."""

@@ -16,6 +16,7 @@ from omnibot_driver.core.lois_ecu.messages import (
 # RPM target. So after a drive forward, the board continues to count ticks, which can prove the
 # standstill. RPM 0/0 ends the counting and clears the measured speed. While the emergency stop is
 # latched, RPM 0/0 and Stop are sent in turn.
+#
 # Damage almost never changes a line into another valid line. Two lines become one only if fourteen
 # characters in a row are lost (twelve without checksum): the end of one line and the beginning of
 # the next. The board receives nothing for at most 13 ms, and set-points are at least 18 ms apart.

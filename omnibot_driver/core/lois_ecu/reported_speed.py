@@ -65,8 +65,7 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel has come to rest, and subtract the distance that it did not roll.
 
-        The wheel was at rest since its reported speed last changed or, without motion, since its
-        start command.
+        It rests since its reported speed last changed, or since a later start command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:

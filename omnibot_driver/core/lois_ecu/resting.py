@@ -2,8 +2,8 @@
 
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-For a wheel at rest, the public firmware repeats the last speed: 5 to 17 RPM, after a fall. A steady
-wheel repeats its speed without a fall.
+The public firmware repeats the last speed of a wheel at rest. Such a speed has just fallen, to 5 to
+17 RPM.
 
 This module works on reported speeds and the time between them.
 """

@@ -33,8 +33,8 @@ class LoisEcuSettings:
 
     ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
 
-    ``low_pass``: 0..1, fraction of a new set-point that each controller step applies. Before its
-    writing, no wheel turns in RPM mode.
+    ``low_pass``: 0..1, part of a new set-point that each controller step applies. Must be written
+    before RPM mode works.
 
     ``written``: further settings that the user wants on the board.
 

@@ -20,8 +20,9 @@ m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 """States of the body: position, and the turn and distance that 0x20 (odometry) should show.
 
-``BIAS``, ``EXCESS``: two indices each, by wheel. Error of the speed, and fraction by which a wheel
-rolls backward faster than its set-point.
+``BIAS``: two states, the error of each wheel's speed.
+
+``EXCESS``: two states, the fraction of the set-point that each wheel exceeds backward.
 """
 STATES: Final = 18
 

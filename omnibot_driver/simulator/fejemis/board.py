@@ -2,14 +2,10 @@
 
 """The two simulated Teensys and their robot, which advance in steps of a millisecond.
 
-The same settings and input give the same output. It knows which Teensy is at which port, and when a
-fault occurs. It must not know commands.
+The simulation is deterministic. Assumptions beyond the manual: ``rc`` stays in effect, the front
+wheel waits for ``rc``, and a restart ends motion and subscriptions.
 
-Not in the manual, but assumed:
-
-- An ``rc`` command stays in effect until the next one.
-- A restart switches a Teensy's motors off and ends its subscriptions.
-- The front wheel stays where it is until an ``rc`` command comes.
+The module knows which Teensy is at which port, and when a fault occurs. It must not know commands.
 """
 
 from collections.abc import Mapping

@@ -24,8 +24,7 @@ class DriveConfig:
 
     ``wheel_base_m``: distance between the driving wheels, as the odometry uses it.
 
-    ``confs_m``: the same distance B for the turning control, and F from the axle to the steered
-    wheel.
+    ``confs_m``: B and F of the turning control. F: from the axle to the steered wheel.
     """
 
     number: int

@@ -31,13 +31,9 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``leds``: red, green and blue of each LED.
 
-    The caller may set these faults of the angle sensor:
-
-    ``diagnosis``: the diagnosis bits without the frame counter. ``error_flags``: the error flags.
-
-    ``frozen``: whether the sensor repeats its last angle.
-
-    ``absent``: whether it is missing. The angle is then 0, with unfinished magneto core loops.
+    Faults of the angle sensor, set by the caller: ``diagnosis`` (bits without the frame
+    counter), ``error_flags``, ``frozen`` (repeats its last angle), ``absent`` (angle 0, magneto
+    core loops unfinished).
     """
 
     version = 100

@@ -18,18 +18,16 @@ WHEEL_BASE_M = 0.40
 class Firmware:
     """Variant of the firmware. Each switch decides one point on which the sources differ.
 
-    ``sums``: lines carry the checksum ``;NN`` and are checked (host programs). If False, neither
-    (manual).
+    ``sums``: lines carry the checksum ``;NN`` and are checked. If False, lines have none (manual).
 
-    ``reverse``: front angle for driving backward. ``mirrored``: that of the same curve forward.
+    ``reverse``: front angle for driving backward. ``mirrored``: as forward on the same curve.
     ``clamped``: ±90°.
 
     ``timed_velocity``: ``vel`` begins with the time.
 
     ``tilt``: ``pose`` has a fifth number.
 
-    ``start_resumes``: after ``start``, the last ``rc`` command takes effect, even one sent while
-    stopped.
+    ``start_resumes``: after ``start``, the last ``rc`` takes effect, even one sent while stopped.
 
     ``confirms``: a command after ``!`` is confirmed, as in newer related firmware.
 
@@ -39,8 +37,7 @@ class Firmware:
 
     ``says_start``: a boot ends with the line ``# Starting main loop``.
 
-    ``exact_words``: commands without numbers must be the whole line, without a space, as in related
-    firmware.
+    ``exact_words``: a command without numbers must be the whole line, as in related firmware.
     """
 
     sums: bool = True

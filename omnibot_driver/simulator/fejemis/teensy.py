@@ -52,7 +52,7 @@ class Teensy(Generic[C]):
 
     ``silent``: whether the Teensy obeys, but sends nothing.
 
-    ``hung``: whether it neither obeys nor sends. The motors keep the last outputs.
+    ``hung``: whether the Teensy does neither. The motors keep the last outputs.
 
     ``unplugged``: whether the cable is unplugged. The Teensy continues to run.
 

@@ -159,8 +159,8 @@ def wheel_speeds(
 ) -> tuple[float, float]:
     """Return the speeds of the left and the right wheel in m/s, by the manual's turning control.
 
-    Outer: ``v2 = sqrt(v² + w²)`` with the sign of ``v``. Inner: ``v1 = v2 - v2 B / d``, ``d = f /
-    tan(theta) + B / 2``.
+    Outer wheel: ``v2 = sqrt(v² + w²)`` with the sign of ``v``. Inner wheel: ``v1 = v2 - v2 B / d``
+    with ``d = f / tan(theta) + B / 2``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

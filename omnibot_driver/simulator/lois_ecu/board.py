@@ -2,8 +2,8 @@
 
 """The simulated LOIS ECU and its robot, which advance in steps of a millisecond.
 
-The same settings and input give the same output. Not in the manual: set-points never expire, ticks
-wrap at 2³², and the e-stop button zeroes set-points when pressed and released.
+The simulation is deterministic. Assumptions beyond the manual: set-points never expire, ticks wrap
+at 2³², and the e-stop button zeroes set-points when pressed and released.
 
 This module knows the manual's table of messages and, through ``Quirks``, the public firmware. It
 does not know ports or real time.

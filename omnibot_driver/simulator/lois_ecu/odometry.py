@@ -52,7 +52,7 @@ class FirmwareOdometry(DocumentedOdometry):
     """Odometry as the firmware computes it: at each tick of either wheel, from the latest RPMs.
 
     ``stands``: whether the position does not change while both RPMs are equal.
-    ``divides``: whether to divide by a time of zero, for a velocity of NaN or infinity.
+    ``divides``: whether to divide even by a time of zero. The velocity is then NaN or infinite.
     ``slow``: whether each count of the timer takes 0.7 % too long.
     """
 

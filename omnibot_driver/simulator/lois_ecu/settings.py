@@ -21,23 +21,21 @@ class Quirks:
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
     keeps_speed_of_stalled_wheel: a wheel without ticks keeps its last measured speed.
     duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
-    reverse_runs_fast: a negative duty of the controller does so too, until the next control step.
+    reverse_runs_fast: a negative duty of the controller does this until the next control step.
     low_pass_starts_at_zero: wheels ignore RPM targets until 0x23 is written.
     extra_settings: the settings 0x21 to 0x23 exist.
     appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
     clock_stops_while_sending: the board's clock stops while a message or record is sent.
-    deaf_while_sending: only the first character that arrives meanwhile is kept.
+    deaf_while_sending: while the board sends, it keeps only the first character that arrives.
     deaf_while_counting: at each tick the board receives nothing for 0.2 ms.
     button_waits_while_sending: a press stops the motors only after the present message or record.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
-    terminal_mode_zeroes_correction: each 0x11 overwrites the left short correction, in effect with
-        0.
+    terminal_mode_zeroes_correction: each 0x11 sets the left short correction to 0.
     button_is_lost_in_terminal_mode: in a terminal mode, a press of the button is not reported.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
-    terminal_passes_input_on: input goes to the sensor, at its 9600 or 4800 baud, before more is
-        read.
+    terminal_passes_input_on: input first goes to the sensor, at its 9600 or 4800 baud.
     one_ball_in_six_seconds: 0x19 is ignored within 6 s of the previous ball.
     gps_is_ignored: GPS position, time and date are zeros.
     headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
@@ -121,8 +119,7 @@ class LoisSettings:
     steps: nominal encoder edges per turn.
     wheel_radius_scale, track_scale: true value divided by nominal value.
     slip: standard deviation, in m, of a wheel's random error of distance after 1 m.
-    load_percent: standard deviation of the ground's load in percent of duty; it changes within 0.5
-        s.
+    load_percent: standard deviation of the load from the ground, in percent of duty.
     mark_noise: standard deviation of the distance of adjacent encoder marks, in half periods.
     start_latitude_deg, start_longitude_deg: position of x = y = 0. The x axis points east.
     compass_period_s: time between two compass readings.
