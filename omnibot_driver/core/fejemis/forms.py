@@ -12,8 +12,8 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: how many of ``OF`` lines in another form end the check of
-their kind. With correct checksums, fewer suffice."""
+"""How many of ``OF`` lines in another form end the check of their kind: with and without a correct
+checksum."""
 OF: Final = 24
 
 Form = tuple[int, ...]

@@ -30,15 +30,15 @@ SUREST_S: Final = 0.05
 """``KNOWN_S``, ``SUREST_S``: smallest evidence in s that proves the order of the two lines, and
 largest that is stored."""
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that is added to a pause in which another kind of line comes. Such a line ends a
-cycle."""
+"""Evidence in s that is added to a pause in which another kind of line comes. The control cycle
+ended there."""
 PATIENCE: Final = 60
 """How many pauses are measured before weak evidence decides, e.g. of lines half a period apart."""
 MOST: Final = 10
 """Largest magnitude of the numbers in ``_outside``."""
 UNPOSED: Final = 20
-"""How many gyro or acceleration lines may come while a pair waits for a pose. More reject the
-pair."""
+"""How many gyro or acceleration lines may come while a pair waits for a pose. Then the pair is
+rejected."""
 
 
 @dataclass(slots=True)

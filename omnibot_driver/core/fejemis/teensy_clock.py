@@ -14,15 +14,15 @@ from omnibot_driver.core.timing.clock_fit import ClockFit
 
 TICK_S: Final = 0.01
 EARLY_S: Final = 0.005
-"""Longest time in s by which a line may seem to arrive early. Beyond it, the board time is
-implausible."""
+"""Longest time in s by which a line may seem to arrive early. If it seems earlier, the board time
+is implausible."""
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: implausible times in a row that begin a new clock:
-their least number, least duration, and largest disagreement with the arrivals."""
+"""A new clock begins after ``AGAIN`` implausible times in a row, over ``AGAIN_AFTER_S``, that agree
+with their arrivals within ``AGREE_S``."""
 SMALLEST_STEP_S: Final = 1e-6
 
 

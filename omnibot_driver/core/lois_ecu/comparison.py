@@ -42,8 +42,8 @@ UNFORESEEN_TICKS: Final = 1.5
 """Residual of a count, in ticks, above which the wheel's speed has changed without a new
 set-point."""
 SAME_TICKS: Final = 0.6
-"""Smallest residual, in ticks, at which an unchanged count is used. At a smaller one, the next tick
-may not be due yet."""
+"""Smallest residual, in ticks, at which an unchanged count is used. At a smaller residual, the next
+tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP``, ``LEAP_M``: limits of a heading's residual, in standard deviations and m at the rims.

@@ -12,8 +12,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""``NEAR_DEG``, ``NEAR_PART``: allowed error of a heading, in degrees, plus a fraction of the
-odometry's turn."""
+"""``NEAR_DEG + NEAR_PART * turn``: allowed error of a heading. ``turn``: the odometry's turn in
+degrees."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)

@@ -52,7 +52,7 @@ measured speed, in RPM."""
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: fraction of the set-point that a wheel exceeds backward.
+"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: excess of a backward speed, as a fraction of the set-point.
 
 ``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
 

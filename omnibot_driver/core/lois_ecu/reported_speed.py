@@ -26,12 +26,12 @@ LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""``JUMP_RPM``, ``JUMP_RPM_PER_S``: largest plausible change of speed between two reports, plus a
-part for each s. A larger change shows a delayed tick."""
+"""``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change of speed between two reports.
+A larger change shows a delayed tick."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""``STRAY_RPM``, ``STRAY_PART``: largest plausible residual of a steady wheel's speed, plus a
-fraction of the expected speed. Only for gains that the user set."""
+"""``STRAY_RPM + STRAY_PART * expected``: largest plausible residual of a reported speed. Only for a
+constant set-point and gains that the user set."""
 COASTED_TICKS: Final = 1.0
 """Ticks to subtract from the distance of a wheel that came to rest. It rolls less far than its last
 speed suggests."""
@@ -65,7 +65,7 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel has come to rest, and subtract the distance that it did not roll.
 
-        It rests since its reported speed last changed, or since a later start command.
+        The wheel rests since its reported speed last changed, or since a later start command.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:

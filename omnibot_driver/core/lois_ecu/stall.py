@@ -20,7 +20,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 # speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
 STALLED_S: Final = 2.0
 """Time in s without motion after which a wheel is stalled. With the firmware's gains, a wheel
-starts in half of it."""
+starts in half of this time."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2

@@ -39,8 +39,8 @@ UNKNOWN_FROM_YEAR: Final = 38
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""``RESTARTED_TICKS``, ``RESTARTED_TICKS_PER_S``: largest fall of the counts by rolling back, plus
-a number for each s. A larger fall shows a restart."""
+"""``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count by rolling back.
+A larger fall shows a restart."""
 CONTRADICTED_S: Final = 1.0
 """Longest assumed time in s of rolling back while the unit of the board's clock is forgotten. The
 clock then cannot confirm the time since the last ticks."""

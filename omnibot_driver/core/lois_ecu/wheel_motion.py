@@ -22,7 +22,7 @@ X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
 
 ``BIAS``: two states, the error of each wheel's speed.
 
-``EXCESS``: two states, the fraction of the set-point that each wheel exceeds backward.
+``EXCESS``: two states, the excess of each wheel's backward speed, as a fraction of its set-point.
 """
 STATES: Final = 18
 
