@@ -2,8 +2,7 @@
 
 """Repeats the motion lines (``rc``) to both boards.
 
-While the speed is limited or lines lack checksums, each new angle of the front wheel repeats them
-too.
+While the speed is limited, or without checksums, each new front angle repeats them too.
 
 The module knows when a line is due; it does not know what the line contains.
 """

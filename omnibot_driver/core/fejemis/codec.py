@@ -2,7 +2,7 @@
 
 """Parses one line of text into a message.
 
-A line is damaged if a field is missing or a number out of range. Newer firmware may add fields.
+Extra fields are ignored, because newer firmware adds fields.
 
 The module knows keywords, fields and ranges; it does not know checksums or other lines.
 """

@@ -2,7 +2,7 @@
 
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
-A number is accepted after two equal readings: 1 in 99 damaged lines has a correct checksum.
+Two equal readings are needed: 1 in 99 damaged lines has a correct checksum.
 
 The module knows which line requests which numbers; it does not know when the robot stands still.
 """
@@ -144,8 +144,7 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        Boards round their numbers. So the user's exact values are returned if the board's agree or
-        are unknown.
+        The user's values replace equal but rounded values of the board, or unknown ones.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

@@ -2,10 +2,8 @@
 
 """Splits the bytes from one board into lines, checks the lines, and counts the damaged ones.
 
-With ``auto``, the first heartbeat decides whether lines need checksums.
-
-The decoder does not read a clock and never raises on input. It holds less than ``LONGEST_LINE``
-bytes between calls.
+The decoder does not read a clock and never raises on input. Between calls, it holds less than
+``LONGEST_LINE`` bytes.
 """
 
 from dataclasses import dataclass
@@ -41,12 +39,12 @@ class FejemisDecoder:
 
     ``sums``: whether the board's lines have checksums; None while unknown.
 
-    ``changed``: whether the board began or ceased to send checksums. The caller resets this flag.
+    ``changed``: whether ``sums`` has changed. The caller resets this flag.
 
     ``doubtful``: whether the last line contradicts ``sums``. Lines to the board then carry no
     checksum.
 
-    ``contradicted``: whether the last line contradicts the setting ``line_sums``.
+    ``contradicted``: whether the last line contradicts ``line_sums``.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -2,7 +2,7 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-Sent packets must be passed to ``meaning``: it notes the front wheel's target and the speed limit.
+Sent packets must be passed to ``meaning``.
 
 The module knows geometry and lines; it does not know when lines are sent.
 """

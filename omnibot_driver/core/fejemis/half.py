@@ -55,7 +55,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 class Half:
     """State of one board.
 
-    ``identity``: the identity in its heartbeats; None before the first heartbeat.
+    ``identity``: the identity in its heartbeats, or None before.
 
     ``restarted``: whether the board has restarted. The caller resets this flag.
 
@@ -109,8 +109,7 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        A message can change the half: after a restart, earlier times of the board are forgotten.
-        Messages with an implausible time are left out.
+        This order matters: after a restart, the half forgets earlier times of the board.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

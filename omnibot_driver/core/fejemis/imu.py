@@ -4,8 +4,7 @@
 
 The lines carry no time: time = phase + a whole number of ``PERIOD_S``.
 
-The module knows pairs of lines and times; it does not know how the pairs are found
-(``imu_pairs.py``).
+The module knows pairs of lines and times; ``imu_pairs.py`` finds the pairs.
 """
 
 import math

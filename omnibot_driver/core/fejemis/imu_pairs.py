@@ -2,8 +2,7 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-A pair is false if its lines are of different samples: both lines between them were lost. Until the
-order of the two lines is known, samples are left out.
+A pair is false if its lines are of different samples: both lines between them were lost.
 """
 
 import itertools
@@ -45,11 +44,11 @@ rejected."""
 class Pair:
     """A gyro and an acceleration line, probably of one sample.
 
-    ``at``: time in s at which the second line arrived.
+    ``at``: arrival of the second line.
 
-    ``pose_s``: time of the last pose before the pair, by the board's clock.
+    ``pose_s``: the board's time of the last pose before the pair.
 
-    ``skipped``: how many incomplete samples were left out before the pair.
+    ``skipped``: how many incomplete samples were left out before.
 
     ``doubtful``: whether the pair must wait for a pose.
     """

@@ -2,8 +2,7 @@
 
 """Handles all messages: passes each message to the parts that use it, and keeps the robot's mode.
 
-It stops the robot at a restart, fault or pause of a board. The module knows messages and times; it
-does not know how lines are written.
+The module knows messages and times; it does not know how lines are written.
 """
 
 from collections.abc import Callable

@@ -2,9 +2,7 @@
 
 """Runs the user's requests other than motion, one at a time, and checks whether they succeed.
 
-The boards do not acknowledge these requests, so each job has its own proof.
-
-The module does not read a clock.
+The boards acknowledge none of them. The module does not read a clock.
 """
 
 import math
@@ -54,7 +52,7 @@ class Jobs:
 
     ``powering_off``: whether the drive board will soon cut the power.
 
-    ``reload``: whether the configuration must be read again. The caller resets this flag.
+    ``reload``: whether to read the configuration again. The caller resets this flag.
     """
 
     def __init__(self) -> None:

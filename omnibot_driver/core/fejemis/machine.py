@@ -2,8 +2,7 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-An e-stop, a pause or a lost board switches brush and lift off. Each lift line limits its run time.
-Other lines are repeated, because the board acknowledges none.
+Each lift line limits its run time. Other lines are repeated, because the board acknowledges none.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 """The messages that the two boards send: one class for each kind of line.
 
-Units are the boards': degrees, m/s², µT, V, A, m, s. ``Status`` and ``Words`` are only shown in
-diagnostics.
+Units are the boards': degrees, m/s², µT, V, A, m, s.
 """
 
 from dataclasses import dataclass

@@ -2,9 +2,8 @@
 
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
-Neither board needs both numbers exactly: the front board uses their ratio, the drive board the root
-of their squares. Of the safe lines (``numerals.py``, ``outbound.py``), the nearest to the command
-is taken.
+The front board uses the ratio of both numbers, the drive board the root of their squares. Of the
+safe lines, the nearest to the command is taken.
 """
 
 import math

@@ -2,8 +2,7 @@
 
 """Adds checksums to lines for the boards, and checks whether damage to a line is detected.
 
-The checksum does not detect two lost characters whose codes add up to 99 or 198. A motion line must
-not contain both (``motion_lines.py``).
+The checksum does not detect two lost characters whose codes add up to 99 or 198.
 """
 
 from functools import lru_cache

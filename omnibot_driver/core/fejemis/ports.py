@@ -2,8 +2,7 @@
 
 """Finds out which of the two boards (halves) is at which port, and addresses lines to them.
 
-Heartbeats identify the boards. An unidentified board only gets lines that stop or switch off
-something.
+An unidentified board only gets lines that stop or switch off something.
 
 The module knows identities and ports; it does not know the meaning of a line.
 """

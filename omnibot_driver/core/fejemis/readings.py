@@ -56,9 +56,9 @@ class MagneticReading:
 class BatteryReading:
     """State of the battery.
 
-    ``amps``: current in A, negative during discharge; NaN if unknown.
+    ``amps``: in A, negative during discharge; NaN if unknown.
 
-    ``cells``: number of cells; 0 if unknown.
+    ``cells``: 0 if unknown.
 
     ``low``: whether a cell is below the limit of the settings.
     """

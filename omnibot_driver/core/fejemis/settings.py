@@ -43,15 +43,13 @@ class Written(Enum):
 class FejemisSettings:
     """The user's settings of the robot.
 
-    ``track_m``, ``wheelbase_m``: geometry that is used until the boards report their own.
+    ``track_m``, ``wheelbase_m``: used until the boards report their own.
 
-    ``line_sums``: whether lines carry a checksum. With ``auto``, the board's heartbeats decide.
+    ``line_sums``: whether lines carry a checksum. With ``auto``, the heartbeats decide.
 
-    ``allow_reverse``: whether a negative speed is sent to the boards (docs/boards/fejemis.md).
+    ``allow_reverse``: whether to send negative speeds (docs/boards/fejemis.md).
 
     ``command_timeout_s``: longest time that the lift runs after one command.
-
-    ``power_off_delay_s``: time from the user's request until the board cuts the power.
 
     ``low_cell_v``: voltage per cell below which the battery is reported as low.
 

@@ -2,7 +2,7 @@
 
 """Converts a body twist into commands for both boards.
 
-While the front wheel moves to its angle, the drive board gets a lower speed, or 0 for a turn on the
+While the front wheel moves to its angle, the drive board is slower, or stops for a turn on the
 spot.
 
 The module knows geometry and angles; it does not know lines.
@@ -30,9 +30,7 @@ GIVEN_RAD: Final = math.radians(5.0)
 class Steered:
     """A command for both boards, and the resulting motion of the body.
 
-    ``speed_mps``, ``turn_radps``: the numbers for the front board.
-
-    ``part``: factor, at most 1, by which both numbers are multiplied for the drive board.
+    ``speed_mps``, ``turn_radps``: for the front board. ``part``: their factor for the drive board.
 
     ``angle_rad``: the angle that the front wheel must reach.
 

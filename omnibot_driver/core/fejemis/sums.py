@@ -2,8 +2,7 @@
 
 """The checksum in front of a line, ``;NN``, by which a board detects most damaged lines.
 
-It misses 1 in 99 damaged lines, a lost ``c`` (code 99), and two lost characters whose codes add up
-to 99.
+Undetected: 1 in 99, a lost ``c`` (code 99), two lost characters whose codes add up to 99.
 
 The module knows characters; it does not know the meaning of a line.
 """

@@ -2,8 +2,7 @@
 
 """Adapter that makes a LOIS ECU a ``Board`` of the driver; ``LoisConversation`` does the work.
 
-Between two groups of ticks, the odometry is predicted. If no ticks showed a motion, its
-displacement reading is marked as not measured.
+Between two groups of ticks, the odometry is predicted.
 """
 
 import math

@@ -2,9 +2,10 @@
 
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-- Public firmware: odometry follows each group of ticks, with their command byte (0x12). Ticks count
-  only while a wheel is commanded forward.
-- Manual: odometry has its own command byte (0x20). Ticks count in both directions.
+- Public firmware: odometry follows the ticks (0x12). Only wheels that are commanded forward count.
+- Manual: odometry has its own command byte (0x20). Ticks count both ways.
+
+This module works on changes of the counts and on the order of groups.
 """
 
 from typing import Final

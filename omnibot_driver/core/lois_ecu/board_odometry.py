@@ -2,8 +2,9 @@
 
 """Changes from one group of odometry (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware uses speeds in whole RPM, each from a wheel's last tick. While both are equal,
-the position does not change.
+The public firmware uses whole RPM. While both speeds are equal, the position does not change.
+
+This module works on groups of odometry, without their times.
 """
 
 import math
@@ -24,9 +25,7 @@ class Told:
 
     ``along_m``: distance of the middle of the axle.
 
-    ``still``: whether position and heading are unchanged.
-
-    ``speeds_mps``: speeds of the left and right rim. None if no whole RPM give the velocity.
+    ``speeds_mps``: left and right rim. None if no whole RPM give the velocity.
     """
 
     turned_m: float

@@ -2,8 +2,9 @@
 
 """Estimation of the delay with which a group of ticks was read, from the board's time in the group.
 
-Two clock models are fitted, and the better one is used: a clock that always runs (manual), and one
-that stops while the board sends (public firmware).
+Two clocks are fitted: always running (manual), or stopped while sending (public firmware).
+
+This module works on clock counts, numbers of lines and arrival times.
 """
 
 import math

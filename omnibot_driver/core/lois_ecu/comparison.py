@@ -4,6 +4,8 @@
 
 While the board counts a wheel's ticks, the count is compared. Otherwise, the changes in 0x20
 (odometry) are compared.
+
+This module works on counts and on changes of 0x20, without the robot's pose.
 """
 
 import math

@@ -2,9 +2,8 @@
 
 """Decoder that turns a stream of bytes into reports.
 
-A line ends with a line feed and begins at the last ``:`` before it. This module does not read a
-clock, and no input raises an error. Between calls, the decoder holds fewer than ``LONGEST_LINE``
-bytes.
+A line begins at the last ``:`` before its line feed. The module reads no clock, and no input raises
+an error. Fewer than ``LONGEST_LINE`` bytes are held.
 """
 
 from dataclasses import dataclass, field
@@ -40,9 +39,9 @@ class LoisDecoder:
 
     ``sum_required``: whether lines without a checksum are discarded.
 
-    ``terminal``: whether text is a sensor's line, which is reported instead of counted as damage.
+    ``terminal``: whether text is a sensor's line instead of damage.
 
-    ``times``: arrival time of the last line of each report of the last call.
+    ``times``: arrival time of each report's last line, for the last call.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:

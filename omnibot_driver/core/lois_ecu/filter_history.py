@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states, to restore one if a restart of the board is noticed late.
+"""History of a filter's states, for a restart of the board that is noticed late.
 
 This module works on states and times. It does not know what a state means.
 """

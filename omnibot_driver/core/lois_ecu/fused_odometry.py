@@ -20,11 +20,11 @@ class FusedOdometry:
 
     ``pose``, ``covariance``: in the odometry frame. ``twist``: in the body frame.
 
-    ``twist_covariance``: variances of the speed in (m/s)² and of the yaw rate in (rad/s)².
+    ``twist_covariance``: variances in (m/s)² and (rad/s)².
 
-    ``displacement``: motion since the previous estimate, in the robot's axes.
+    ``displacement``: since the previous estimate, in the robot's axes.
 
-    ``wheel_ways_m``: distances of the board's left and right wheel since then, at nominal size.
+    ``wheel_ways_m``: the same for the board's left and right wheel, at nominal size.
     """
 
     stamp_s: float

@@ -2,8 +2,7 @@
 
 """Assembly of reports that take several lines: a marker line, then lines with values.
 
-A group is returned complete or not at all. Records are assembled in ``record_lines``. This module
-works on lines and arrival times.
+``record_lines`` assembles records. This module works on lines and arrival times.
 """
 
 import math

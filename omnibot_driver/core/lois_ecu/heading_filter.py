@@ -2,7 +2,7 @@
 
 """Filter of compass headings that rejects the false headings of the public firmware near north.
 
-The firmware averages three headings of 0 to 359 degrees as plain numbers: 359, 1 and 1 give 120.
+The firmware averages headings as plain numbers: 359, 1 and 1 give 120.
 
 This module works on degrees and the odometry's yaw.
 """

@@ -54,8 +54,7 @@ def encode_line(command: int, payload: int, *, with_sum: bool = True) -> bytes:
 def line_of(text: bytes, *, sum_required: bool = True) -> Line | None:
     """Parse the characters of one line, from ``:`` to the line feed. None if they are not valid.
 
-    A carriage return before the line feed is accepted. A checksum must be right even if
-    ``sum_required`` is false.
+    A carriage return may precede the line feed. A wrong checksum is never valid.
     """
     if text.endswith(b"\r\n"):
         text = text[:-2] + END

@@ -3,6 +3,8 @@
 """Prediction of the wheel speeds that the firmware measured last, and of their effect on 0x20.
 
 The motion filter calls this module in each of its steps.
+
+This module works on the states of the filter, without reports.
 """
 
 import math

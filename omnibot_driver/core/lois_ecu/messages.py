@@ -2,7 +2,7 @@
 
 """All messages of the manual's table as values. ``codec`` turns them into lines and back.
 
-The host sends ``Command``, the ECU sends ``Report``. Some command bytes are used for both.
+The host sends ``Command``, the ECU sends ``Report``.
 
 Sources: the ECU's manual, table of messages; the public firmware for 0x21 to 0x23.
 """
@@ -79,11 +79,9 @@ class Stream(IntEnum):
 class TerminalMode(IntEnum):
     """What the serial line between the board and the host carries.
 
-    ``HOST``: the protocol.
-
     ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no checksum.
 
-    Other modes: a forwarded serial input, without the board's own messages.
+    Other modes than ``HOST``: a serial input of the board.
     """
 
     HOST = 0
@@ -261,10 +259,9 @@ class Heading:
 
 @dataclass(frozen=True, slots=True)
 class Ticks:
-    """Encoder ticks of both wheels since the board started or was reset. They are signed.
+    """Signed encoder ticks of both wheels since the board started or was reset.
 
-    ``time_counts``: the board's time of sending, in ns (manual) or ms (public firmware). It wraps
-    at 2³².
+    ``time_counts``: sending time in ns (manual) or ms (public firmware), modulo 2³².
     """
 
     time_counts: int
@@ -276,9 +273,7 @@ class Ticks:
 class BoardOdometry:
     """The robot's pose and velocity in the earth frame, as the board computes them.
 
-    The velocities may be NaN or infinite.
-
-    ``appended``: whether the group came directly after ticks, with their command byte.
+    Velocities may be NaN or infinite. ``appended``: whether it has the command byte of ticks.
     """
 
     x_m: float
@@ -294,11 +289,8 @@ class BoardOdometry:
 class Record:
     """A complete record with as many samples as were requested.
 
-    ``left``, ``right``: samples of both wheels. A record of headings, in degrees, has only
-    ``left``.
-
-    RPM: times from tick to tick in ``record_request.COUNT_S``. Torque: 12-bit values of the
-    converter.
+    ``left``, ``right``: by wheel. RPM samples: tick times in ``record_request.COUNT_S``. Torque:
+    12-bit values. Headings: degrees, all in ``left``.
     """
 
     kind: RecordKind

@@ -2,8 +2,7 @@
 
 """Advice on a misconfiguration, found in the settings or in received bytes that form no valid line.
 
-Advice from bytes is given only while valid lines do not arrive. This module works on bytes and
-settings, without times.
+This module works on bytes and settings, without times.
 """
 
 import re

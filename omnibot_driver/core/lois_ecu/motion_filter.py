@@ -2,8 +2,8 @@
 
 """Kalman filter of the motion of both wheels, and of the values by which the board reports it.
 
-Distances and speeds are for wheels of nominal size; left and right are the board's. This module
-works on commands and the firmware's counters, without messages.
+Wheels have nominal size and the board's left and right. This module works on commands and the
+firmware's counters, without messages.
 """
 
 import math

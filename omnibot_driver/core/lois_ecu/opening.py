@@ -2,8 +2,7 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-All settings are sent in ``ROUNDS`` rounds. Further rounds follow until two things confirm them:
-ticks with the requested period, and a date. ``write`` queues other commands.
+Rounds of all settings follow until ticks with the requested period and a date confirm them.
 """
 
 import math

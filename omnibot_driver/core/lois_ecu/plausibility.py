@@ -2,7 +2,7 @@
 
 """Plausibility of a complete group of lines: its values, and their change since the last group.
 
-Two groups that fit each other, but not the last accepted one, show a restart or reset.
+Two groups that only fit each other show a restart or reset.
 
 This module works on values and arrival times.
 """

@@ -25,9 +25,7 @@ RECORD_CODES: Final = (Code.RECORD_RPM, Code.RECORD_TORQUE, Code.RECORD_HEADING)
 class GroupStatistics:
     """Counters of groups and records since this object was created.
 
-    ``damaged_groups``: discarded groups and records.
-
-    ``damaged_records``: the records among them.
+    ``damaged_groups``: discarded groups and records. ``damaged_records``: the records among them.
 
     ``implausible``: complete groups with values that are not plausible.
 

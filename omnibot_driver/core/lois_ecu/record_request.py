@@ -2,8 +2,7 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-Each request restarts the record. So repetitions come soon, and end when the record begins to
-arrive.
+Repetitions come soon, because each request restarts the record.
 """
 
 import math
@@ -82,8 +81,6 @@ class RecordRequest:
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
         """Return the readings, with the result of the request if it is known now.
-
-        While the record arrives, a ``RecordComes`` is added.
 
         ``prevented``: why the record cannot come, as a sentence. Empty if it may.
         """

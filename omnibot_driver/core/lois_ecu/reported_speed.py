@@ -2,8 +2,10 @@
 
 """Corrections of one wheel by the speeds that a LOIS ECU reports for it.
 
-A reported speed is that of the last tick. It is old if the wheel rests or has not ticked, and wrong
-if the board's sending delayed the tick.
+A reported speed is that of the last tick. If the wheel rests, the speed is old. If sending delayed
+the tick, the speed is wrong.
+
+This module works on reported speeds and the motion filter, without messages.
 """
 
 import math

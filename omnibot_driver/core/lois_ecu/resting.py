@@ -28,14 +28,13 @@ FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities that the wheel is at rest, by the number of repetitions of its speed. They were
-counted on the public firmware.
+"""Probabilities of rest, by the number of repetitions of the speed, counted on the public firmware:
 
 ``FAST``: after a fall to a speed above ``FAST_RPM``.
 
 ``FAR``: after a fall by ``FELL_FAR_RPM``.
 
-``LONE``: after a fall by ``FELL_FAR_RPM`` from a speed that was reported only once.
+``LONE``: the same, from a speed that was reported only once.
 
 ``NEAR``: after a smaller fall.
 

@@ -24,9 +24,9 @@ CLEAR_AGAIN_S: Final = 0.15
 class SetPoints:
     """Encoder of set-points. It also remembers which set-points were sent.
 
-    ``saturated``: number of commands that were slowed because they were too fast.
+    ``saturated``: number of commands that were slowed.
 
-    ``stopped_at_s``: time since which only zeros were sent; infinite while the robot is driven.
+    ``stopped_at_s``: time since which only zeros were sent, or infinity.
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 

@@ -25,9 +25,7 @@ periods harm."""
 class LoisEcuSettings:
     """Settings of a LOIS ECU and its robot.
 
-    ``inverted``: whether the board's left wheel is the robot's right wheel, and vice versa.
-
-    ``drive_mode``: whether ``cmd_vel`` is sent as RPM or as duty.
+    ``inverted``: whether the board's left wheel is the robot's right wheel.
 
     ``max_duty``: largest duty of a motor, in percent.
 
@@ -40,9 +38,7 @@ class LoisEcuSettings:
 
     ``periods_ms``: periods of the board's messages. Other messages keep theirs.
 
-    ``with_sum``: whether lines to the board have a checksum.
-
-    ``declination_rad``: declination of magnetic north, east positive.
+    ``declination_rad``: of magnetic north, east positive.
     """
 
     wheel_radius_m: float = 0.13

@@ -2,8 +2,8 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-The same drive is computed with each error, once positive and once negative. The spread of the poses
-is the covariance.
+The drive is repeated with each error, positive and negative. The spread of the poses is the
+covariance.
 
 This module works on distances of the wheels.
 """

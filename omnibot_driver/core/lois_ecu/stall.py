@@ -2,8 +2,7 @@
 
 """Detection of a wheel that is commanded to turn, but is at rest and may never start by itself.
 
-Ticks show forward motion, 0x20 (odometry) backward motion. RPM 0/0 makes a stalled wheel start
-again.
+Ticks show forward motion, and 0x20 (odometry) backward motion.
 
 This module works on set-points, reports and times.
 """
@@ -40,8 +39,7 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``saturated``: for each wheel, whether it may roll at full power although its reported speed is
-    unchanged.
+    ``saturated``: for each wheel, whether it may roll at an unchanged reported speed.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

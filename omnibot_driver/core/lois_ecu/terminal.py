@@ -2,8 +2,7 @@
 
 """Changes of the terminal mode, and the standstill that is needed before a change of any mode.
 
-In a terminal mode, the board obeys but reports neither motion nor its e-stop button. So the robot
-is stopped first.
+In a terminal mode, the board reports neither motion nor its e-stop button.
 
 This module works on modes and times.
 """

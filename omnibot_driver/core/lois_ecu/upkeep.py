@@ -2,8 +2,6 @@
 
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-It also recovers a board that is silent or ignores commands.
-
 This module combines the classes for these tasks. It does not know what the board sends.
 """
 
@@ -22,8 +20,6 @@ class Upkeep:
     """Scheduler of settings, modes, records and recovery. ``due`` returns what to write now.
 
     ``opened``: whether the writing of the present settings has begun.
-
-    ``heard_at_s``: when valid lines of the board last arrived.
     """
 
     def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:

@@ -2,8 +2,7 @@
 
 """Model of one wheel's commands: when they take effect, and what the firmware then counts.
 
-The public firmware counts a wheel's ticks only while its RPM target is positive. The measured speed
-has the target's sign.
+The public firmware counts ticks only while the RPM target is positive.
 
 This module works on set-points and times.
 """

@@ -2,8 +2,6 @@
 
 """Motion of a wheel under its commands, as a step of the motion filter.
 
-A wheel coasts without power, follows a duty, or is driven by the board's speed controller.
-
 This module works on commands and the states of one wheel.
 """
 
@@ -63,8 +61,7 @@ class Step:
 
     ``new``: means of the states after the step.
 
-    ``unsure_mps``: standard deviation of each wheel's last measured speed, by the wheel's first
-    state.
+    ``unsure_mps``: standard deviation of ``HELD``, by the wheel's first state.
 
     ``rows``: changed rows of the transition matrix.
 

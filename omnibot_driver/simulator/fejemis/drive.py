@@ -27,9 +27,9 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     ``source``: the rcSource of the heartbeat, -1 while the Teensy is stopped.
 
-    ``reference``: speed in m/s and turn rate in rad/s of the last ``rc`` command.
+    ``reference``: m/s and rad/s of the last ``rc`` command.
 
-    ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command.
+    ``told_angle_deg``: front angle in the last ``fwl`` command.
 
     ``off_at_s``: when the Teensy cuts the power, or None.
     """

@@ -29,11 +29,9 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``wanted_deg``: angle that the steered wheel must reach; None before the first ``rc`` command.
 
-    ``leds``: red, green and blue of each LED.
-
-    Faults of the angle sensor, set by the caller: ``diagnosis`` (bits without the frame
-    counter), ``error_flags``, ``frozen`` (repeats its last angle), ``absent`` (angle 0, magneto
-    core loops unfinished).
+    Sensor faults, set by the caller: ``diagnosis`` (bits without the frame counter),
+    ``error_flags``, ``frozen`` (repeats its angle), ``absent`` (angle 0, magneto core loops
+    unfinished).
     """
 
     version = 100

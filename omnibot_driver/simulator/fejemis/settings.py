@@ -23,17 +23,15 @@ class Firmware:
     ``reverse``: front angle for driving backward. ``mirrored``: as forward on the same curve.
     ``clamped``: ±90°.
 
-    ``timed_velocity``: ``vel`` begins with the time.
-
     ``tilt``: ``pose`` has a fifth number.
 
     ``start_resumes``: after ``start``, the last ``rc`` takes effect, even one sent while stopped.
 
-    ``confirms``: a command after ``!`` is confirmed, as in newer related firmware.
+    ``confirms``: a command after ``!`` is confirmed.
 
     ``shows_source``: the drive's heartbeat shows the source of the last ``rc``, not only 10 or -1.
 
-    ``single_precision``: times are float32, so after an hour they advance in steps of 0.2 ms.
+    ``single_precision``: times are float32: steps of 0.2 ms after an hour.
 
     ``says_start``: a boot ends with the line ``# Starting main loop``.
 
@@ -76,8 +74,6 @@ class FejemisSettings:
 
     ``slip``: standard deviation, in m, of a wheel's random error of distance after 1 m.
 
-    ``motor_lag_s``, ``servo_lag_s``: time constants of a wheel's and the servo's speed.
-
     ``ticks``: encoder ticks per revolution of the motor.
 
     ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
@@ -86,8 +82,6 @@ class FejemisSettings:
     12 rad/s.
 
     ``sensor_zero_deg``: zero offset of the angle sensor. The factory configuration corrects it.
-
-    ``gyro_bias_dps``, ``accel_bias_mps2``: biases that a calibration must find.
 
     ``clock_ppm``, ``ids``: crystal errors and heartbeat numbers, first those of the drive Teensy.
 

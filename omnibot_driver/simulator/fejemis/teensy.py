@@ -50,13 +50,9 @@ class Teensy(Generic[C]):
 
     ``sums``: whether lines carry checksums.
 
-    ``silent``: whether the Teensy obeys, but sends nothing.
+    ``silent``: obeys, but sends nothing. ``hung``: neither; the motors keep the last outputs.
 
-    ``hung``: whether the Teensy does neither. The motors keep the last outputs.
-
-    ``unplugged``: whether the cable is unplugged. The Teensy continues to run.
-
-    ``powered``: whether the Teensy has power.
+    ``unplugged``: runs without its cable. ``powered``: whether the Teensy has power.
     """
 
     version = 0

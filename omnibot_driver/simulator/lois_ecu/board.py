@@ -38,8 +38,7 @@ class SimulatedLois:
 
     tick: number of ticks of 10 ms since construction.
     commands: valid lines that the board processed, newest last.
-    motors: the true left and right motor.
-    wheels: the left and right wheel as the board measures them.
+    motors: the true motors. wheels: the wheels as the board measures them.
     """
 
     channels = CHANNELS

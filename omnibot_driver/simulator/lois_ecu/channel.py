@@ -27,7 +27,6 @@ class WheelChannel:
     ``corrections``: factors for the durations of the encoder's short and long level.
     ``steps``: encoder edges per turn.
     ``ticks``: encoder ticks, as 0x12 reports them.
-    ``rpm``, ``exact_rpm``: measured speed, as an integer and with fraction.
     ``open_loop``: whether a duty is commanded, not a speed.
     ``record_left``: number of samples still to take.
     """

@@ -148,9 +148,8 @@ class Gains:
 class SpeedController:
     """The board's speed controller, with measured and target RPM as input and a duty as output.
 
-    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), by the trapezoidal rule for steps of
-    ``NOMINAL_STEP_S``, whatever the true step. The firmware adds a low-pass filter of the target,
-    and a feed-forward.
+    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), by the trapezoidal rule. The coefficients are always
+    for ``NOMINAL_STEP_S``.
     """
 
     def __init__(self, gains: Gains) -> None:

@@ -13,38 +13,33 @@ from typing import Literal
 class Quirks:
     """Deviations of the public firmware from the manual: none by default, all in ``FIRMWARE``.
 
-    Numbers such as 0x12 are the manual's command numbers.
+    Numbers such as 0x12 are the manual's command numbers. A clear name has no line.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
     odometry_stands_at_equal_speeds: the position in 0x20 stays while both integer RPMs are equal.
     velocity_may_be_nan: two ticks within one timer count divide by zero. 0x20 has NaN or infinity.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
-    keeps_speed_of_stalled_wheel: a wheel without ticks keeps its last measured speed.
     duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
-    reverse_runs_fast: a negative duty of the controller does this until the next control step.
+    reverse_runs_fast: a negative controller duty lowers the target too, until the next step.
     low_pass_starts_at_zero: wheels ignore RPM targets until 0x23 is written.
     extra_settings: the settings 0x21 to 0x23 exist.
     appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
-    clock_stops_while_sending: the board's clock stops while a message or record is sent.
     deaf_while_sending: while the board sends, it keeps only the first character that arrives.
     deaf_while_counting: at each tick the board receives nothing for 0.2 ms.
     button_waits_while_sending: a press stops the motors only after the present message or record.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
     terminal_mode_zeroes_correction: each 0x11 sets the left short correction to 0.
-    button_is_lost_in_terminal_mode: in a terminal mode, a press of the button is not reported.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
     terminal_passes_input_on: input first goes to the sensor, at its 9600 or 4800 baud.
-    one_ball_in_six_seconds: 0x19 is ignored within 6 s of the previous ball.
-    gps_is_ignored: GPS position, time and date are zeros.
     headings_average_over_north: headings are averaged as plain numbers: 359, 1 and 1 give 120.
     records_in_100_us: the samples of an RPM record are in 100 µs, not in 100 ns.
     torque_comes_as_rpm: the reply to 0x17 has command number 0x04.
     record_waits_for_one_more: a record of n headings is sent when sample n + 1 arrives.
-    large_records_never_end: a record of more than 1024 samples is never completed.
-    lenient_hex: a line with a field that is not hexadecimal is obeyed if its checksum is right.
-    limits_rpm: targets beyond 50 RPM are limited to 50 RPM.
+    large_records_never_end: more than 1024 samples are never complete.
+    lenient_hex: a field that is not hexadecimal is accepted if the checksum is right.
+    limits_rpm: targets are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
     slow_timer: a count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
     slow_boot: the board does not react for 2 s after power-up, and reads earlier input then.
@@ -97,7 +92,6 @@ class MotorSettings:
     """A first-order motor with dry friction.
 
     rpm_per_percent: for each percent of duty beyond the dead zone.
-    dead_zone_percent: duty below which the motor has no torque.
     friction_rpm_per_s: additional deceleration without power.
     second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
     backlash_turns: play between motor and encoder, in turns of the wheel.
@@ -122,7 +116,6 @@ class LoisSettings:
     load_percent: standard deviation of the load from the ground, in percent of duty.
     mark_noise: standard deviation of the distance of adjacent encoder marks, in half periods.
     start_latitude_deg, start_longitude_deg: position of x = y = 0. The x axis points east.
-    compass_period_s: time between two compass readings.
     heading_noise_deg: standard deviation of each raw heading.
     running: whether the board has already booted.
     """

@@ -15,7 +15,6 @@ class Uart:
     """The serial port.
 
     ``loses``: whether it keeps only the first byte that arrives while interrupts are off.
-    received: all bytes that were sent to the port.
     input: characters that were received but not read yet.
     """
 
