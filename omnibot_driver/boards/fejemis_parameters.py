@@ -103,10 +103,10 @@ WHEELS: Final = (
         "steering_gains",
         [1.0],
         "",
-        "Numbers of the steering controller, in this order: use, Kp (proportional part), useI,"
-        " taui, ilimit, 1 (integral part), useLeadf, tz, tp (lead filter), useLeadb, tz, tp"
-        " (second lead filter), usePre, tz, tp (prefilter), useULim, Ulim (output limit). The"
-        " driver writes them with the command `cssteer`. Unset: the board keeps its own values.",
+        "Parameters of the steering controller, in the order in which the command `cssteer` takes"
+        " them. Proportional part: use, Kp. Integral part: useI, taui, ilimit, and the number 1."
+        " Lead filter: useLeadf, tz, tp. Second lead filter: useLeadb, tz, tp. Prefilter: usePre,"
+        " tz, tp. Output limit: useULim, Ulim. Unset: the board keeps its own values.",
         length=(1, MOST_GAINS),
         low=-1e6,
         high=1e6,

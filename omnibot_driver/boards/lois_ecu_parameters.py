@@ -192,10 +192,12 @@ _WORDS: Final = {
     "tn": "Integral time Tn of the {} wheel's speed controller",
     "td": "Time constant Td of the {} wheel's speed controller",
     "short_correction": (
-        "Correction factor for the measured duration of the {} encoder's short signal level"
+        "Factor by which the board multiplies the measured durations of the {} encoder's short"
+        " levels. The encoder's signal has short and long levels in turn"
     ),
     "long_correction": (
-        "Correction factor for the measured duration of the {} encoder's long signal level"
+        "Factor by which the board multiplies the measured durations of the {} encoder's long"
+        " levels. The encoder's signal has short and long levels in turn"
     ),
     "feed_forward": "Feed-forward of the {} wheel's speed controller",
 }

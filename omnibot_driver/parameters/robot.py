@@ -65,8 +65,8 @@ ROBOT: Final = (
         15.0,
         "m/s²",
         "Highest linear acceleration that the robot can reach, even in a collision. If one"
-        " displacement jumps by more than this acceleration and the next one jumps back, the"
-        " driver rejects the first.",
+        " displacement jumps by more than this acceleration allows and the next one jumps back,"
+        " the driver rejects the first.",
         low=0.1,
         high=1000.0,
     ),
@@ -75,8 +75,8 @@ ROBOT: Final = (
         50.0,
         "rad/s²",
         "Highest angular acceleration that the robot can reach, even in a collision. If one"
-        " displacement or gyro reading jumps by more than this acceleration and the next one"
-        " jumps back, the driver rejects the first.",
+        " displacement or gyro reading jumps by more than this acceleration allows and the next"
+        " one jumps back, the driver rejects the first.",
         low=1.0,
         high=10_000.0,
     ),
@@ -84,9 +84,9 @@ ROBOT: Final = (
         "largest_force_step",
         4.0,
         "m/s²",
-        "Largest spike of one accelerometer axis that the driver always publishes. The driver"
-        " rejects a larger spike if it lasts for one reading and a flipped bit can explain its"
-        " size.",
+        "Largest change of one accelerometer axis between two readings that the driver always"
+        " accepts. It rejects a larger change if this lasts for one reading and a flipped bit can"
+        " explain its size.",
         low=0.1,
         high=1000.0,
     ),

@@ -96,9 +96,9 @@ def _parser(module: SimulatorModule) -> argparse.ArgumentParser:
             "--link",
             metavar="PATH",
             action="append",
-            help="make a symbolic link to the pseudo-terminal. For a board with several"
-            " pseudo-terminals, give one --link for each. If only one --link is given, each port"
-            " has the link PATH-PORT, with the name of the port",
+            help="make a symbolic link at PATH to the board's pseudo-terminal. If the board has"
+            " several, give one --link for each, in the order of the printed addresses; or give a"
+            " single --link, then the links are PATH-NAME, with the name of each port",
         )
     if any(channel.datagrams for channel in module.CHANNELS):
         parser.add_argument(

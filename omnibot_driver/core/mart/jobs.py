@@ -143,9 +143,9 @@ class Jobs:
             )
         if job is Job.LOG_FILE and self.log_may_be_lost:
             raise RequestRefused(
-                "the server may have been restarted; if so, this request would end the server, and"
-                " no file would come: copy the file from the controller, or begin a new log by"
-                " ~/start_log"
+                "the server may have been restarted and may no longer keep a log; without a log,"
+                " this request would end the server, and no file would come: copy the file from"
+                " the controller, or begin a new log by ~/start_log"
             )
         self.job, self._token, self.turn_record = job, token, None
         self._request = WORD_OF[job].request(*arguments)

@@ -43,7 +43,7 @@ class Carrier(Protocol):
 class ServedBoard(RunningBoard[B]):
     """Context manager that runs a board behind pseudo-terminals and UDP ports, at ``addresses``.
 
-    links: one path for each pseudo-terminal, or one for all ("PATH-CHANNEL").
+    links: one path for each pseudo-terminal; or one path, then the links are PATH-CHANNEL.
     udp_port: first UDP port, 0 for any free port.
 
     Raises OSError on entry if a link or a port is unavailable.
@@ -152,7 +152,7 @@ def _one_for_each(names: Sequence[str], links: Sequence[str | Path]) -> Sequence
     if len(links) == 1 and names:
         return [f"{os.fspath(links[0])}-{name}" for name in names]
     if not names:
-        raise OSError("this board has no serial port that a link could lead to")
+        raise OSError("this board has no serial port to link to")
     raise OSError(
         f"{len(links)} links do not fit a board with {len(names)} serial port"
         f"{'s' if len(names) > 1 else ''}:"

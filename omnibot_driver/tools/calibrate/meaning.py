@@ -113,7 +113,7 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     """Return whether the frame of the odometry deltas is set correctly, "earth" or "body".
 
-    ``before``, ``after``: by the same command, around a turn by ``turned_rad``.
+    ``before``, ``after``: motion by the same command, before and after a turn by ``turned_rad``.
 
     Raises ToolError if neither frame fits.
     """
@@ -124,8 +124,8 @@ def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
         return False
     raise ToolError(
         f"the odometry contradicts itself: after a turn of {math.degrees(turned_rad):.0f}°, the"
-        f" direction of a forward drive is off by {math.degrees(change_rad):.0f}° (it should be"
-        " off by 0°, or by the whole turn if delta_frame is wrong); see /diagnostics, and"
+        f" direction of a forward drive has changed by {math.degrees(change_rad):.0f}° (expected:"
+        " by 0°, or by the angle of the turn if delta_frame is wrong); see /diagnostics, and"
         " docs/internals/omnibot_protocol.md"
     )
 

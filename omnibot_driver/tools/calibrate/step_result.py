@@ -20,7 +20,8 @@ Two causes: the encoder, and the protocol's unit of 0.1 mm.
 MANY: Final = 1.5
 """Multiple of ``QUANTUM_RADPS`` above which the tool warns about the residuals.
 
-Example of delayed commands: residuals of twice ``QUANTUM_RADPS``, and a delay 4 ms too long.
+Example: with delayed commands, the residuals are twice ``QUANTUM_RADPS``, and the delay that the
+tool finds is 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.
@@ -113,10 +114,10 @@ def _remarks(wheel: WheelFound) -> list[str]:
     first, second, motor = wheel.first, wheel.second, wheel.motor_fit
     gain = float(second.values[0])
     remarks = [
-        f"Wheel {wheel.name}: the residuals are {first.rms_radps:.3f} rad/s with the model of first"
-        f" order, {second.rms_radps:.3f} with that of second order, and {motor.rms_radps:.3f} with"
-        " a motor in the manual's control loop. By the AIC, the better of the first two models is"
-        f" “{wheel.answer.model.title}”."
+        f"Wheel {wheel.name}: three models were fitted. Their residuals are"
+        f" {first.rms_radps:.3f} rad/s (first order), {second.rms_radps:.3f} rad/s (second order)"
+        f" and {motor.rms_radps:.3f} rad/s (a motor in the manual's control loop). By the Akaike"
+        f" criterion (AIC), “{wheel.answer.model.title}” is the better of the first two."
     ]
     if wheel.left_out:
         remarks.append(

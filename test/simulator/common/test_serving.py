@@ -80,7 +80,7 @@ def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path
     three[1].write_text("data")
     with pytest.raises(FileExistsError, match="choose another name"):
         open_carriers(ToyLines.channels, three[:2])
-    with pytest.raises(OSError, match="no serial port that a link could lead to"):
+    with pytest.raises(OSError, match="no serial port to link to"):
         open_carriers(ToyServer.channels, three[:1])
     assert os.listdir(tmp_path) == ["b"]
 
