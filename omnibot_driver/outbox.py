@@ -53,7 +53,7 @@ class Outbox:
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the waiting calls, or leave them to a thread that is making calls.
+        """Make the queued calls, or leave them to a thread that is making calls.
 
         If the outbox is full, wait for that thread. Raises what the calls raise.
         """
@@ -68,7 +68,7 @@ class Outbox:
                 delivering.release()
 
     def hand_over(self) -> None:
-        """Let the ``serve`` thread make the waiting calls, so that the caller is not delayed."""
+        """Let the ``serve`` thread make the queued calls, so that the caller is not delayed."""
         if self._waiting:
             self._handed_over.set()
 

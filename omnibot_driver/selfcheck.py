@@ -68,7 +68,7 @@ def waiting_advice(port: str, now_ns: int) -> str:
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     """Return a warning if another node has this full name; otherwise empty.
 
-    ``publishers``: those of a topic on which every node of this name publishes.
+    ``publishers``: of a topic that every driver with this name publishes, such as ``~/state``.
     """
     names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in publishers]
     if names.count(name) < 2:

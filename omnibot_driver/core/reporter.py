@@ -35,7 +35,7 @@ class Reporter:
 
     * ``events``: events since the last ``take``.
     * ``news_at``: time of the next ``look_for_news``, in s.
-    * ``missing``: which lines are missing, as a sentence; empty if none.
+    * ``missing``: which of the board's ports are not open, as a sentence; empty if all are.
     * ``overruns``: how often a port has lost bytes, over all connections.
     * ``shown``: public state and e-stop latch at the last ``take``.
     """
@@ -102,7 +102,7 @@ class Reporter:
         self.notify(news)
 
     def silent(self, silence_s: float, *, bytes_came: bool) -> None:
-        """Report that no valid data arrived for ``silence_s``, unless a line is missing.
+        """Report that no valid data arrived for ``silence_s``, if all ports of the board are open.
 
         ``bytes_came``: whether bytes arrived that could not be decoded.
         """

@@ -138,7 +138,7 @@ class Session:
     def opened(self, now: float, *, missing: str = "") -> None:
         """Begin a connection, because the port is open now.
 
-        ``missing``: which lines are not open, as a sentence. With any, the robot is not driven.
+        ``missing``: which ports are not open, as a sentence. If any, the robot is not driven.
         """
         self._board.connect()
         self._commanding.begin(now)

@@ -26,5 +26,8 @@ class SessionSettings:
 
     @property
     def kinematics(self) -> Kinematics:
-        """Geometry of the robot's wheels, at a wheel radius of 1 m."""
+        """Geometry of the robot's wheels, with a wheel radius of 1 m.
+
+        So a wheel rate in rad/s is also the rim's speed in m/s.
+        """
         return self.odometry.noise.wheels

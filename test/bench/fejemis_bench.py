@@ -43,8 +43,9 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both halves in real time; send each front angle's delay, in s, to ``results``.
+    """Run both simulated halves in real time; then send a list of delays in s to ``results``.
 
+    Each delay is from the front half's report of an angle to the driver's line for the drive half.
     The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()

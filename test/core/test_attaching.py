@@ -95,7 +95,7 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The odometry has assumed heading 0, then poses with another heading arrive.
+    """The board sends no pose, so heading 0 is assumed. Then poses with another heading arrive.
 
     Odom does not jump, and later motion has the heading of the poses.
     """

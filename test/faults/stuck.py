@@ -16,9 +16,9 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive while the adapter is stuck for ``seconds`` and keeps the data. Then all data arrives.
+    """Drive while the adapter holds back the driver's data. Later, all of it arrives at once.
 
-    ``mute``: whether the adapter also keeps the board's data.
+    ``seconds``: time with commands; 1 s without follows. ``mute``: whether the board's data is cut.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -67,7 +67,7 @@ def full_for_long(rig: Rig) -> None:
 def estop_into_a_full_port(rig: Rig) -> None:
     """Latch the e-stop while the port is full. The reply must contain a warning.
 
-    Then no new motion command may precede the e-stop.
+    When the port accepts data again, the e-stop must come before any new motion command.
     """
     rig.drive()
     rig.hand.leave()
@@ -102,9 +102,9 @@ TERMINAL: Final[dict[str, Callable[[Rig], None]]] = {
 
 
 def server_holds(rig: NetworkRig, *, mute: bool) -> None:
-    """Let the server keep data back and later deliver everything at once.
+    """Let the server hold back the driver's data for 3 s, then deliver all of it at once.
 
-    ``mute``: whether the server also keeps the data from the board.
+    ``mute``: whether the server also holds back the board's data.
     """
     rig.drive()
     rig.server.deaf, rig.server.mute = True, mute

@@ -11,7 +11,7 @@ from rig_board import load
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """Every board has faults. The names of the faults that it leaves out exist."""
+    """Every board has faults to inject. The faults that it leaves out (``without``) exist."""
     kind = load(board)
     own = (kind.cases or survivable)(0)
     assert own.keys() - kind.without

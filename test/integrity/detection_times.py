@@ -64,7 +64,10 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Print a row: the shortest and longest reaction time over all phases of the displacements."""
+    """Print a row: the shortest and the longest reaction time.
+
+    There is one trial for each tick between two displacements at which the motion can begin.
+    """
     shown = []
     for period_s in PERIODS_S:
         times = []

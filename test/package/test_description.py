@@ -92,9 +92,10 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """Wheels at the rates for a twist roll as fast as their places on the body.
+    """The kinematics give the wheel rates for a twist of the body.
 
-    Only the rolling direction counts, because rollers slide.
+    At these rates, each rim rolls as fast as the body moves at this wheel. Only the rolling
+    direction is compared: the rollers let the wheel move sideways.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -37,13 +37,13 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    ``imu_sent``, ``odom_sent``: frames from the first one that arrived.
+    ``imu_sent``, ``odom_sent``: frames that the board sent, from the first one that was published.
 
     ``imu_wrong``, ``odom_wrong``: messages that match no frame.
 
     ``worst_m``, ``worst_rad``: largest error of ``odom`` against the pose of the board.
 
-    ``last_m``, ``last_rad``: error in the last message.
+    ``last_m``, ``last_rad``: error of ``odom`` in the last message.
     """
 
     seconds: float

@@ -48,7 +48,7 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     * ``proof``: receives a report of each stop and motion sent.
-    * ``heard``: called with each written packets and the time, also for requests.
+    * ``heard``: called with all packets that are written, also those of requests, and the time.
     """
 
     def __init__(
@@ -96,8 +96,8 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        Packets other than Stop can complete a damaged motion frame, so the set-point is then
-        repeated at once.
+        A damaged motion frame may wait in the board for its last bytes. Packets other than Stop
+        can complete it to a wrong motion, so the set-point is then repeated at once.
         """
         if self._heard is not None:
             self._heard(packets, now)

@@ -52,7 +52,7 @@ class Setpoint(Protocol):
 
     @property
     def final(self) -> Order:
-        """The order of this command once it is settled."""
+        """The order that this command gives at last, after any ramp."""
 
     def order(self, now: float) -> Order:
         """Return the order for the time ``now``."""

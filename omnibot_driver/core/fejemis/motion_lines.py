@@ -2,8 +2,9 @@
 
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
-The front board uses the ratio of both numbers, the drive board the root of their squares. Of the
-safe lines, the nearest to the command is taken.
+A line has a speed and a turn rate. The front board uses only their ratio, the drive board only the
+root of the sum of their squares. So several lines give the same motion. Of those with which the
+loss is detected, the nearest to the command is taken.
 """
 
 import math

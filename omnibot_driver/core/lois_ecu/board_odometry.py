@@ -25,7 +25,7 @@ class Told:
 
     ``along_m``: distance of the middle of the axle.
 
-    ``speeds_mps``: left and right rim. None if no whole RPM give the velocity.
+    ``speeds_mps``: left and right rim. None if the velocity does not result from whole RPM.
     """
 
     turned_m: float

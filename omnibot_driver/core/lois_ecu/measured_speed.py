@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Prediction of the wheel speeds that the firmware measured last, and of their effect on 0x20.
+"""Prediction of the board's odometry (0x20), which uses the last measured speed of each wheel.
 
-The motion filter calls this module in each of its steps.
+The firmware measures a wheel's speed at the wheel's ticks. The motion filter calls this module in
+each of its steps.
 
 This module works on the states of the filter, without reports.
 """
@@ -30,12 +31,14 @@ START_STDDEV_TICKS: Final = 0.9
 that 0x20 misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that 0x20 misses above ``FAST_RPM``. A tick soon
-after one that sending delayed gets no speed."""
+"""Variance, in squared ticks per s, of the motion that 0x20 misses above ``FAST_RPM``.
+
+Sending delays a tick. If the next tick comes soon after it, the board measures no speed.
+"""
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
-    """Predict the speeds that the firmware measured last, and the resulting changes of 0x20.
+    """Predict the last measured speed of each wheel, and the changes of 0x20 that result.
 
     ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
     """

@@ -2,8 +2,8 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-While the public firmware does not count ticks, ``motion_filter`` predicts and ``comparison``
-corrects by 0x20.
+While the public firmware does not count ticks, ``motion_filter`` predicts the motion, and
+``comparison`` corrects the prediction by the board's own odometry (0x20).
 
 Time is an argument. All times are arrival times in s.
 """

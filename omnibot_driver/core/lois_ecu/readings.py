@@ -69,7 +69,7 @@ class RecordFailed:
 class TerminalLeft:
     """Notice that a terminal mode has ended.
 
-    During a terminal mode, the driver does not learn whether the e-stop button is pressed.
+    The e-stop button may have changed meanwhile. In a terminal mode, its state is not reported.
     """
 
 

@@ -2,8 +2,8 @@
 
 """Corrections of one wheel by the speeds that a LOIS ECU reports for it.
 
-A reported speed is that of the last tick. If the wheel rests, the speed is old. If sending delayed
-the tick, the speed is wrong.
+The board measures a wheel's speed at each tick of this wheel. So the reported speed of a wheel at
+rest is old. If sending delayed the tick, the speed is wrong.
 
 This module works on reported speeds and the motion filter, without messages.
 """
@@ -83,7 +83,7 @@ class ReportedSpeed:
         motion.filter.forget(wheel.base + PUSH, 0.0, 0.0)
 
     def take(self, speed_mps: float, duration_s: float) -> None:
-        """Correct the wheel by a reported speed, which is that of its last tick.
+        """Correct the wheel's estimate by a reported speed, as measured at the wheel's last tick.
 
         ``duration_s``: time since the last report, in s.
         """

@@ -170,7 +170,7 @@ class MartBoard(Board):
         return readings
 
     def reset_odometry(self) -> None:
-        """Begin a new odometry frame at the robot's present pose."""
+        """Move the origin of the odometry frame to the robot's present pose."""
         self._pilot.odometry.reset()
 
     # Outbound

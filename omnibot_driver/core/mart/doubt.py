@@ -69,7 +69,7 @@ class Doubt:
         self.reset()
 
     def reset(self) -> None:
-        """Begin a new frame at the present pose, without errors."""
+        """Forget all errors, because the odometry frame now begins at the robot's pose."""
         self._walk = Covariance()
         self._levers = [(0.0, 0.0, 0.0)] * 5
         self._bend_before_rad = 0.0
@@ -154,9 +154,9 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the heading error of a turn that has ended, because its angle is known now.
+        """Replace the wheel's heading error in the last turn by the gyro's smaller error.
 
-        Call this before the position changes.
+        The server has recorded the angle by the gyro. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

@@ -136,7 +136,7 @@ class Health:
     def _status(self, bits: int) -> None:
         """Record the status of the motor board.
 
-        A status other than 0 must come twice: a late encoder count looks alike.
+        A status other than 0 must come twice, because a late encoder count can look like one.
         """
         if not 0 <= bits <= NO_READ:
             return

@@ -94,7 +94,8 @@ class Motors:
     def _balance(self, units: float) -> float:
         """Return the ratio of both motors' speeds (left / right), each with ``units``.
 
-        It is ``motor_balance`` ± MOST_UNEQUAL at most: lost changes can spoil the lines.
+        Lost or duplicate speed changes can make the motor lines wrong. So the ratio is limited
+        to ``motor_balance`` ± MOST_UNEQUAL.
         """
         usual, ratio = self._settings.motor_balance, self._line_ratio(units)
         return min(usual + MOST_UNEQUAL, max(usual - MOST_UNEQUAL, ratio))

@@ -2,8 +2,8 @@
 
 """Dead reckoning: the robot's pose at the last encoder count.
 
-On the spot, the wheel measures the turn until SM reports it. This module knows counts, degrees and
-metres; it does not know commands. The caller passes the time.
+The right wheel measures a turn on the spot, until the server reports its angle in the reply to SM.
+This module knows counts, degrees and metres; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -84,7 +84,7 @@ class Reckoning:
         self._settings = self.doubt.settings = settings
 
     def reset(self) -> None:
-        """Begin a new odometry frame at the present pose."""
+        """Move the origin of the odometry frame to the robot's present pose."""
         self.pose = Pose()
         self.doubt.reset()
         self._begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)

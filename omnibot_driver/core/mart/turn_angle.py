@@ -80,8 +80,8 @@ class TurnAngle:
 
 
 def is_of_another(wrong_rad: float, spun_rad: float) -> bool:
-    """Return whether a reported turn that is wrong by ``wrong_rad`` belongs to another motion.
+    """Return whether a reported angle is too far from the wheel's turn to be of the same motion.
 
-    ``spun_rad``: the turn that the wheel has measured.
+    ``spun_rad``: the wheel's turn. ``wrong_rad``: difference between it and the reported angle.
     """
     return abs(wrong_rad) > TOLD_RAD + TOLD_PART * abs(spun_rad)

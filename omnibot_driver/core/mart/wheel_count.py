@@ -32,7 +32,7 @@ class Step:
 
     ``lost``: whether the robot has also moved by an unknown amount.
 
-    ``unsure``: the true distance may be zero, as the start may be lost.
+    ``unsure``: whether the start command may be lost. If it is, the wheel has not rolled.
     """
 
     wheel_m: float
@@ -46,7 +46,7 @@ class WheelCount:
 
     ``last``: last accepted count. ``told_s``, ``from_s``: its probable and earliest time.
 
-    ``certain``: the last reply answers no other query.
+    ``certain``: whether the last reply is certainly the reply to ENC.
 
     ``maybe``: the last count, if it equals the one before the start, else 0.
     """

@@ -95,7 +95,10 @@ class OutlierFilter:
         self._restarted = self._time_unknown = False
 
     def admit(self, reading: Reading, stamp_s: float) -> list[Stamped]:
-        """Add a reading; return the readings that no longer wait. Each kind stays in order."""
+        """Add a reading; return the readings whose wait is over. Each kind stays in order.
+
+        A reading that need not wait is returned at once.
+        """
         if isinstance(reading, ImuReading):
             return list(self.admit_imu(reading, stamp_s))
         if isinstance(reading, DisplacementReading):
@@ -125,7 +128,7 @@ class OutlierFilter:
         return released
 
     def admit_imu(self, reading: ImuReading, stamp_s: float) -> list[tuple[ImuReading, float]]:
-        """Add an IMU reading; return the IMU readings that no longer wait, in order."""
+        """Add an IMU reading; return the IMU readings whose wait is over, in order."""
         force = self.limits.force_step_mps2
         turn = self.limits.fastest_radps2 * self._tick_s
         (x, y, z), (u, v, w) = reading.specific_force, reading.angular_velocity
@@ -268,7 +271,7 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether a flipped bit can explain the step, within the recent variation.
 
-        ``value``: magnitude after the step. A knock can reach the end of the scale: False.
+        ``value``: magnitude after the step. False at the end of the scale: a knock can reach it.
         """
         if topmost == inf:  # the readings are not integers
             return False

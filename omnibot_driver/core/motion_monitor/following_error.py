@@ -64,7 +64,7 @@ class FollowingError:
         *,
         heading_known: bool,
     ) -> None:
-        """Add one displacement to the error, or reset the error if the displacement is inside.
+        """Add one displacement to the error. If it is inside the envelope, reset the error.
 
         ``motion``: mean twist in ``seconds`` from ``begun_s`` on. An unknown heading leaves linear
         directions unchecked.

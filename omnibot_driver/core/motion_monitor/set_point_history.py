@@ -89,7 +89,7 @@ class SetpointHistory:
         return found
 
     def driven(self, at_s: float) -> bool:
-        """Return whether any set-point at ``at_s`` or later commands motion."""
+        """Return whether motion was commanded at ``at_s`` or at any time since then."""
         return any(each is not AT_REST for each in self.since(at_s))
 
     def explained(self, at_s: float) -> list[Velocity]:

@@ -30,7 +30,7 @@ class OdometryNoise:
     * ``wheel_drift``: standard deviation of a wheel after 1 m of rim motion, in m.
     * ``wheel_scale``: standard deviation of a wheel's relative size error.
     * ``wheel_slip``: mean slip of all wheels, as a fraction of the distance.
-    * ``wheels``: geometry, at a wheel radius of 1 m.
+    * ``wheels``: geometry with a wheel radius of 1 m, so that wheel rates are rim speeds in m/s.
     * ``unheard_mps2``, ``unheard_radps2``: assumed accelerations during a gap.
     """
 

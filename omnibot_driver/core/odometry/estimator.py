@@ -2,9 +2,9 @@
 
 """The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
-``_board`` is the pose in the board's frame; the CorrectionSmoother has the odometry frame. Both
-move by the same tangents, so the board's next pose recovers lost motion. This module knows SE(2);
-it does not know bytes, clocks or ROS.
+``_board`` is the robot's pose in the board's frame; the CorrectionSmoother has its pose in the
+odometry frame. Both move by the same tangents, so the board's next pose recovers lost motion. This
+module knows SE(2); it does not know bytes, clocks or ROS.
 """
 
 import math
@@ -62,7 +62,7 @@ class OdometryEstimate:
     """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in body axes.
 
     * ``twist``: None if the duration is unknown.
-    * ``rolled``: all wheel motion so far, as one tangent in the board's axes.
+    * ``rolled``: sum of the tangents (twist x time) of all motion so far, in the board's axes.
     * ``rolling``: rate of ``rolled``; None if unknown.
     * ``twist_variances``: linear in m²/s², angular in rad²/s²; None: the parameters' values.
     """
@@ -247,9 +247,10 @@ class Odometry:
         self._board, self._restarted, self._belief.doubted = board, None, None
 
     def _judge(self, told: Pose, confirmed: bool) -> None:
-        """Accept a pose that is reachable and expected, or that confirms the last unexpected pose.
+        """Accept a pose, or keep it as ``doubted`` until the next pose.
 
-        A confirmed pose out of reach changes only the relation of the frames.
+        A pose that is reachable and expected is accepted, and so is one that confirms the last
+        doubted pose. If that one is unreachable, only the relation of the frames changes.
         """
         assert self._board is not None
         way = self._board.way_to(told)

@@ -31,19 +31,19 @@ class PendingDisplacements:
         return waiting
 
     def forget_losses(self) -> None:
-        """Set the losses before the first displacement to 0: their motion is known now."""
+        """Set ``lost`` to 0: the motion of the lost displacements is known now."""
         if self._waiting:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s
 
     @property
     def lost(self) -> int:
-        """Number of displacements that are missing before the first waiting one."""
+        """Number of displacements that were lost just before the first waiting one."""
         return self._waiting[0][0].lost if self._waiting else 0
 
     @property
     def lost_s(self) -> float:
-        """Duration in s of all displacements that are missing before the first waiting one."""
+        """Duration in s of the displacements that were lost before the first waiting one."""
         return self.lost * (self._waiting[0][0].duration_s or 0.0) if self._waiting else 0.0
 
     @property

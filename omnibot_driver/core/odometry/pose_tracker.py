@@ -26,7 +26,7 @@ class PoseTracker:
 
     def __init__(self, axis_signs: Signs) -> None:
         self.rolled = Pose()
-        """All motion since the driver began, in true size, as one tangent in the board's axes."""
+        """Sum of the tangents of all motion since the driver began, true-sized, in board axes."""
         self._axis_signs = axis_signs
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(OdometryNoise())
 

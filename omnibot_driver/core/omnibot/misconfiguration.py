@@ -31,7 +31,8 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M``, ``TIMES``: when a pose contradicts the configured frame of the deltas.
 
-The summed deltas miss the pose by ``CLEARLY_M``, and by ``TIMES`` the distance in the other frame.
+In the configured frame, the summed deltas miss the pose by more than ``CLEARLY_M``, and by more
+than ``TIMES`` the distance by which they miss it in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
@@ -61,7 +62,7 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Store a delta, with which the next pose will check the frame of the deltas.
+        """Store a delta. With it, the next pose shows whether the deltas' frame is set correctly.
 
         ``reading``: the delta as the settings interpret it.
         """
@@ -73,9 +74,10 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """Check the period of the deltas, with a delta that arrived at ``now`` in s.
+        """Check the configured period of the deltas, each time a delta arrives.
 
-        ``imus``: IMU frames since the previous delta. Arrival times must confirm the result.
+        ``now``: its arrival in s. ``imus``: IMU frames since the previous delta, which give the
+        period. Arrival times must confirm it.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:
@@ -99,7 +101,7 @@ class MisconfigurationChecks:
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
         """Check the byte order of the poses, and the frame of the deltas, with a new pose.
 
-        ``reading``: the pose by the settings. ``order``: configured byte order.
+        ``reading``: the pose as the settings interpret it. ``order``: configured byte order.
         """
         values = (frame.x, frame.y, frame.theta)
         makes_sense, swapped = _makes_sense(values), _makes_sense(_swapped(values))

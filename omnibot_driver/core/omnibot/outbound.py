@@ -2,7 +2,8 @@
 
 """The encoding of frames and letters for a line that loses bytes, and for unknown firmware.
 
-Zeros precede everything; nothing follows a motion frame; no payload contains a letter or a header.
+Zeros are sent before each frame or letter. After a motion frame, nothing is sent until the next
+frame or letter is due. No payload contains a letter or a header.
 docs/internals/omnibot_protocol.md ("The line to the board") gives the reasons.
 
 This module knows bytes; it does not know what is commanded, nor when.
@@ -23,15 +24,17 @@ from omnibot_driver.core.omnibot.frames import (
 MAX_WORD: Final = 32767
 
 ZEROS: Final = bytes(8)
-"""Zeros before a frame or letter. Seven end a frame that was begun; one may be lost.
+"""Zeros before Stop, the emergency stop or a letter.
 
-Three wake a board.
+Seven zeros complete any frame that lost its end, and one zero may be lost. Three wake a board.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
-"""Zeros before a motion frame. They are few, so that this frame soon replaces a damaged frame
-before it."""
+"""Zeros before a motion frame.
+
+They may complete a damaged frame. They are few, so that the motion frame soon replaces it.
+"""
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET
 _HARMFUL: Final = re.compile(b"[%s]|%s" % (_LETTERS, re.escape(COMMAND_HEADER))).search

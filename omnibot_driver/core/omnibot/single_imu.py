@@ -2,8 +2,8 @@
 
 """The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
-Readings and state are as on the normal path; a test compares both. If a frame fails, the decoder
-gets each piece with its own arrival time.
+Readings and state are as on the normal path; a test compares both. A frame may arrive in several
+reads (pieces). If the fast path rejects it, the decoder gets each piece with its arrival time.
 """
 
 import struct

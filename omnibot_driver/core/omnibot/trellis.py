@@ -2,8 +2,8 @@
 
 """The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
-The search looks for the shortest path in a graph. Edges are frames, damaged frames and unexplained
-bytes.
+An interpretation is a path in a graph. Its edges are frames, damaged frames and unexplained bytes,
+each with a cost. A frame on the cheapest path is sure if every path without it costs clearly more.
 
 This module knows how a line damages the shapes of frames; it does not know which frames are
 accepted.
@@ -32,7 +32,7 @@ SURE: Final = 3.5
 Such an interpretation is at least 30 times less likely.
 """
 STEP: Final = 5.5
-"""First cost limit of the search, above the lower bound of the cost.
+"""First cost limit of the search, as a distance above the lower bound of the cost.
 
 The limit rises until the search finds a path.
 """
@@ -273,7 +273,7 @@ class _Search:
         return found
 
     def pieces(self) -> list[Segment]:
-        """Return the complete frames on the shortest path, and mark those that are sure."""
+        """Return the complete frames on the cheapest path, and mark those that are sure."""
         cost = self._cost
         path: list[_Edge] = []
         edge = self._by[self._end]

@@ -2,7 +2,8 @@
 
 """The time of each tick: a straight line over the ticks, fitted to bounds of their times.
 
-*Latest* points are arrivals; *earliest* points are ticks that a read did not bring.
+A *latest* point (n, t): a read at time t brought tick n, so the tick was not later. An *earliest*
+point (n, t): a read at time t did not bring tick n yet, so the tick was not earlier.
 docs/internals/time.md explains the fit.
 
 This module knows ticks and times; it does not know what is sampled, nor how ticks are counted.
@@ -26,7 +27,7 @@ margin."""
 SUPPORT: Final = 0.75
 """Place at which the line touches the points' hull, as a fraction of the hull's time span.
 
-Late enough for recent points, early enough against jitter.
+A later place follows the recent points more closely. An earlier place is less affected by jitter.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -82,7 +83,7 @@ class ClockFit:
             self._best, self._not_before, self._block_from = None, [], tick
 
     def not_before(self, earliest: Point) -> None:
-        """Add a lower bound: a tick that a read did not bring, and the time of that read in s."""
+        """Add a lower bound: a tick that a read did not bring yet, and that read's time in s."""
         self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:
@@ -134,7 +135,10 @@ class ClockFit:
         return True
 
     def _lay_under(self) -> None:
-        """Place the line along the edge of the latest points' lower hull that is at ``SUPPORT``."""
+        """Place the line under the latest points, along one edge of their lower convex hull.
+
+        This edge is at the fraction ``SUPPORT`` of the hull's time span.
+        """
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])
         middle = hull[0][0] + SUPPORT * (hull[-1][0] - hull[0][0])

@@ -30,7 +30,7 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
-An adapter of 16 ms reads at five phases of the tick: 12 reads have each twice.
+An adapter with a timer of 16 ms reads at five phases of the tick. 12 reads have each phase twice.
 """
 CALM: Final = 0.45
 """Largest distance from the line, in periods, of a read whose tick is certain.
@@ -99,7 +99,7 @@ class DeviceClock:
     def stamps(
         self, readings: Sequence[Reading], now: float, edge: SampleBoundary | None = WHOLE
     ) -> list[float]:
-        """Return the sampling times in s of the readings that a read at ``now`` completed.
+        """Return the sampling time in s of each reading. Their last bytes were read at ``now``.
 
         Stamps increase from tick to tick, up to ``now``. A displacement has its tick's stamp.
         ``edge``: end of the read.
@@ -236,9 +236,10 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """Record a new tick, read at ``now``, and its delay ``lag_s`` from the line, in s.
+        """Record a new tick that was read at ``now``.
 
-        Of ticks read together, only the last delay is kept.
+        ``lag_s``: how much later than the line's time it arrived, in s. Of ticks read together,
+        only the last delay is kept.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s

@@ -2,7 +2,8 @@
 
 """The front Teensy: the steered wheel and its angle sensor, brush, lift, LEDs, infrared sensors.
 
-This module knows the front half of the manual and the robot. It must not know the drive Teensy.
+This module knows what the manual says about the front half, and the robot. It must not know the
+drive Teensy.
 """
 
 from collections.abc import Callable

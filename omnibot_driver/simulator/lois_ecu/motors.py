@@ -74,7 +74,10 @@ class Motor:
         return self._on_the_way.popleft()
 
     def _through_gap(self, turns: float) -> float:
-        """Return how far the wheel turns behind the backlash, if the motor makes ``turns``."""
+        """Return by how many turns the wheel moves when the motor makes ``turns``.
+
+        The backlash between them absorbs the rest.
+        """
         backlash = self._settings.backlash_turns
         if not backlash:
             return turns

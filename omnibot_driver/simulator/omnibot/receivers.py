@@ -52,7 +52,7 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``, but discard a byte other than FE after FF.
+    """Find frames like ``counting``; but if another byte than FE follows FF, discard both.
 
     So the header in FF FF FE is missed.
     """

@@ -64,9 +64,9 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Written time constant divided by the time constant that results on the board.
+        """Factor from a wanted time constant to the number to write to the board.
 
-        The board computes with ``nominal_s`` instead of ``period_s``.
+        The board computes its coefficients for ``nominal_s``, but applies them every ``period_s``.
         """
         return self.nominal_s / self.period_s
 

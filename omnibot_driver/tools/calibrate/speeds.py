@@ -40,9 +40,9 @@ class Speed:
 
     ``counts``: the commanded counts.
 
-    ``measured``, ``sigma``: by the odometry.
+    ``measured``, ``sigma``: speed by the odometry, and its standard deviation.
 
-    ``gyro``, ``gyro_sigma``: by the gyro. NaN for x and y.
+    ``gyro``, ``gyro_sigma``: the same by the gyro. ``gyro`` is NaN for x and y.
     """
 
     axis: int
@@ -59,7 +59,7 @@ class Scale:
 
     ``sigma``: standard deviation of ``value``.
 
-    ``excess``: scatter of the speeds over the expected scatter.
+    ``excess``: scatter of the speeds, divided by the expected scatter.
     """
 
     value: float
@@ -70,7 +70,8 @@ class Scale:
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
     """Return commands in both directions along each axis, each with its duration in s.
 
-    ``top``: largest speeds. ``scales``: counts per m/s or rad/s. ``levels``: speeds by axis.
+    ``top``: largest speeds. ``scales``: counts per m/s or rad/s. ``levels``: number of speeds for
+    each axis.
     """
     stairs = []
     for level in range(1, levels + 1):

@@ -47,7 +47,8 @@ Even such distant residuals are correlated, because the load changes slowly.
 MISSED: Final = 0.42
 """Sum of two successive relative errors above which the board has missed a mark.
 
-Late mark: near 0. Missed mark: less than 1, because the board's clock loses up to 6 ms.
+The sum is near 0 for a late mark. For a missed mark it is less than 1, because the board's clock
+loses up to 6 ms.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which the board cannot miss a mark.
@@ -112,7 +113,8 @@ class Search:
     def roughly(self) -> Column:
         """Return first estimates of all values.
 
-        They are for a plant of second order with evenly spaced marks and independent noise.
+        These first estimates assume a plant of second order, evenly spaced marks and independent
+        noise.
         """
         records = len(self._lengths)
         starts = []
@@ -151,7 +153,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        From then on, such a time counts for two distances.
+        From then on, the time around a missed mark is used for two distances between marks.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -199,8 +201,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        A larger scatter between records increases it, because a slowly changing load affects whole
-        records.
+        A slowly changing load affects whole records. So if the records scatter more than the
+        residuals show, the covariance is increased to this scatter.
         """
         own = 1 + self.order
         found = self._search(values)

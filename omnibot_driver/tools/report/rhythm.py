@@ -160,9 +160,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step, the end of the steps that may compensate it.
+    """Return, for each long step, the index at which the steps end that may compensate it.
 
-    ``wide``: indices of long steps. ``most``: largest number of compensating steps.
+    The next long step ends them too. ``wide``: indices of the long steps. ``most``: largest number
+    of steps, counted from the long one.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

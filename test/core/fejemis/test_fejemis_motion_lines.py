@@ -54,14 +54,20 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """The driver therefore chooses digits with which the checksum shows such a loss."""
+    """In the manual's example, the checksum does not show the loss of certain two characters.
+
+    The driver therefore chooses other digits.
+    """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
 
 
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
-    """Another line follows each line, because the line end may be lost."""
+    """A line loses one or two characters, and another line follows. No wrong motion is read.
+
+    The following line matters if the line end is lost.
+    """
     chance = random.Random(5)
     texts = {text for v, w in COMMANDS for text in (front_line(v, w, FRONT_M), drive_line(v, w))}
     behind = [line(b"fwl .04", sums=True), line(b"rc 2 .299 28.6", sums=True)]
@@ -168,7 +174,10 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
 @pytest.mark.parametrize("sums", [True, False])
 def test_nothing_is_added_to_a_line(text: bytes, *, sums: bool) -> None:
-    """A related firmware obeys ``stop`` only if it is the complete line."""
+    """A line has no characters besides its text, its checksum and the line end.
+
+    A related firmware obeys ``stop`` only if it is the complete line.
+    """
     data = line(text, sums=sums).lstrip(b"\n")
     assert data == (b";%02d" % sum_of(text) if sums else b"") + text + b"\n"
 
@@ -194,9 +203,9 @@ def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() 
 
 
 def test_without_sums_the_front_board_gets_both_numbers() -> None:
-    """Without checksums, the front board still gets both numbers.
+    """Without checksums, the front board's line still has a speed and a turn rate.
 
-    Their ratio gives the wheel's angle.
+    The board needs both, because their ratio gives the wheel's angle.
     """
     assert plain_front_line(0.25, 0.5) == b"rc 2 0.25 28.65"
     assert plain_front_line(0.0, -0.5) == b"rc 2 0 -28.65"

@@ -73,7 +73,8 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """The LED's line follows a motion line after at least 14.5 ms.
 
-    Otherwise, 13 ms of lost bytes could leave a wrong motion.
+    The board can lose 13 ms of bytes. If these were the end of the motion line and the beginning
+    of the LED's line, the rest could be a wrong motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

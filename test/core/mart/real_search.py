@@ -45,7 +45,7 @@ Regular queries are not counted.
 PROOF_S: Final = 0.25
 """Time in s after the death of the IMU.
 
-A motion that begins later had no check while the IMU worked.
+A motion that begins later was not checked while the IMU still worked.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
@@ -174,7 +174,10 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
 
 
 def beginnings() -> Iterator[Trial]:
-    """Yield the trials of a driver that starts, one for each motion and network interruption."""
+    """Yield the trials in which a driver starts while the server may be executing a command.
+
+    One trial for each command in ``MET`` with each interruption of the network.
+    """
     for met, away_s, back_s in product(MET, AWAY_S, BACK_S):
         for ways in ((0, 1), (0,), (1,)):
             yield Trial(met=met, away_s=away_s, back_s=back_s, ways=ways)

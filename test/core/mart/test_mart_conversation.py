@@ -92,7 +92,7 @@ def test_a_reply_answers_the_pending_request() -> None:
 def test_a_late_reply_is_not_attributed_to_the_next_request(word: words.Word, late: bytes) -> None:
     """A late reply arrives while another request is pending.
 
-    The pending command never returns such a form or reason. The driver discards the reply.
+    The server never answers the pending command like this, so the driver discards the reply.
     """
     talk = conversation()
     talk.ask(word.request(), 1.0)
@@ -114,9 +114,9 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The server answers RST IMU so soon that the reply looks like a late ok.
+    """The reply to RST IMU comes soon, so a late ok of another command could be taken for it.
 
-    RST IMU waits until the last late ok is gone.
+    RST IMU waits until its reply can only come after any late ok.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -212,9 +212,9 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """Two stops follow a start. For 0.6 s, both replies may answer the first stop.
+    """Two stops follow a start. The first stop may have overtaken the start.
 
-    The first stop may have overtaken the start.
+    For 0.6 s, both replies may be copies of the reply to the first stop, so they prove nothing.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)

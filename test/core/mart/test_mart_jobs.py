@@ -65,7 +65,8 @@ def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
 def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
     """Without a dock, the robot drives at most the permitted distance.
 
-    Moves exceed their request, so the driver requests less. Obstacles do not stop docking.
+    A controlled move is longer than requested, so the driver requests less. Obstacles do not stop
+    docking.
     """
     bench = MartBench().ready()
     bench.job(Job.DOCK, "DOCK", docking_inches(longest_m))

@@ -219,9 +219,9 @@ def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> Non
 
 
 def test_a_copy_of_what_has_come_is_not_the_reply_that_is_owed() -> None:
-    """The driver waits for a missing reply, and a copy of an older reply arrives.
+    """The driver waits for a missing reply. Instead, a copy of an older reply arrives.
 
-    A query of the same form still waits.
+    The copy does not end the wait, so the driver sends no other query of the same form.
     """
     talk = Conversation(0.3)
     asked(talk, words.ENC, b"ok 5", 1.0, 0.01)
@@ -298,9 +298,9 @@ def test_a_balance_of_the_motors_is_believed_within_limits() -> None:
 
 
 def test_a_reset_during_a_controlled_move_leaves_the_place_uncertain() -> None:
-    """The odometry is reset during a controlled move. The final count covers the whole move.
+    """The odometry is reset during a controlled move.
 
-    The covariance covers the error.
+    The count at the end includes the distance before the reset. The covariance covers this error.
     """
     bench = MartBench("source").ready()
     bench.go_to(1.0, 0.0, 0.0)
@@ -333,9 +333,10 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """Only the heading shows that a speed change arrived twice.
+    """The network may duplicate a speed change, which then acts twice.
 
-    So a single change is at most 15 units in RM, and 5 in B.
+    Only the heading shows this, and in B it may be unknown. So a single change is at most 15 units
+    in RM, and 5 in B.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

@@ -134,9 +134,9 @@ def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: f
 
 
 def test_a_turn_faster_than_commanded_undoes_no_lesson_of_a_drive() -> None:
-    """Units are whole numbers, so slow turns are up to 17 % too fast.
+    """Motor units are whole numbers, so slow turns on the spot are up to 17 % too fast.
 
-    The measured motor balance does not change.
+    They do not change the motor balance that the driver has learned from a drive.
     """
     bench = MartBench("source", volts=23.0, dead_zone_units=4.0, motor_inequality=0.05).ready()
     for vx, yaw_rate in ((0.0, 0.3), (0.25, 0.0), (0.1, 0.0), (0.0, 0.1), (0.0, 0.08)):

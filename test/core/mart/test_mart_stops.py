@@ -187,9 +187,9 @@ def test_a_number_that_was_asked_for_before_is_not_the_reply_to_a_lost_stop(
 def test_a_copy_of_the_starts_ok_is_not_the_reply_to_a_lost_stop(
     start: bytes, twist: tuple[float, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The ok of a start comes twice. The stop in between is lost.
+    """The ok of a start arrives twice. Between the two, the driver sends a stop, which is lost.
 
-    The second ok is not the stop's reply.
+    The driver does not take the second ok for the reply to the stop.
     """
     bench = MartBench().ready()
     while not bench.said()[-1].startswith(start):

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the range of velocities that recent set-points explain.
+"""Tests of the envelope: the velocities that a robot may have under its recent set-points.
 
-Older set-points lose their weight.
+A replaced set-point has less and less effect on the envelope.
 """
 
 import math

@@ -51,9 +51,9 @@ def test_a_request_is_answered_when_its_move_is_done() -> None:
 
 
 def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
-    """Datagrams are delayed by up to 10 s of board time, but not in real time.
+    """A network delays datagrams by up to 10 s of the board's simulated time.
 
-    Each datagram arrives once, twice or never.
+    The test does not wait in real time. Each datagram arrives once, twice or never.
     """
     network = FaultyNetwork(NetworkFaults(delay_s=10.0, duplicate=0.5, lose=0.2))
     board = ToyServer()

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the simulated halves' lines: checksums, comments, subscriptions, firmware variants."""
+"""Tests of the text lines that the two simulated halves send and obey.
+
+Checksums, comments, subscriptions and firmware variants are tested.
+"""
 
 from itertools import pairwise
 

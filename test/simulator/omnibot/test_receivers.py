@@ -209,14 +209,17 @@ def test_a_frame_without_its_header_acts_by_its_letters() -> None:
 
 
 def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
-    """FF FF FE begins a frame. Most receivers take the second FF as the beginning of the frame."""
+    """The first byte of the header FF FE comes twice. Most receivers still find the frame."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         typed = "FF FF FE 02 00 20 00 00 00 00"
         assert understood(typed, kind=kind) == [ControlFrame(0x02, (32, 0, 0))]
 
 
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
-    """FF FF FE begins a frame. The naive receiver discards the second FF and reads letters."""
+    """The first byte of the header FF FE comes twice.
+
+    The naive receiver discards both FF, misses the frame and reads its letters.
+    """
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
 
