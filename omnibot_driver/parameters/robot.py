@@ -64,9 +64,9 @@ ROBOT: Final = (
         "fastest_linear_acceleration",
         15.0,
         "m/s²",
-        "Highest linear acceleration that the robot can reach, even in a collision. If one"
-        " displacement jumps by more than this acceleration allows and the next one jumps back,"
-        " the driver rejects the first.",
+        "Highest linear acceleration that the robot can reach, even in a collision. If a"
+        " displacement differs from the previous one by more than this acceleration permits, and"
+        " the next one jumps back, the driver rejects the middle one.",
         low=0.1,
         high=1000.0,
     ),
@@ -74,9 +74,9 @@ ROBOT: Final = (
         "fastest_angular_acceleration",
         50.0,
         "rad/s²",
-        "Highest angular acceleration that the robot can reach, even in a collision. If one"
-        " displacement or gyro reading jumps by more than this acceleration allows and the next"
-        " one jumps back, the driver rejects the first.",
+        "Highest angular acceleration that the robot can reach, even in a collision. If a"
+        " displacement or gyro reading differs from the previous one by more than this"
+        " acceleration permits, and the next one jumps back, the driver rejects the middle one.",
         low=1.0,
         high=10_000.0,
     ),

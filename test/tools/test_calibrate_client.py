@@ -72,8 +72,8 @@ def test_what_the_driver_refuses_is_told(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--namespace", "no/such name!"], "is not a namespace"),
-        (["--ros-args", "--nonsense"], "ROS does not understand its arguments"),
+        (["--namespace", "no/such name!"], "is not a valid namespace"),
+        (["--ros-args", "--nonsense"], "the ROS arguments (after --ros-args) are invalid"),
     ],
 )
 def test_what_ros_cannot_take_is_a_sentence(

@@ -19,7 +19,11 @@ _SWITCHES = (
     ("timed-velocity", "vel lines begin with the time"),
     ("acceleration-in-g", "acc lines are in g instead of m/s²"),
     ("tilt", "pose lines have a fifth number, the tilt"),
-    ("start-resumes", "after the command start, the last rc command takes effect again"),
+    (
+        "start-resumes",
+        "after the command start, the board obeys the last rc command again, even one that it"
+        " received while it was stopped",
+    ),
     ("confirms", "the board confirms a command that begins with !"),
     ("single-precision", "times are float32, so after an hour they advance in steps of 0.2 ms"),
 )

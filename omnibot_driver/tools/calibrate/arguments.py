@@ -210,8 +210,8 @@ def _step(parser: argparse.ArgumentParser) -> None:
         "--steps",
         type=_whole,
         default=8,
-        help="number of steps in each direction of rotation; steps up and steps down alternate"
-        " (default 8)",
+        help="number of steps in each direction of rotation (default 8). A step is a change of the"
+        " speed, alternately from slow to fast and from fast to slow",
     )
     parser.add_argument(
         "--gains",

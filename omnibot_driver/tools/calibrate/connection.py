@@ -27,12 +27,12 @@ def connect(
     try:
         rclpy.init(args=list(ros_arguments), context=context, signal_handler_options=quiet)
     except (RCLError, UnknownROSArgsError) as error:
-        raise ToolError(f"ROS does not understand its arguments: {error}") from error
+        raise ToolError(f"the ROS arguments (after --ros-args) are invalid: {error}") from error
     try:
         try:
             node = Node("calibrate", namespace=namespace.rstrip("/"), context=context)
         except InvalidNamespaceException as error:
-            raise ToolError(f"'{namespace}' is not a namespace: {error}") from error
+            raise ToolError(f"'{namespace}' is not a valid namespace: {error}") from error
         try:
             yield Robot(node, context, interruption)
         finally:
