@@ -41,7 +41,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """Decode without checks, as the floor does: all bytes that look like a header begin a frame."""
+    """Decode without checks, as floor.py does: all bytes that look like a header begin a frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:

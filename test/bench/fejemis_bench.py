@@ -132,7 +132,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return an empty list of figures, and the rows of a table. Nothing here has a floor."""
+    """Return an empty list of figures, because there is no floor, and the rows of a table."""
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

@@ -2,7 +2,8 @@
 
 """The LOIS ECU's part of ``make bench``: processor time of its stream, and latency of commands.
 
-Driver and floor get the same bytes, which were recorded at rest.
+The driver and the floor (the smallest program with the same output, without any checks) get the
+same bytes, which were recorded at rest.
 """
 
 import bisect

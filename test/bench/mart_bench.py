@@ -2,8 +2,9 @@
 
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
-Driver and floor have a simulated controller each, on UDP. The driver sends a speed after the
-current reply, but a stop at once.
+The driver and the floor (the smallest program with the same output, without any checks) have a
+simulated controller each, on UDP. The driver sends a speed after the current reply, but a stop at
+once.
 """
 
 import time

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Comparison of the driver with the floor, which are measured in turn."""
+"""Comparison of the driver with the *floor*, which are measured in turn.
+
+The floor is the smallest program with the same output, without any checks.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +12,7 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of one measurement, repeated for the driver and the floor in turn.
+    """The results of one measurement, made several times: each time for the driver, then the floor.
 
     ``ours``, ``floor``: the values of driver and floor, in pairs.
 
@@ -65,7 +68,7 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure the driver and the floor in turn, ``times`` times."""
+    """Measure the driver, then the floor. Do this ``times`` times."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 

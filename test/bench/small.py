@@ -3,7 +3,7 @@
 """Driver and floor on a small computer: each gets a share of one core, by Linux's cgroups.
 
 The quota's period is the shortest that the kernel permits, so the processes run evenly. This needs
-root.
+root. The floor is the smallest program with the same output as the driver, without any checks.
 """
 
 import math

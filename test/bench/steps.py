@@ -2,6 +2,8 @@
 
 """Relays of growing size between the floor and a correct relay. Each step adds one task.
 
+The floor is the smallest program with the same output as the driver, without any checks.
+
 Arguments: the step (a key of STEPS), the port, the namespace. The relay writes nothing to the port.
 """
 

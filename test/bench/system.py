@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Measurements of the driver and the floor as processes on pseudo-terminals."""
+"""Measurements of the driver and the floor as processes on pseudo-terminals.
+
+The floor is the smallest program with the same output, without any checks.
+"""
 
 import bisect
 import json

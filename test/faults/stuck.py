@@ -49,9 +49,9 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full for long.
+    """Keep the port full for long. The driver opens the port repeatedly but reports this once.
 
-    The driver opens the port repeatedly but reports this once. Later, the robot must stop.
+    When the port accepts data again, the robot must stop.
     """
     rig.drive()
     states, mark = len(rig.states), len(rig.driver.lines)
@@ -65,7 +65,7 @@ def full_for_long(rig: Rig) -> None:
 
 
 def estop_into_a_full_port(rig: Rig) -> None:
-    """Latch the e-stop while the port is full. The reply must contain a warning.
+    """Latch the e-stop while the port accepts no data. The driver's reply must contain a warning.
 
     When the port accepts data again, the e-stop must come before any new motion command.
     """

@@ -42,7 +42,9 @@ class Outcome:
 
     ``trips``: how and when the motion monitor stopped the robot.
 
-    ``said``: number of each message. ``happened``: number of each of HANDS.
+    ``said``: how often the driver sent each message.
+
+    ``happened``: how often people did each of HANDS to the robot.
     """
 
     seconds: float = 0.0

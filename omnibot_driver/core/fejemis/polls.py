@@ -54,7 +54,7 @@ class Polls:
         return min(self._next_at, self._sonar_at) if self._role == "drive" else self._next_at
 
     def unknown(self, words: Mapping[str, None]) -> None:
-        """Send the requests in ``words`` no longer, because the firmware does not know them."""
+        """Stop sending the requests in ``words``, because the firmware does not know them."""
         self._unknown = {text for text in ASKED[self._role] if text.decode("ascii") in words}
 
     def due(self, now: float, *, sums: bool) -> list[bytes]:

@@ -2,8 +2,8 @@
 
 """Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-Lines arrive late, never early: the clock is the line just below all arrivals
-(``core/timing/clock_fit.py``). docs/internals/time.md explains why.
+Data arrives late, never early. So the clock is a straight line just below all arrivals, fitted by
+``core/timing/clock_fit.py``. docs/internals/time.md explains why.
 """
 
 from collections.abc import Sequence

@@ -258,7 +258,7 @@ class LoisEcuBoard(Board):
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the body velocity that the last set-point in ``packets`` commands."""
+        """Return the body velocity that is commanded by the last set-point in ``packets``."""
         return self._ecu.meaning(joined(packets))
 
     def wake(self) -> Packets:

@@ -274,7 +274,7 @@ class LoisConversation:
         return self._lines(*self._points.wheels(rates_radps))
 
     def meaning(self, data: bytes) -> BodyTwist:
-        """Return the body velocity that the last set-point in ``data`` commands."""
+        """Return the body velocity that is commanded by the last set-point in ``data``."""
         return self._points.meaning(data)
 
     # Other requests

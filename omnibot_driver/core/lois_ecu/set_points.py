@@ -115,7 +115,7 @@ class SetPoints:
         return SetDuty(*self._board_order(pair))
 
     def meaning(self, data: bytes) -> BodyTwist:
-        """Return the body velocity that the last set-point in ``data`` commands."""
+        """Return the body velocity that is commanded by the last set-point in ``data``."""
         settings = self.settings
         found = outbound.set_points(data, with_sum=settings.with_sum)
         if not found:

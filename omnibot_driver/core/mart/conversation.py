@@ -38,7 +38,7 @@ The reply may only be late, so the next query waits longer.
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """Times in s. While the network is disturbed, a reply may answer an earlier query.
 
-``SLOW_S``: a longer exchange is a disturbance. ``DISTURBED_S``: duration after its last sign.
+``SLOW_S``: a longer exchange is a sign of it. ``DISTURBED_S``: assumed duration after a sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
@@ -116,7 +116,7 @@ class Conversation:
     def may_ask(self, word: Word, now: float) -> bool:
         """Return whether ``word`` may be sent now: no request is pending.
 
-        Queries outside PRESSING also wait until no late reply can be mistaken.
+        Queries outside PRESSING also wait until no late reply can be mistaken for theirs.
         """
         if self.pending is not None:
             return False
@@ -235,9 +235,10 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether the reply copies another query's reply.
+        """Return whether a reply to the query ``word`` is a duplicate of another query's reply.
 
-        Another query has just had this reply, and ``word`` last had a different one.
+        This is assumed if another query has just had an equal reply, and the last reply to ``word``
+        was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA

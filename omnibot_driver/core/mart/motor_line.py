@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A line, learned by the driver, that gives the speed of a motor for its command units.
+"""A straight line, learned by the driver, that gives a motor's speed for its motor units.
 
-Nominal units are those of an ideal motor, e.g. speed 10 at 10 units. This module knows units; it
-does not know wheels or time.
+A command sets the motor units, 0 to 127. Speeds are in nominal units: an ideal motor has speed 10
+at 10 motor units. This module knows units; it does not know wheels or time.
 """
 
 import math

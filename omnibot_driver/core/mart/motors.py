@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver knows about the two motors: the speed of each for its command units.
+"""What the driver has learned about the two motors: how fast each turns at how many motor units.
 
-Each motor has a ``MotorLine``. This module knows units, m/s and rad/s; it does not know what is
-commanded.
+A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. This module knows units,
+m/s and rad/s; it does not know what is commanded.
 """
 
 import copy

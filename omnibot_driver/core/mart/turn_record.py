@@ -68,7 +68,7 @@ class TurnRecords:
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
         """Return the recorded angle as ``recorded_deg`` does, from the file called ``name``.
 
-        None if ``name`` repeats: the server could not write a new file.
+        Return None if ``name`` repeats: the server could not write a new file.
         """
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)
@@ -89,9 +89,9 @@ class TurnRecords:
 
 
 def recorded_deg(pieces: list[bytes], request: Request) -> float | None:
-    """Return the angle of a turn in degrees, with the server's sign, from its file's pieces.
+    """Return the angle of a turn in degrees, with the server's sign, from the pieces of its file.
 
-    ``request``: the turn's command. None for another turn, or without an angle.
+    ``request``: the turn's command. Return None if the file records another turn or has no angle.
     """
     for piece in pieces:  # the angle is in the first piece, so a later piece may be lost
         if head := _HEAD.match(piece):

@@ -126,8 +126,8 @@ class MotionMonitor:
     def release(self) -> None:
         """Record that the driver's e-stop was released.
 
-        The board may still hold its own. A robot that does not move is then HELD_BY_ESTOP, not
-        BLOCKED.
+        The board has an e-stop of its own, which may still hold the robot. So until the robot moves
+        as commanded, the fault of a robot at rest is HELD_BY_ESTOP instead of BLOCKED.
         """
         self._released = True
 

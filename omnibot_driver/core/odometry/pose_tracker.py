@@ -2,8 +2,9 @@
 
 """The robot's motion in the odometry frame: best pose, published pose and uncertainty.
 
-Inputs are tangents (twist x time) in the board's axes and wheel sizes. Outputs are in REP-103's
-axes, of true size. This module does not know which of the board's reports to believe.
+Inputs are tangents (twist x time) as the board reports them: in the board's axes, computed with
+assumed wheel sizes. Outputs are in REP-103's axes, with true distances and turns. This module does
+not know which of the board's reports to believe.
 """
 
 from typing import Final
@@ -58,7 +59,7 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent from the robot's pose to ``place``, by the shorter turn.
 
-        The tangent is in the board's body axes and wheel sizes.
+        The tangent is as the board reports it: in its body axes, not yet corrected by ``scale``.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)

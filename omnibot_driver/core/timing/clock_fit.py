@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The time of each tick: a straight line over the ticks, fitted to bounds of their times.
+"""The fitted clock: a straight line that gives the time of each tick.
 
-A *latest* point (n, t): a read at time t brought tick n, so the tick was not later. An *earliest*
-point (n, t): a read at time t did not bring tick n yet, so the tick was not earlier.
-docs/internals/time.md explains the fit.
+The line is fitted to bounds of the times. A *latest* point (n, t): a read at time t brought tick n,
+so the tick was not later. An *earliest* point (n, t): a read at time t did not bring tick n yet, so
+the tick was not earlier. docs/internals/time.md explains the fit.
 
 This module knows ticks and times; it does not know what is sampled, nor how ticks are counted.
 """
@@ -25,7 +25,7 @@ LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Place at which the line touches the points' hull, as a fraction of the hull's time span.
+"""Place at which the fitted clock touches the points' hull, as a fraction of the hull's time span.
 
 A later place follows the recent points more closely. An earlier place is less affected by jitter.
 """
@@ -46,7 +46,7 @@ Point = tuple[int, float]
 
 
 class ClockFit:
-    """The line that gives the time of each tick, from the first tick seen on.
+    """The fitted clock, which gives the time of each tick, from the first tick seen on.
 
     * ``slope_s``: the fitted period in s; ``period_s`` is nominal.
     """
@@ -103,7 +103,7 @@ class ClockFit:
             self._lay_under()
 
     def _height(self, point: Point) -> float:
-        """Return the height in s of a point above the line with slope ``slope_s`` from (0, 0)."""
+        """Return the time in s of a point, minus ``slope_s`` times its tick."""
         return point[1] - self.slope_s * point[0]
 
     def _within_skew(self, slope_s: float) -> float:
@@ -111,7 +111,7 @@ class ClockFit:
         return min(max(slope_s, least), most)
 
     def _lay_between(self) -> bool:
-        """Place the line in the middle of all bounds and return True.
+        """Place the fitted clock in the middle of all bounds and return True.
 
         If the bounds contradict each other, forget the earliest points and return False.
         """
@@ -135,7 +135,7 @@ class ClockFit:
         return True
 
     def _lay_under(self) -> None:
-        """Place the line under the latest points, along one edge of their lower convex hull.
+        """Place the fitted clock under the latest points, along an edge of their lower convex hull.
 
         This edge is at the fraction ``SUPPORT`` of the hull's time span.
         """

@@ -2,8 +2,8 @@
 
 """Sampling times from arrival times: the board's clock, as seen by the host's clock.
 
-Ticks are counted, and ``ClockFit`` gives their times. One constant error remains: the smallest
-delay that ever occurs. docs/internals/time.md explains why.
+Ticks are counted. ``ClockFit``, the *fitted clock*, gives their times. One constant error remains:
+the smallest delay that ever occurs. docs/internals/time.md explains why.
 
 This module knows readings and times; it reads no clock and does not know any board's bytes.
 """
@@ -33,13 +33,13 @@ BEAT_READS: Final = 12
 An adapter with a timer of 16 ms reads at five phases of the tick. 12 reads have each phase twice.
 """
 CALM: Final = 0.45
-"""Largest distance from the line, in periods, of a read whose tick is certain.
+"""Largest difference from the fitted clock, in periods, of a read whose tick is certain.
 
-The previous read must be as near to the line. Keep the value below 0.5.
+The previous read must be as near to the fitted clock. Keep the value below 0.5.
 """
 LARGEST_RISE: Final = 0.02
-"""Fraction by which the step from one stamp to the next may exceed the period. So if the line
-rises, the stamps approach it slowly."""
+"""Fraction by which the step from one stamp to the next may exceed the period. So if a new fit
+makes the fitted clock later, the stamps approach it slowly."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
@@ -72,7 +72,7 @@ class DeviceClock:
         self._seen_tick: int | None = None
         self._settled = False
         self._calm: ClockFit | None = None
-        """The line if the last read was near it and cut no sample, else None."""
+        """The fitted clock if the last read was near it and cut no sample, else None."""
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
@@ -189,9 +189,10 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
-        """Compare the newest arrival with the line; return how many ticks were not counted so far.
+        """Compare the newest arrival with the fitted clock, and correct the count of the ticks.
 
-        ``counted``: whether displacements confirm the tick's number.
+        Return the correction: positive if ticks were lost but not counted. ``counted``: whether
+        displacements confirm the tick's number.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -238,8 +239,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record a new tick that was read at ``now``.
 
-        ``lag_s``: how much later than the line's time it arrived, in s. Of ticks read together,
-        only the last delay is kept.
+        ``lag_s``: how much later it arrived than the fitted clock says, in s. Of ticks read
+        together, only the last delay is kept.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -252,7 +253,7 @@ class DeviceClock:
         self._seen_tick, self._seen_at = tick, now
 
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
-        """Set the stamp of a tick to the line's time, but limit the step from the last stamp.
+        """Set a tick's stamp by the fitted clock, but limit the step from the last stamp.
 
         ``latest_s``: latest allowed stamp. ``room_s``: step that leaves room for later stamps.
         """

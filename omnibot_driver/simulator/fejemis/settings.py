@@ -25,7 +25,8 @@ class Firmware:
 
     ``tilt``: ``pose`` has a fifth number.
 
-    ``start_resumes``: after ``start``, the last ``rc`` takes effect, even one sent while stopped.
+    ``start_resumes``: after ``start``, the board obeys the last ``rc`` again, even one that it
+    received while stopped.
 
     ``confirms``: a command after ``!`` is confirmed.
 

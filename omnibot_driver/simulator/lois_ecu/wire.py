@@ -58,7 +58,8 @@ class LineReader:
     """Decoder of the lines that the board receives, character by character.
 
     ``checks``: whether lines have a checksum.
-    ``lenient``: whether fields are read as by C's strtol: with space, sign, prefix, and other ends.
+    ``lenient``: whether fields are read as by C's strtol: blanks, a sign and 0x may precede the
+    digits, and what follows the digits is ignored.
     """
 
     def __init__(self, *, lenient: bool) -> None:

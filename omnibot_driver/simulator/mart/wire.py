@@ -30,7 +30,10 @@ def integer(text: str) -> int:
 
 
 def fields(text: str) -> list[str]:
-    """Return for each blank in the text everything after this blank."""
+    """Return one part of the text for each blank: all that follows this blank.
+
+    ``integer`` reads the number at the beginning of a part.
+    """
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 
 

@@ -42,9 +42,9 @@ class Odometry:
         self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
 
     def difference(self) -> Triple:
-        """Return the motion since the last 25 Hz frame, and begin a new difference.
+        """Return the motion since the last 25 Hz frame, in the units of such a frame.
 
-        The result is in the units of this frame.
+        The next call returns the motion from now on.
         """
         words = self._counts_unsent
         if self._settings.frame == "body":

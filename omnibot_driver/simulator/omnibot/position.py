@@ -25,7 +25,7 @@ The robot then does not drive, or turn.
 
 
 def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
-    """Return the pose in the board's earth frame that a control frame commands."""
+    """Return the pose that is commanded by a control frame, in the board's earth frame."""
     x, y, theta = values
     return PlanarPose(
         x / settings.position_scale, y / settings.position_scale, theta / settings.heading_scale

@@ -99,7 +99,7 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    Another choice of the front keeps sign(x) sign(y) = sign(yaw).
+    If only another side is regarded as the robot's front, sign(x) sign(y) = sign(yaw).
     """
     x, y, yaw = signs
     return x * y != yaw

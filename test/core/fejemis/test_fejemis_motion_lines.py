@@ -101,9 +101,11 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """The loss of a line end and a semicolon can turn ``rc 2 0 0`` into ``rc 2 0 092``.
+    """A motion line follows the stop line ``rc 2 0 0``. The characters between them are lost.
 
-    The sum fits if the second line has the checksum 02 or 92. An empty line prevents this.
+    These are a line end and the semicolon before the second line's checksum, e.g. 92. The board
+    then reads ``rc 2 0 092``, a motion. The stop line's checksum fits the joined line if the second
+    line's is 02 or 92. So the driver sends an empty line before such a line.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -188,7 +190,7 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """If a space or the source number is lost, the board reads a stop."""
+    """One character is lost. If it is a space or the source number, the board reads a stop."""
     for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         text = plain_drive_line(speed, turn)
         rim = math.hypot(speed, turn)

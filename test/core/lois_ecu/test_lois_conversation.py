@@ -130,7 +130,8 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot rests.
 
-    The public firmware counts no ticks backward, so rest is unproved there.
+    The public firmware does not count the ticks of a backward drive, so its ticks prove nothing
+    after such a drive.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)

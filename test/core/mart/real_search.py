@@ -61,7 +61,7 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 class Trial(NamedTuple):
     """One run of the search: wishes with one disturbed datagram, or a driver that starts.
 
-    ``way``: 0 to the server, 1 from the server.
+    ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
 
     ``number``: the disturbed datagram's number in that direction, from 0, without regular queries.
 
@@ -153,20 +153,24 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield the trials of all pairs of wishes: one trial for each fate of each datagram."""
+    """Yield the trials of all pairs of wishes, from ``each_fate``."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 
 
 def eights() -> Iterator[Trial]:
-    """Yield the trials of sequences of eight wishes: one trial for each fate of each datagram."""
+    """Yield the trials of sequences of eight wishes, from ``each_fate``."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield a trial for each fate of each datagram that is sent in a run of these wishes."""
+    """Yield trials of these wishes. In each trial, one datagram has one of FATES.
+
+    The trials cover all FATES of all datagrams, but at most MOST_DATAGRAMS for each wish and
+    direction. An undisturbed run counts the datagrams.
+    """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
         for n, fate in product(range(most), FATES):

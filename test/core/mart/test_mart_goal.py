@@ -23,9 +23,10 @@ from omnibot_driver.simulator.mart import Firmware
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
 def test_small_turns_that_go_beyond_do_not_use_up_the_moves(beyond_deg: float, seed: int) -> None:
-    """The robot turns up to 9° and drives up to 30 % too far.
+    """The robot turns up to 10° farther than requested, and drives 15 % to 30 % too far.
 
-    The driver corrects its requests, and needs at most the permitted moves.
+    The driver learns this and requests less. So it reaches each goal in fewer than MOST_MOVES
+    moves.
     """
     random, surplus, pose = Random(seed), Surplus(), Pose()
     for _ in range(12):
@@ -195,7 +196,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 ) -> None:
     """The turn of a goal is lost. A late ok of the IMU check seems to confirm the turn.
 
-    The old count is not added again.
+    The odometry does not add the encoder's old count again.
     """
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)

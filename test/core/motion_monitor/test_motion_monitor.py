@@ -89,7 +89,7 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """The time counts from 0.05 m/s. A held robot, in contrast, is excused for up to 0.4 s."""
+    """A robot speeds up slowly, the wrong way. The time counts from when it reaches 0.05 m/s."""
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
     wrong_s = -time_constant_s * math.log(1.0 - 0.05 / speed_mps)
@@ -208,7 +208,10 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 
 
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
-    """Held for 1 s at 0.4 m/s, the robot may be too fast until it has caught up 0.4 m."""
+    """A robot that should drive at 0.4 m/s is held for 1 s, so it falls 0.4 m behind.
+
+    Afterwards it may move too fast until it has made up for this distance.
+    """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
     drive.move((0.4, 0.0, 0.0), 1.0)
@@ -219,7 +222,7 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """The push winds up the controllers. At the next command, the robot moves back for a moment."""
+    """A push of a robot at rest winds up its controllers. At the next command, it may move back."""
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)
@@ -228,14 +231,14 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """Each fault causes a Stop. A robot at rest has obeyed Stop, so more Stops do not help."""
+    """A robot at rest is pushed. It has obeyed Stop, so the faults that cause Stops get rarer."""
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """Each fault causes a Stop. The robot has missed Stop, but may receive a later Stop."""
+    """The robot has missed Stop, but may receive a later one. So a fault causes one every 5 s."""
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -248,7 +251,7 @@ def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() ->
 
 
 def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
-    """The robot moves on the wrong way until Stop arrives, and then rolls out."""
+    """A robot moves the wrong way, is stopped and rolls out. This motion is not a second fault."""
     drive = Drive()
     drive.command(0.05, 0.0, 0.0)
     assert first(drive.move((-0.3, 0.0, 0.0), 0.2))[1] is Fault.WRONG_WAY

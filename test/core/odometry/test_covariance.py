@@ -54,7 +54,10 @@ def test_the_covariance_is_positive_definite_and_grows(readings: list[Displaceme
 
 
 def test_two_wheels_of_wrong_sizes_turn_a_robot_that_drives_straight() -> None:
-    """With wheel sizes uncertain by 1 %, each wheel adds 0.025 rad and 5 mm in a metre."""
+    """The wheel sizes are uncertain by 1 %.
+
+    So in 1 m forward, each wheel adds standard deviations of 0.025 rad and 5 mm.
+    """
     noise = OdometryNoise(
         wheel_drift=0.0,
         wheel_scale=0.01,
@@ -76,7 +79,10 @@ def test_a_robot_at_rest_grows_no_less_sure() -> None:
 
 
 def test_the_covariance_is_a_random_walk_over_the_way() -> None:
-    """In 1 m forward, wheels A and B roll 0.87 m each. Ten or a hundred steps give the same."""
+    """The robot drives 1 m forward, so wheels A and B roll 0.87 m each.
+
+    The covariance is the same whether odometry adds this in 10 or in 100 steps.
+    """
     noise = OdometryNoise(wheel_drift=0.01, wheel_scale=0.0, wheel_slip=0.0)
     for steps in (10, 100):
         odometry = Odometry(OdometrySettings(noise=noise))
@@ -122,9 +128,9 @@ def test_wheels_that_drift_spread_the_robots_as_the_covariance_says() -> None:
 
 
 def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it() -> None:
-    """From 1 m to 10 m, the standard deviation of the yaw grows tenfold.
+    """The wheel sizes are uncertain, and the robot drives 10 m forward and back.
 
-    After the way back it is zero.
+    The standard deviation of the yaw after 10 m is ten times that after 1 m; at the end it is zero.
     """
     noise = OdometryNoise(wheel_drift=0.0, wheel_scale=0.01, wheel_slip=0.0)
     deviations = []
@@ -176,7 +182,7 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board's pose comes from its wheels, so it drifts as the deltas do."""
+    """A pose of the board drifts with its wheels, so it does not lower the covariance."""
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):

@@ -268,7 +268,10 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """Between two true displacements, a false one shows a restart. The stamps do not move."""
+    """Between two true displacements comes a false one, as if the board's counter had restarted.
+
+    The stamps of the samples stay 10 ms apart.
+    """
     clock = DeviceClock(0.01)
     true = DisplacementReading(0.0, 0.0, 0.0, "earth", 0.04, 0)
     made_up = DisplacementReading(0.0, 0.0, 0.0, "earth", None, 0, restarted=True)
