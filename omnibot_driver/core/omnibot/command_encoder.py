@@ -101,7 +101,7 @@ class CommandEncoder:
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist that the last command frame in ``packets`` commands."""
+        """Return the twist that is commanded by the last command frame in ``packets``."""
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
         linear = settings.linear_scale
