@@ -85,8 +85,8 @@ ROBOT: Final = (
         4.0,
         "m/s²",
         "Largest change of one accelerometer axis between two readings that the driver always"
-        " accepts. It rejects a larger change if this lasts for one reading and a flipped bit can"
-        " explain its size.",
+        " accepts. If a reading differs from the previous one by more, the next one jumps back, and"
+        " a flipped bit can explain the difference, the driver rejects the middle one.",
         low=0.1,
         high=1000.0,
     ),

@@ -160,8 +160,9 @@ def table(
         raise ValueError(f"these are not common parameters: {', '.join(sorted(unknown))}")
     if kept := sorted({*without} - DISPENSABLE):
         raise ValueError(
-            f"the board {board} must not lack {', '.join(kept)}, which the driver reads on every"
-            f" board with such traits; a board may only lack {', '.join(sorted(DISPENSABLE))}"
+            f"the board {board} must have the parameters {', '.join(kept)}: the driver reads them"
+            " on every board with such traits. A board may only omit the parameters"
+            f" {', '.join(sorted(DISPENSABLE))}"
         )
     sections = {
         title: tuple(

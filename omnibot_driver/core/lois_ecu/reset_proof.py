@@ -73,12 +73,15 @@ class ResetProof:
         if self._proved:
             return ""
         if self._before is None:
-            was = "unknown"
+            was = "not known before the reset"
         else:
-            was = f"{self._before.left} and {self._before.right} ticks"
+            was = (
+                "already small before the reset"
+                f" ({self._before.left} and {self._before.right} ticks)"
+            )
         return (
-            "reset sent, but unconfirmed: the wheel counters are near zero now, but their values"
-            f" before the reset ({was}) do not prove that the board obeyed"
+            f"reset sent, but unconfirmed: the wheel counters were {was}, so their present values"
+            " near zero do not prove that the board obeyed"
         )
 
 

@@ -103,7 +103,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="SECONDS:HALF:WHAT",
-        help="let the fault WHAT occur in one half (drive or front), SECONDS after the start."
+        help="let the fault WHAT occur in one of the two Teensys (HALF: drive or front), SECONDS"
+        " after the start."
         " Repeat the option for more faults; well and sensor-well end earlier faults. WHAT in"
         " either half:"
         f" {', '.join(FAULTS)}; in the front half only: {', '.join(SENSOR_FAULTS)}",

@@ -117,7 +117,7 @@ _NUMBERS: tuple[tuple[str, Callable[[str], float], str, str], ...] = (
         "dead_zone_units",
         _within(0.0, 127.0),
         "UNITS",
-        "motor speed, in units, up to which a motor does not turn",
+        "dead zone: a motor turns only if more than this number of units is commanded",
     ),
     (
         "motor_inequality",

@@ -123,9 +123,10 @@ def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
     if abs(change_rad - abs(math.remainder(turned_rad, math.tau))) < ALIKE * abs(turned_rad):
         return False
     raise ToolError(
-        f"the odometry contradicts itself: after a turn of {math.degrees(turned_rad):.0f}°, the"
-        f" direction of a forward drive has changed by {math.degrees(change_rad):.0f}° (expected:"
-        " by 0°, or by the angle of the turn if delta_frame is wrong); see /diagnostics, and"
+        "the odometry contradicts itself: the robot drove forward before and after a turn of"
+        f" {math.degrees(turned_rad):.0f}°. By the odometry, the directions of these two drives in"
+        f" the body's axes differ by {math.degrees(change_rad):.0f}°. They should differ by 0°, or"
+        " by the angle of the turn if delta_frame is wrong. See /diagnostics, and"
         " docs/internals/omnibot_protocol.md"
     )
 

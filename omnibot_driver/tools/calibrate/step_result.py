@@ -132,9 +132,10 @@ def _remarks(wheel: WheelFound) -> list[str]:
         )
     if motor.rms_radps > UNEXPLAINED * second.rms_radps:
         remarks.append(
-            f"Wheel {wheel.name}: no motor in the manual's control loop explains these steps, so"
-            " the results for motor and gains are not valid. Perhaps the gains in the firmware"
-            " differ from --gains. In this case, calibrate again with the firmware's gains."
+            f"Wheel {wheel.name}: the model of a motor in the manual's control loop fits these"
+            " steps worse than the second-order model, so the results for motor and gains are not"
+            " valid. Perhaps the gains in the firmware differ from --gains. In this case, calibrate"
+            " again with the firmware's gains."
         )
     if abs(gain - 1.0) > UNLIKE_ONE:
         remarks.append(
