@@ -30,7 +30,7 @@ LONGEST_WAIT_S: Final = 2.0
 class Reader:
     """The work of the reader thread, which runs ``serve``, and its counts.
 
-    * ``trouble``: why the port, or one of its lines, is not open, or empty.
+    * ``trouble``: the reason why a port of the board is not open. Empty if all are open.
     * ``overruns``: the kernel's losses since the last opening. None if unknown.
     """
 

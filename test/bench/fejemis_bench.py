@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make bench``: how long a front angle takes to reach the drive half.
+"""The Fejemis's part of ``make bench``: how long a front angle takes to reach the drive Teensy.
 
-The simulated halves have their own process. Other processes keep the computer busy.
+The two simulated Teensys have their own process. Other processes keep the computer busy.
 """
 
 import contextlib
@@ -43,10 +43,10 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both simulated halves in real time; then send a list of delays in s to ``results``.
+    """Run both simulated Teensys in real time; then send a list of delays in s to ``results``.
 
-    Each delay is from the front half's report of an angle to the driver's line for the drive half.
-    The wheel swings, so that successive angles differ.
+    Each delay is from the front Teensy's report of an angle to the driver's line for the drive
+    Teensy. The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()
     drive, _ = masters

@@ -39,7 +39,8 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Number of drivers for each group of stops on a line that loses bytes towards the board."""
+"""Number of drivers for each group of stops in ``LIVES``. The line from the driver to the board
+loses bytes."""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -267,7 +268,10 @@ Piece = tuple[str, tuple[Any, ...]]
 
 
 def losses() -> list[Piece]:
-    """Return the pieces in which the line loses bytes to the board. Each piece has ten drivers."""
+    """Return the pieces of the campaign that lose bytes on the line from the driver to the board.
+
+    Each piece runs ``LOSSES_AT_ONCE`` drivers, one after the other.
+    """
     starts = range(0, LOSSES, LOSSES_AT_ONCE)
     return [
         ("losses", (life, range(start, start + LOSSES_AT_ONCE)))

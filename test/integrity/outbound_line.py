@@ -24,8 +24,9 @@ Change = Callable[[bytes, int, Random], list[Arrival]]
 class Line(Protocol):
     """The damaged line of one trial.
 
-    ``whole``: number of bytes before the next fault. A write of at most this length needs only a
-    subtraction from ``whole``, any other ``carry``.
+    ``whole``: number of bytes before the next fault. A write of at most this length arrives
+    undamaged: the caller only subtracts its length from ``whole``. For a longer write, the caller
+    must call ``carry``.
     """
 
     whole: int

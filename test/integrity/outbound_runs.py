@@ -47,7 +47,10 @@ Scores = dict[tuple[str, str, str], Score]
 
 
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
-    """Yield the boards with this receiver for a scene, each with the name for its scores."""
+    """Yield the kinds of board on which a scene runs, all with this receiver.
+
+    Each comes with the name under which its scores are added.
+    """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
         name = f"{scene}, {'obeyed' if obeys else 'ignored'}" if scene == "e-stop" else scene

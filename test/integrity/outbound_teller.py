@@ -2,7 +2,8 @@
 
 """A minimal simulation of what a board sends, without any code of the driver.
 
-A robot follows the last motion that was written. So damaged commands are invisible to the driver.
+A moving robot has the twist of the last motion that the driver wrote, even if the line damaged this
+command. So the driver cannot see the damage in the readings.
 """
 
 import math

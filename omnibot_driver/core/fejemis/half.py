@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One of the two Teensy boards, called a half: its identity, its data streams and its silence.
+"""A half (each of the two Teensys, drive or front): its identity, its data streams, its silence.
 
 If a stream does not arrive, the driver subscribes again.
 
@@ -53,7 +53,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """State of one board.
+    """State of one half. A *half* is each of the two Teensys (drive or front).
 
     ``identity``: the identity in its heartbeats, or None before.
 

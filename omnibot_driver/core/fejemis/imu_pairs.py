@@ -68,7 +68,8 @@ Oriented = tuple[Attitude, float]
 class ImuPairs:
     """Forms pairs from the lines of the IMU.
 
-    ``take`` returns the pairs, and orientations between them, in order of arrival.
+    It also receives the orientations. ``take`` returns pairs and orientations in one list, in order
+    of arrival.
     """
 
     def __init__(self) -> None:

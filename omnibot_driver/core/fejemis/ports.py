@@ -1,7 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Finds out which of the two boards (halves) is at which port, and addresses lines to them.
+"""Finds out which half is at which port, and addresses lines to the halves.
 
+A *half* is each of the two Teensys (drive or front); it is also called a board.
 An unidentified board only gets lines that stop or switch off something.
 
 The module knows identities and ports; it does not know the meaning of a line.

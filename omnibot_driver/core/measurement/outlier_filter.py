@@ -2,7 +2,8 @@
 
 """The outlier filter: it rejects physically impossible readings that arrive in valid frames.
 
-A spike leaps and leaps back. So a reading that leaps waits for the next one.
+A spike is a single wrong reading: it leaps (changes implausibly much), and the next reading leaps
+back. So the filter holds a reading that leaps until the next one arrives.
 docs/internals/architecture.md gives the rules.
 
 This module knows readings and the robot's limits; it does not know bytes or a clock.
@@ -73,7 +74,9 @@ class Refused:
 
 
 class OutlierFilter:
-    """Rejects implausible readings, and holds a reading that leaps until the next one arrives.
+    """Rejects implausible readings.
+
+    A reading that leaps may be a spike, so the filter holds it until the next reading arrives.
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.

@@ -16,7 +16,8 @@ SPREAD_S: Final = 0.2
 class CorrectionSmoother:
     """Moves ``pose``, the published pose, towards ``target``, the best known pose.
 
-    A step corrects ``pose`` by at most the largest possible motion minus the robot's own.
+    Each step has a largest possible motion. The robot's own motion uses a part of it, and the
+    correction of ``pose`` uses at most the rest.
     """
 
     def __init__(self) -> None:

@@ -27,7 +27,8 @@ class PoseTracker:
 
     def __init__(self, axis_signs: Signs) -> None:
         self.rolled = Pose()
-        """Sum of the tangents of all motion since the driver began, true-sized, in board axes."""
+        """Sum of the tangents of all motions since the driver began, in the board's axes, but with
+        true distances and turns."""
         self._axis_signs = axis_signs
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(OdometryNoise())
 

@@ -67,7 +67,9 @@ class ClockFit:
         return self._anchor[1] + self.slope_s * (tick - self._anchor[0])
 
     def see(self, latest: Point, *, cut: bool) -> None:
-        """Add an upper bound: the newest tick of a read, and a time in s by which it had arrived.
+        """Add an upper bound: the number of a tick, and a time in s by which it had arrived.
+
+        The tick is the newest one of a read.
 
         ``cut``: the read ended within this tick's sample.
         """
@@ -83,7 +85,7 @@ class ClockFit:
             self._best, self._not_before, self._block_from = None, [], tick
 
     def not_before(self, earliest: Point) -> None:
-        """Add a lower bound: a tick that a read did not bring yet, and that read's time in s."""
+        """Add a lower bound: the number of a tick, and a time in s by which it had not arrived."""
         self._not_before.append(earliest)
 
     def _end_block(self, best: Point, cut: bool) -> None:

@@ -2,7 +2,7 @@
 
 """The drive Teensy: control of the driving wheels, odometry, IMU, battery, distance sensors.
 
-This module knows what the manual says about the drive half, and the robot. It must not know the
+This module knows what the manual says about the drive Teensy, and the robot. It must not know the
 front Teensy: it learns the front wheel's angle only from a command.
 """
 

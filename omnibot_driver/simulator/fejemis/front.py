@@ -2,7 +2,7 @@
 
 """The front Teensy: the steered wheel and its angle sensor, brush, lift, LEDs, infrared sensors.
 
-This module knows what the manual says about the front half, and the robot. It must not know the
+This module knows what the manual says about the front Teensy, and the robot. It must not know the
 drive Teensy.
 """
 

@@ -59,7 +59,7 @@ class Fault:
 
     ``at_s``: when the fault occurs, in s after construction.
 
-    ``half``: ``drive`` or ``front``. ``what``: a name in ``faults.py``.
+    ``half``: the Teensy, ``drive`` or ``front``. ``what``: a name in ``faults.py``.
     """
 
     at_s: float

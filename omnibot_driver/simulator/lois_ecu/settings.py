@@ -13,7 +13,8 @@ from typing import Literal
 class Quirks:
     """Deviations of the public firmware from the manual: none by default, all in ``FIRMWARE``.
 
-    Numbers such as 0x12 are the manual's command numbers. A clear name has no line.
+    Numbers such as 0x12 are the manual's command numbers. Fields whose names explain
+    themselves are not listed.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
     odometry_stands_at_equal_speeds: the position in 0x20 stays while both integer RPMs are equal.

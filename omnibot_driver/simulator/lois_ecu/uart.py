@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's serial port at 115200 baud: what it receives, and what it sends with interrupts off.
+"""The board's serial port at 115200 baud: the characters that it receives and sends.
+
+The board sends some data with interrupts off. During this time it can lose received characters.
 
 This module knows characters and steps of a millisecond. It does not know lines.
 """

@@ -92,7 +92,7 @@ class MartSettings:
     """Settings of the controller, its robot and its surroundings.
 
     speed_mps_per_unit: wheel speed for one register unit at ``nominal_volts``.
-    dead_zone_units: effort that is needed before a motor turns; only the rest gives speed.
+    dead_zone_units: a motor turns only above this number of units; the excess gives speed.
     motor_inequality: how much faster the left motor is, as a fraction of the speed.
     encoder_sign: -1 if the encoder counts down while the robot drives forward.
     gyro_bias_dps: unknown to the server before SB.

@@ -71,9 +71,10 @@ class Levels:
 
 
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
-    """Return the corrections of an encoder's levels, for a wheel at constant duty.
+    """Return the corrections of the two levels of an encoder's signal, which differ in duration.
 
-    Both corrections must be 1 in the record. Raises ToolError for irregular ticks.
+    ``ticks_s``: times between the ticks of a wheel at constant duty. They must be uncorrected: the
+    board's parameters for both corrections were 1. Raises ToolError for irregular ticks.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

@@ -219,7 +219,7 @@ def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
 
 
 def numbered() -> Bench:
-    """Return a bench whose gyro and acceleration lines have the number of their cycle as x."""
+    """Return a bench that sends the number of the cycle as the x of gyro and acceleration lines."""
     bench = nominal()
     drive = bench.robot.drive
     drive._items["gyro"] = lambda: f"gyro {drive._cycles % 20_000 / 1000:.3f} 0.100 0.200"
@@ -230,7 +230,10 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return for each published sample the cycle numbers of its two lines."""
+    """Return for each published sample the cycle numbers of its gyro and its acceleration line.
+
+    The bench ``numbered`` sends the number of the cycle, divided by 1000, as the reading x.
+    """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))
         for e in bench.imu

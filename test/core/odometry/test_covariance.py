@@ -182,7 +182,10 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """A pose of the board drifts with its wheels, so it does not lower the covariance."""
+    """The board computes its pose from the wheels, so this pose has the wheels' drift, too.
+
+    A pose that ends no gap therefore does not lower the covariance.
+    """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)
     for number in range(50):

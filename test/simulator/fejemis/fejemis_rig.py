@@ -15,7 +15,7 @@ class Rig:
 
     ``lines``: all lines from the board, without line ends, each with time and port.
 
-    ``relays``: whether the host relays the front wheel's angles to the drive half.
+    ``relays``: whether the host relays the front wheel's angles to the drive Teensy.
     """
 
     def __init__(self, *, firmware: Firmware | None = None, **settings: object) -> None:
@@ -63,7 +63,7 @@ class Rig:
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
-        """Send an ``rc`` line to both halves, and run for ``seconds``, relaying the front angle."""
+        """Send an ``rc`` line to both Teensys; run for ``seconds``, relaying the front angle."""
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)
         self.say(DRIVE, text)

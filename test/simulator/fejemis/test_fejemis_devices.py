@@ -129,7 +129,7 @@ def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_load
 
 
 def test_the_answer_to_confs_has_the_steering_first() -> None:
-    """Both halves receive ``confs TRACK STEERING``, but report ``confs STEERING TRACK``."""
+    """Both Teensys receive ``confs TRACK STEERING``, but report ``confs STEERING TRACK``."""
     rig = Rig().booted()
     for port in (DRIVE, FRONT):
         rig.say(port, "confs 0.5 0.6")

@@ -63,7 +63,7 @@ def test_from_straight_ahead_a_turn_on_the_spot_surges_forward() -> None:
 
 
 def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
-    """Only the front half gets the ``rc`` line. The front wheel moves, and the robot is at rest."""
+    """Only the front Teensy gets the ``rc`` line. The front wheel moves; the robot is at rest."""
     rig = Rig().booted()
     rig.say(FRONT, "rc 2 0 20")
     rig.run(2.0)
@@ -74,7 +74,7 @@ def test_the_wheel_can_be_aligned_while_the_robot_stands() -> None:
 def test_without_the_angle_drive_goes_straight() -> None:
     """The host does not relay the front angle.
 
-    The drive half assumes that the front wheel is straight.
+    The drive Teensy assumes that the front wheel is straight.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.5 30")

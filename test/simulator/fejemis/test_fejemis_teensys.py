@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the two halves of the simulated Fejemis: their functions besides driving, and faults."""
+"""Tests of the two halves of the simulated Fejemis: their functions besides driving, and faults.
+
+A *half* is each of the two Teensys (drive or front).
+"""
 
 import json
 

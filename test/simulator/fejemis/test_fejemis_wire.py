@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the text lines that the two simulated halves send and obey.
+"""Tests of the text lines that the two simulated Teensys send and obey.
+
+A *half* is each of the two Teensys (drive or front).
 
 Checksums, comments, subscriptions and firmware variants are tested.
 """
@@ -36,9 +38,9 @@ def test_sums_are_those_of_the_public_hosts(line: str) -> None:
 
 
 def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
-    """Each half sends a heartbeat every 400 ms, laid out as in the manual.
+    """Each of the two Teensys sends a heartbeat every 400 ms, laid out as in the manual.
 
-    The drive half has the id 90, the front half 91.
+    The drive Teensy has the id 90, the front Teensy 91.
     """
     rig = Rig()
     rig.run(2.5)
@@ -54,7 +56,7 @@ def test_heartbeats_come_unasked_every_400_ms_with_ids_90_and_91() -> None:
 def test_a_wrong_sum_is_a_comment_and_nothing_else() -> None:
     """The host sends a line with a wrong checksum.
 
-    The half discards it and answers with a comment.
+    The Teensy discards it and answers with a comment.
     """
     rig = Rig(firmware=SUMS).booted()
     (answer,) = rig.ask(DRIVE, ";20rc 2 0.5 0")
@@ -195,7 +197,10 @@ def test_a_line_of_more_than_200_characters_is_cut() -> None:
     ],
 )
 def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: float) -> None:
-    """A half reads the numbers of a line one after the other. A missing number is zero."""
+    """The drive Teensy reads the numbers of a line from left to right.
+
+    So a lost number shifts the later ones. A number that is missing at the end is zero.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, line)
     rig.run(0.01)

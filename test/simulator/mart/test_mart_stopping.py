@@ -49,7 +49,10 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """SS stops a spin on the stop port, and SM then ends it. The reply to SM has the angle."""
+    """SS, sent to the stop port, stops the robot during a spin. SM on the command port follows.
+
+    The reply to SM has the angle of the spin, and the server accepts the next motion.
+    """
     rig = Rig()
     rig.drive("R")
     rig.stop("SS")

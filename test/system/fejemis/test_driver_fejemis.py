@@ -224,7 +224,7 @@ def test_power_off_is_refused_while_driving(
 
 
 def test_diagnostics_name_the_boards(probe: Probe) -> None:
-    """The diagnostics show the version, name and id of each half of the Fejemis."""
+    """The diagnostics show the version, name and id of each of the two Teensys."""
     diagnoses = probe.listen(DiagnosticArray, "/diagnostics")
 
     def told() -> set[str]:

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the driver with a Fejemis whose halves are lost, swapped, broken or of another kind."""
+"""Tests of the driver with a Fejemis whose halves are lost, swapped, broken or of another kind.
+
+A *half* is each of the two Teensys (drive or front).
+"""
 
 from collections.abc import Callable
 from contextlib import ExitStack
