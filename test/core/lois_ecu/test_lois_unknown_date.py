@@ -15,6 +15,8 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.simulator.lois_ecu import DOCUMENTED, FIRMWARE, LoisSettings, Quirks
 from omnibot_driver.simulator.lois_ecu.sensors import Fix
 
+pytestmark = pytest.mark.slow
+
 DAY_S = 86400
 UTC_S = 20 * 365 * DAY_S
 REQUEST = encode_command(SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))

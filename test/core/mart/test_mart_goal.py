@@ -19,6 +19,8 @@ from omnibot_driver.core.mart.words import MCR, TB, TF
 from omnibot_driver.core.packets import Packet
 from omnibot_driver.simulator.mart import Firmware
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("beyond_deg", [0.0, 3.0, 6.0, 9.0])
