@@ -98,8 +98,7 @@ class Hearing(Measuring):
         The server works in turn: a duplicate would run before this HELLO.
         """
         since_start = now >= self._started_s + 2 * self._delay_s
-        arrived = self._rested_s >= self._started_s + self._delay_s
-        return since_start and arrived and not self._greeted_before
+        return since_start and self._rested_s >= self._started_s + self._delay_s
 
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion, because the server gives its name although a move should keep it busy.

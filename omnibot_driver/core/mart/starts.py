@@ -160,7 +160,6 @@ class Starts(Adjusting):
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
         self._recorded, self._port_is_free = None, False
-        self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused = start.word, False
         self._started_s = now
         self.imu.used()

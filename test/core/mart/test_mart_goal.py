@@ -239,33 +239,6 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
     assert len(counts_lost) >= 2
 
 
-def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
-    """HELLO is sent shortly before a move. The network delays HELLO and duplicates the move.
-
-    The server queues both during the move: HELLO first, then the copy. So its answer to HELLO does
-    not show that no copy runs, and the driver stops the copy.
-    """
-    bench = MartBench("source").ready()
-    way = bench.robot.network[0].to_board
-
-    def send(data: bytes, at_s: float, real: Any = way.send) -> None:
-        real(data, at_s)
-        if data == b"MCL SLOW 90":
-            real(b"HELLO", at_s + 0.02)
-            real(data, at_s + 0.1)
-
-    way.send = send
-    bench.robot._good = False
-    bench.go_to(0.0, 0.0, math.pi / 2)
-    while b"MCL SLOW 90" not in bench.said():
-        bench.board._pilot._greeted_s = bench.now  # the time of the HELLO that is late
-        bench.run(0.01)
-    bench.run(8.0)
-    assert bench.robot.stands
-    assert math.pi / 2 < bench.truth.yaw_rad < 0.75 * math.pi
-    assert b"SS" in bench.said()
-
-
 def first_distance(bench: MartBench, x_m: float) -> int:
     """Command a goal ahead or behind, and return the first requested distance, in inches."""
     since = len(bench.written)
