@@ -128,7 +128,6 @@ class Ground:
         self._refused = False
         self._moved_last = False
         self._copies_stopped_s = -math.inf
-        self._port_is_free = False
         self._moved_by: Request | None = None
         self._last_move: Request | None = None
         self._recorded: Request | None = None

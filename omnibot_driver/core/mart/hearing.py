@@ -84,21 +84,11 @@ class Hearing(Measuring):
             self._stopped(now)  # the port is free, so the move is over and its reply was lost
         if self.state is State.MOVING and now >= self._started_s + GREET_S:
             self._free_s = min(self._free_s, now + self._delay_s)  # the reply may be on its way
-        if self.state is State.STILL and self._is_behind_copies(now):
-            self._port_is_free = True
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:
             self._ask_what_moves(now)
             self._named_s = self._name_from_s
-
-    def _is_behind_copies(self, now: float) -> bool:
-        """Return whether this answer to HELLO shows that no duplicate of the last move runs.
-
-        The server works in turn: a duplicate would run before this HELLO.
-        """
-        since_start = now >= self._started_s + 2 * self._delay_s
-        return since_start and self._rested_s >= self._started_s + self._delay_s
 
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion, because the server gives its name although a move should keep it busy.

@@ -201,7 +201,7 @@ class Pilot(Hearing):
         The stop is SL and SS. After RM or B, they would hang the server.
         """
         suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
-        if self.state is not State.STILL or not suspected or self._port_is_free:
+        if self.state is not State.STILL or not suspected:
             return math.inf
         apart_s = self._halted_s + self._delay_s
         silent_s = COPY_S

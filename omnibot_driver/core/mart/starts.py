@@ -159,7 +159,7 @@ class Starts(Adjusting):
         self._require(start.word)
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
-        self._recorded, self._port_is_free = None, False
+        self._recorded = None
         self._start, self._refused = start.word, False
         self._started_s = now
         self.imu.used()

@@ -4,12 +4,10 @@
 
 import math
 from random import Random
-from typing import Any
 
 import pytest
 from mart_bench import MartBench
 
-from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings
 from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, STRETCH, Move, Surplus, next_move
@@ -211,32 +209,6 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     bench.command(0.0, 0.0, 3.0)
     assert bench.error.way_m < 0.05
     assert abs(bench.error.yaw_rad) < 0.05
-
-
-@pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
-def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> None:
-    """The first reply to ENC after each move is lost, but the server answers HELLO.
-
-    So the driver repeats ENC.
-    """
-    bench = MartBench(firmware).ready()
-    way, counts_lost = bench.robot.network[0].from_board, set[int]()
-
-    def send(data: bytes, at_s: float, real: Any = way.send) -> None:
-        moves = sum(each[:2] in (b"TF", b"MC") for each in bench.said())
-        ended = bench.board._pilot._moved_by is not None and bench.robot.stands
-        if ended and bench.written[-1][1] == b"ENC" and moves not in counts_lost:
-            counts_lost.add(moves)
-        else:
-            real(data, at_s)
-
-    way.send = send
-    bench.robot._good = False
-    bench.go_to(1.0, 0.5, 0.0)
-    end(bench)
-    assert bench.truth.way_to(Pose(1.0, 0.5, 0.0)).way_m < 0.1
-    assert not any("twice" in event.text for event in bench.events if isinstance(event, Notice))
-    assert len(counts_lost) >= 2
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
