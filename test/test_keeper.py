@@ -16,6 +16,9 @@ from guarded_line import LAST_WORDS, LATCHED_WORDS, PATIENCE_S, Line, beat_until
 from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
+EARLY_S = -1000.0
+"""A time of simulated heartbeats, in s. The clock, which begins near 0 at boot, is always later."""
+
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
     """A suspended guard does not read the new stop bytes. The driver replaces this guard.
@@ -43,7 +46,7 @@ def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
     children = line.children()
     for number in range(30):
         keeper.change(packed(b"%d" % number), packed(LATCHED_WORDS))
-        assert keeper.beat(1000.0) == ""
+        assert keeper.beat(EARLY_S) == ""
     assert line.children() == children
     keeper.end(stopped=True)
 
@@ -70,10 +73,10 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
         keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
-        assert "cannot start the guard process" in keeper.beat(1000.0)
-    assert keeper.beat(1000.5) == ""
+        assert "cannot start the guard process" in keeper.beat(EARLY_S)
+    assert keeper.beat(EARLY_S + 0.5) == ""
     assert line.children() == []
-    keeper.beat(1001.5)
+    keeper.beat(EARLY_S + 1.5)
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
 
@@ -88,9 +91,9 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
     started(first)
     os.kill(first, signal.SIGSTOP)
     os.waitid(os.P_PID, first, os.WSTOPPED)
-    assert [keeper.beat(1000.0) for _ in range(HANGS_AFTER)] == [""] * HANGS_AFTER
+    assert [keeper.beat(EARLY_S) for _ in range(HANGS_AFTER)] == [""] * HANGS_AFTER
     assert line.children() == [first]
-    assert keeper.beat(1000.0) == "the guard process hung; starting another guard process"
+    assert keeper.beat(EARLY_S) == "the guard process hung; starting another guard process"
     beat_until(keeper, lambda: first not in line.children())
     keeper.end(stopped=False)
     line.hear(LAST_WORDS)
@@ -111,7 +114,7 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     os.waitid(os.P_PID, first, os.WSTOPPED)
     with monkeypatch.context() as undying:
         undying.setattr("subprocess.Popen.kill", lambda _process: None)
-        told = [keeper.beat(1000.0 + n * BEAT_S) for n in range(HANGS_AFTER + 2)]
+        told = [keeper.beat(EARLY_S + n * BEAT_S) for n in range(HANGS_AFTER + 2)]
         assert [text for text in told if text] == [
             "the guard process hung; starting another guard process"
         ]
@@ -135,7 +138,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
                 os.kill(pid, signal.SIGSTOP)
                 os.waitid(os.P_PID, pid, os.WSTOPPED)
                 stopped.add(pid)
-            keeper.beat(1000.0 + second)
+            keeper.beat(EARLY_S + second)
     assert len(line.children()) == MOST_DYING
     for pid in stopped:
         os.kill(pid, signal.SIGKILL)
