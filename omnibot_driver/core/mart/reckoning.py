@@ -101,6 +101,8 @@ class Reckoning:
 
     def begin(self, motion: Motion, now: float) -> None:
         """Record that a motion was started; its encoder count begins at zero."""
+        if motion is not Motion.REFERENCE and self.heading.from_s < self._stood_s:
+            self.heading.forget()  # on some servers the last motion has changed it
         self.motion, self.stands = motion, False
         self._began_s, self._stood_s = now, math.inf
         self.slowing_since_s = None

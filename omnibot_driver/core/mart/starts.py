@@ -206,7 +206,9 @@ class Starts(Adjusting):
         self.health.heading_changes = 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        self.odometry.started(now, sure=not answer.when.doubtful)  # it may answer RST IMU
+        copies_s = self._started_s + 2 * self._delay_s  # of RST IMU, whose reply is ok too
+        sure = not self.conversation.disturbed(now) or now >= copies_s
+        self.odometry.started(now, sure=sure and not answer.when.doubtful)
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 

@@ -194,7 +194,11 @@ class Stops(Ground, ABC):
                 self.conversation.owes(form, now)  # the reply to the move
         if stopping.began:
             self.odometry.wheel.started()
-        elif stopping.began is False and not self.conversation.doubles(now):
+        elif (
+            stopping.began is False
+            and (motion in UNCONTROLLED or self._refused)  # a controlled move ends by itself
+            and not self.conversation.doubles(now)
+        ):
             self.odometry.wheel.refused()
         if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
             uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)

@@ -15,6 +15,7 @@ from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.states import Motion
 from omnibot_driver.core.mart.words import MCR, TB, TF
 from omnibot_driver.core.packets import Packet
+from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
 pytestmark = pytest.mark.slow
@@ -155,8 +156,8 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
     assert bench.truth.x_m < 0.12
 
 
-def lose_moves_and_copy_a_check(bench: MartBench) -> None:
-    """Change the network: it loses all turns of goals, and doubles the next RST IMU.
+def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
+    """Change the network: it loses commands that begin with ``lost``, and doubles the next RST IMU.
 
     Copy and reply are 0.29 s late each.
     """
@@ -167,7 +168,7 @@ def lose_moves_and_copy_a_check(bench: MartBench) -> None:
     def lossy(data: bytes, now: float, channel: int) -> None:
         if data.startswith(b"RST IMU") and not copies:
             copies.append(board.now_s + 0.29)
-        if not data.startswith(b"MC"):
+        if not data.startswith(lost):
             receive(data, now, channel)
 
     def late() -> list[Packet]:
@@ -201,7 +202,7 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     bench = MartBench(firmware).ready()
     bench.command(*before, 3.0)
     bench.command(0.0, 0.0, 1.5)
-    lose_moves_and_copy_a_check(bench)
+    lose_and_copy_a_check(bench, (b"MC",))
     here = bench.odometry[-1].pose
     bench.go_to(here.x_m, here.y_m, here.yaw_rad - 2.0)
     bench.run_until(lambda: bench.board._pilot.motion is Motion.TURN, 5.0)
@@ -209,6 +210,27 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     bench.command(0.0, 0.0, 3.0)
     assert bench.error.way_m < 0.05
     assert abs(bench.error.yaw_rad) < 0.05
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
+    """The same with a backward drive, during which no encoder count arrives.
+
+    The network has just duplicated replies, so the driver does not trust the late ok.
+    """
+    bench = MartBench(firmware).ready()
+    bench.robot._good = False
+    bench.command(-0.2, 0.0, 3.0)
+    replies = bench.robot.network[0].from_board
+    replies._faults = NetworkFaults(duplicate=1.0)
+    bench.command(0.0, 0.0, 3.0)
+    replies._faults = NetworkFaults()
+    receive = bench.robot.receive
+    lose_and_copy_a_check(bench, (b"B", b"ENC"))
+    bench.command(-0.2, 0.0, 1.0)
+    bench.robot.receive = receive  # type: ignore[method-assign]
+    bench.command(0.0, 0.0, 4.0)
+    assert bench.error.way_m < 0.05
 
 
 def first_distance(bench: MartBench, x_m: float) -> int:
