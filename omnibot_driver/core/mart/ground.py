@@ -128,6 +128,7 @@ class Ground:
         self._refused = False
         self._moved_last = False
         self._copies_stopped_s = -math.inf
+        self._port_is_free = self._greeted_before = False
         self._moved_by: Request | None = None
         self._last_move: Request | None = None
         self._recorded: Request | None = None

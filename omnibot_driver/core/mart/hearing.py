@@ -84,6 +84,8 @@ class Hearing(Measuring):
             self._stopped(now)  # the port is free, so the move is over and its reply was lost
         if self.state is State.MOVING and now >= self._started_s + GREET_S:
             self._free_s = min(self._free_s, now + self._delay_s)  # the reply may be on its way
+        if now >= self._started_s + 2 * self._delay_s and not self._greeted_before:
+            self._port_is_free = True  # a copy of the move would be ahead of HELLO in the queue
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:

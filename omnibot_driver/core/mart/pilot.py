@@ -18,6 +18,7 @@ from omnibot_driver.core.mart.ground import (
     STARTS_UP_S,
 )
 from omnibot_driver.core.mart.hearing import Hearing
+from omnibot_driver.core.mart.imu_proof import PROBE_S
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.required_motion import is_standstill, moving_order
 from omnibot_driver.core.mart.states import (
@@ -41,13 +42,14 @@ The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
 """Unanswered requests delay VOLTS at most until this time in s after the previous VOLTS."""
-SILENT_S, GREET_AGAIN_S = 0.15, 0.1
+SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends HELLO to a silent server.
 
-``SILENT_S``: from the last reply, plus two exchanges. ``GREET_AGAIN_S``: between two HELLOs.
+``SILENT_S``: from the last reply, plus two exchanges. ``SILENT_AFTER_MOVE_S``: the same while a
+duplicate of a move may be running. ``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
-"""Time in s after a move within which the server must answer ENC.
+"""Time in s after a move within which the server must answer ENC or HELLO.
 
 If it does not, a duplicate of the move may be running.
 """
@@ -191,8 +193,18 @@ class Pilot(Hearing):
             return self._greet_s
         if self.state in (State.STILL, State.CHECKING, *ROLLING):
             silent_s = SILENT_S + 2 * self.conversation.answered_trip_s
+            if self.state is State.CHECKING:
+                silent_s += PROBE_S[self.imu.word]
+            elif self.state is State.STILL and self._suspects_copy:
+                silent_s = SILENT_AFTER_MOVE_S
             return max(self.heard_s + silent_s, self._greeted_s + GREET_AGAIN_S)
         return math.inf
+
+    @property
+    def _suspects_copy(self) -> bool:
+        """Whether a duplicate of the last move may be running, because no reply excludes it."""
+        counted = self.odometry.wheel.from_s >= self._rested_s
+        return self._moved_last and not counted and not self._port_is_free
 
     @property
     def _copy_stop_s(self) -> float:
@@ -200,8 +212,7 @@ class Pilot(Hearing):
 
         The stop is SL and SS. After RM or B, they would hang the server.
         """
-        suspected = self._moved_last and self.odometry.wheel.from_s < self._rested_s
-        if self.state is not State.STILL or not suspected:
+        if self.state is not State.STILL or not self._suspects_copy:
             return math.inf
         apart_s = self._halted_s + self._delay_s
         silent_s = COPY_S
@@ -220,7 +231,10 @@ class Pilot(Hearing):
         return now >= max(self.appeared_s + VOLTS_AFTER_S, quiet_s)
 
     def _poll(self, now: float) -> Packets:
-        for word in self._polls.due(self.state, now):
+        due = self._polls.due(self.state, now)
+        if self.state is State.STILL and self._suspects_copy:
+            due.sort(key=lambda word: word is not words.ENC)
+        for word in due:
             if word is words.ENC and self._heading_first:
                 continue
             if word is words.VOLTS and not self._may_ask_volts(now):

@@ -81,7 +81,7 @@ class Starts(Adjusting):
         if why := self.refusal:
             self._notice(why, halt=True)
             return NO_PACKETS
-        if self._copies_may_come(now):
+        if self._copies_may_come(now) or self._name_may_come(start, now):
             return NO_PACKETS
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)
@@ -106,6 +106,14 @@ class Starts(Adjusting):
         """
         moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
         return moves or now < self._halted_s + self._delay_s
+
+    def _name_may_come(self, start: Request, now: float) -> bool:
+        """Return whether HELLO may arrive after ``start``, which is then a controlled move.
+
+        HELLO would wait in the server's queue, perhaps ahead of a copy of the move.
+        """
+        moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
+        return moves and now < self._greeted_s + self._delay_s
 
     def _next_start(self, now: float) -> Request | None:
         order = self._order(now)
@@ -159,7 +167,8 @@ class Starts(Adjusting):
         self._require(start.word)
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
-        self._recorded = None
+        self._recorded, self._port_is_free = None, False
+        self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused = start.word, False
         self._started_s = now
         self.imu.used()

@@ -1,0 +1,203 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of goals on a network that loses, delays and duplicates datagrams."""
+
+import math
+from random import Random
+from typing import Any
+
+import pytest
+from mart_bench import MartBench
+
+from omnibot_driver.core.events import Notice
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.simulator.common.network import NetworkFaults, NetworkPath
+from omnibot_driver.simulator.mart import Firmware
+
+pytestmark = pytest.mark.slow
+
+EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
+
+
+def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
+    """Return a bench that is ready, and whose network has these faults from now on."""
+    bench = MartBench(firmware, seed=seed).ready()
+    bench.robot._good = False
+    for channel in bench.robot.network:
+        channel.to_board._faults = channel.from_board._faults = network
+    return bench
+
+
+def reach(bench: MartBench, goal: Pose) -> str:
+    """Command the goal, and wait for its end. Return the driver's messages."""
+    since = len(bench.events)
+
+    def messages() -> str:
+        return " ".join(each.text for each in bench.events[since:] if isinstance(each, Notice))
+
+    bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
+    bench.run(0.1)
+    pilot = bench.board._pilot
+    bench.run_until(
+        lambda: pilot.goal_progress.startswith("over") or "discarded" in messages(), 120.0
+    )
+    bench.run(3.0)
+    assert bench.robot.stands
+    return messages()
+
+
+def yaw_error(bench: MartBench) -> float:
+    """Return the size of the error of the odometry's heading, in rad."""
+    return abs(math.remainder(bench.error.yaw_rad, math.tau))
+
+
+def drops(path: NetworkPath, lost: Any) -> list[bytes]:
+    """Let ``path`` lose each datagram for which ``lost`` is true. Return the list of the lost."""
+    gone, real = list[bytes](), path.send
+
+    def send(data: bytes, at_s: float) -> None:
+        if lost(data):
+            gone.append(data)
+        else:
+            real(data, at_s)
+
+    path.send = send  # type: ignore[method-assign]
+    return gone
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+@pytest.mark.parametrize("seed", range(3))
+def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
+    seed: int, firmware: Firmware
+) -> None:
+    """Replies come late and in another order. The driver takes none of it for a duplicated move."""
+    bench, random = on(NetworkFaults(delay_s=0.1), firmware, seed), Random(seed)
+    for _ in range(3):
+        goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
+        assert reach(bench, goal) == ""
+        assert bench.truth.way_to(goal).way_m < 0.12
+        assert bench.error.way_m < 0.1
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+def test_losses_end_few_goals_and_the_odometry_stays_right(firmware: Firmware) -> None:
+    """Each tenth datagram is lost in both directions: moves, replies, counts and headings.
+
+    The network duplicates nothing. The driver discards at most one goal in six, because it cannot
+    exclude a duplicated move. Where the odometry is wrong, its covariance says so.
+    """
+    discarded = 0
+    for seed in range(12):
+        bench, random = on(NetworkFaults(lose=0.1, delay_s=0.05), firmware, seed), Random(seed)
+        for _ in range(4):
+            goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
+            discarded += "discarded" in reach(bench, goal)
+            assert bench.error.way_m < 0.1
+            assert yaw_error(bench) < 0.2 + 2 * bench.odometry[-1].covariance.yaw_yaw ** 0.5
+    assert discarded <= 8
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
+    """The replies to all turns are lost. The server knows of no motion when the driver stops it.
+
+    This does not show that the turn has not begun. So its count begins at zero, and not at the
+    count of the drive before.
+    """
+    bench = on(NetworkFaults(), firmware)
+    reach(bench, Pose(0.15, 0.0, 0.0))
+
+    def ends_a_turn(data: bytes) -> bool:
+        last = bench.said()[-1]
+        return data == b"ok" and last.startswith(b"MC") and not last.endswith(b" 0")
+
+    lost = drops(bench.robot.network[0].from_board, ends_a_turn)
+    reach(bench, Pose(0.15, 0.5, 0.0))
+    assert lost
+    assert bench.error.way_m < 0.05
+    assert yaw_error(bench) < 0.05
+
+
+def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
+    """A documented server reports the heading at any time. It is not read between two moves.
+
+    The reply to the turn makes the driver suspect a copy, so the driver reads the encoder first and
+    drives on. The first heading after the drive has changed by the turn, which is known already.
+    """
+    bench = on(NetworkFaults(), "documented")
+    reach(bench, Pose(0.0, 0.6, math.pi / 2))
+    turns = [data for data in bench.said() if data.startswith(b"MC") and data != b"MCR SLOW 0"]
+    assert turns
+    assert bench.error.way_m < 0.05
+    assert yaw_error(bench) < 0.05
+
+
+@pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
+def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> None:
+    """The first reply to ENC after each move is lost, but the server answers HELLO.
+
+    So the driver repeats ENC.
+    """
+    bench, counted = on(NetworkFaults(), firmware), set[int]()
+
+    def is_first_count(data: bytes) -> bool:
+        moves = sum(each[:2] in (b"TF", b"MC") for each in bench.said())
+        ended = bench.board._pilot._moved_by is not None and bench.robot.stands
+        first = ended and bench.written[-1][1] == b"ENC" and moves not in counted
+        counted.update({moves} if first else ())
+        return first
+
+    lost = drops(bench.robot.network[0].from_board, is_first_count)
+    assert reach(bench, Pose(1.0, 0.5, 0.0)) == ""
+    assert bench.truth.way_to(Pose(1.0, 0.5, 0.0)).way_m < 0.1
+    assert len(lost) >= 2
+
+
+def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
+    """The reply to the check of the IMU is late, so that the driver sends HELLO meanwhile.
+
+    The network delays HELLO until the move has begun, and then delivers a copy of the move. The
+    server answers HELLO first, so this answer does not show that no copy runs.
+    """
+    bench = MartBench("source").ready()
+    network, late = bench.robot.network[0], list[bytes]()
+
+    def send(data: bytes, at_s: float, real: Any = network.to_board.send) -> None:
+        if data == b"HELLO" and bench.written[-2][1] == b"RST IMU":
+            late.append(data)
+            return
+        real(data, at_s)
+        if data == b"MCL SLOW 90":
+            real(late[-1], at_s + 0.02)
+            real(data, at_s + 0.1)
+
+    def reply(data: bytes, at_s: float, real: Any = network.from_board.send) -> None:
+        checked = b"MCL SLOW 90" not in bench.said() and data == b"ok"
+        real(data, at_s + 0.25 if checked else at_s)
+
+    network.to_board.send, network.from_board.send = send, reply
+    bench.robot._good = False
+    bench.go_to(0.0, 0.0, math.pi / 2)
+    bench.run(10.0)
+    assert bench.robot.stands
+    assert math.pi / 2 < bench.truth.yaw_rad < 0.75 * math.pi
+    assert b"SS" in bench.said()
+
+
+def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
+    """An answer to an earlier HELLO is late and comes during the move, of which a copy follows."""
+    bench = on(NetworkFaults(), "source")
+    network = bench.robot.network[0]
+
+    def send(data: bytes, at_s: float, real: Any = network.to_board.send) -> None:
+        real(data, at_s)
+        if data == b"MCL SLOW 90":
+            real(data, at_s + 0.2)
+            network.from_board.send(b"ok BBB", at_s + 0.5)
+
+    network.to_board.send = send  # type: ignore[method-assign]
+    bench.go_to(0.0, 0.0, math.pi / 2)
+    bench.run(10.0)
+    assert bench.robot.stands
+    assert math.pi / 2 < bench.truth.yaw_rad < 0.75 * math.pi
+    assert b"SS" in bench.said()
