@@ -6,8 +6,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import pytest
+
 from omnibot_driver.core.commands.limits import SpeedLimits
 from omnibot_driver.core.commands.policy import CommandSettings
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Extra, Notice
 from omnibot_driver.core.fejemis.board import FejemisBoard
 from omnibot_driver.core.fejemis.settings import FejemisSettings
@@ -169,3 +172,11 @@ def nominal(
 
 
 __all__ = ["DRIVE", "FRONT", "Bench", "Firmware", "SimulatedSettings", "nominal"]
+
+
+def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:
+    """Drive until a command is refused, and return the time until then, in s."""
+    began = bench.now
+    with pytest.raises(CommandRefused):
+        bench.drive_on(seconds=limit_s)
+    return bench.now - began

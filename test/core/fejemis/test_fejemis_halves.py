@@ -3,7 +3,7 @@
 """Tests of the two boards of one robot: swapped ports, and a restart or silence of one board."""
 
 import pytest
-from fejemis_bench import DRIVE, FRONT, Bench, nominal
+from fejemis_bench import DRIVE, FRONT, Bench, drive_until_refused, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis.readings import Job
@@ -11,14 +11,6 @@ from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
 from omnibot_driver.simulator.fejemis import Firmware, SimulatedFejemis
 
 HALVES = {"drive": DRIVE, "front": FRONT}
-
-
-def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:
-    """Drive until a command is refused, and return the time until then, in s."""
-    began = bench.now
-    with pytest.raises(CommandRefused):
-        bench.drive_on(seconds=limit_s)
-    return bench.now - began
 
 
 def assert_stands(bench: Bench) -> None:
@@ -230,77 +222,6 @@ def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
     assert sum(words in text for text in bench.notices) == 2
 
 
-def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """The front board sends its angle 66 times a second.
-
-    The driver relays each one without delay.
-    """
-    bench = nominal()
-    mark = bench.now
-    bench.drive_on(0.2, 0.4, 1.0)
-    relayed = [at for at, to, data in bench.written if to == DRIVE and at > mark and b"fwl" in data]
-    assert 60 <= len(relayed) <= 68
-    assert bench.robot.drive.told_angle_deg == pytest.approx(
-        bench.robot.vehicle.servo.angle_deg, abs=1.5
-    )
-
-
-def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """The angles stop while the robot drives. The driver does not wait for the next command."""
-    bench = nominal()
-    bench.drive_on()
-    mark = bench.now
-    bench.carry = lambda channel, data: b"" if channel == FRONT and b"fwl" in data else data
-    bench.run(0.08)
-    stops = [
-        at for at, to, data in bench.written if at > mark and to == DRIVE and b"rc 2 0 0" in data
-    ]
-    assert stops[0] - mark <= 0.064
-    assert any("60 ms" in text for text in bench.notices)
-
-
-SENSOR = [
-    "sensor-absent", "sensor-error", "hall-broken", "agc-unsettled", "offset-unfinished",
-    "sine-unfinished", "cosine-unfinished", "magnet-weak", "agc-high", "agc-low",
-    "cordic-overflow", "loops-unfinished", "supply-5v",
-]  # fmt: skip
-
-
-def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """The sensor sets an error bit. Motion is refused while the bit is set."""
-    bench = nominal()
-    for fault in SENSOR:
-        bench.drive_on(seconds=0.3)
-        assert not bench.robot.standing
-        told = len(bench.notices)
-        bench.robot.befall("front", fault)
-        drive_until_refused(bench)
-        assert "angle sensor" in bench.notices[told], fault
-        with pytest.raises(CommandRefused, match="angle sensor"):
-            bench.drive()
-        bench.robot.befall("front", "sensor-well")
-        bench.run(0.6)
-        assert bench.robot.standing, fault
-
-
-def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
-    """The angle sensor breaks while the robot is not driven. One notice reports it."""
-    bench = nominal()
-    bench.robot.befall("front", "hall-broken")
-    bench.run(1.0)
-    assert sum("angle sensor" in notice for notice in bench.notices) == 1
-
-
-def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """The angle sensor repeats its last angle without an error bit."""
-    bench = nominal()
-    bench.robot.befall("front", "sensor-frozen")
-    with pytest.raises(CommandRefused, match="front wheel did not go where"):
-        bench.drive_on(0.0, 0.5, 2.0)
-    assert any("does not go where it is commanded" in text for text in bench.notices)
-    assert bench.robot.standing
-
-
 def test_help_text_and_unknown_answers_are_no_trouble() -> None:
     """The boards send help text and an unknown line, and the robot still obeys commands.
 
@@ -329,20 +250,6 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
     assert bench.robot.truth.speed_mps == pytest.approx(0.3, abs=0.01)
     assert bench.board.figures.faults == 0
     assert not bench.notices
-
-
-def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
-    """Both boards have been silent for 0.1 s, so the last angle is too old when a command comes.
-
-    The driver refuses the command.
-    """
-    bench = nominal()
-    bench.speaks = set()
-    bench.run(0.1)
-    mark = bench.now
-    with pytest.raises(CommandRefused, match="angle"):
-        bench.drive()
-    assert not [text for text in bench.lines(DRIVE, mark) if text.startswith("rc 2 .")]
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:

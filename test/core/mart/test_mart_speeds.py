@@ -19,6 +19,20 @@ STEPS = [(0.3, 0.0), (0.15, 0.0), (0.3, 0.3), (0.3, -0.3), (-0.2, 0.0), (-0.2, 0
 pytestmark = pytest.mark.slow
 
 
+def driven(bench: MartBench, vx: float, yaw_rate: float, *, samples: int) -> tuple[float, float]:
+    """Return the robot's mean speed and turn rate from two seconds after the command's begin.
+
+    ``samples``: number of samples, ten a second.
+    """
+    bench.command(vx, yaw_rate, 2.0)
+    speeds, rates = [], []
+    for _ in range(samples):
+        bench.command(vx, yaw_rate, 0.1)
+        speeds.append(bench.robot.board.facts["speed_mps"])
+        rates.append(bench.robot.board.facts["yaw_rate_radps"])
+    return mean(speeds), mean(rates)
+
+
 @pytest.mark.parametrize(
     ("volts", "unequal", "firmware"),
     [(20.0, 0.05, "source"), (24.0, 0.0, "documented"), (26.0, -0.05, "firmware")],
@@ -31,15 +45,9 @@ def test_speed_and_turn_rate_are_within_five_per_cent_two_seconds_after_a_step(
     for vx, yaw_rate in STEPS:
         if firmware == "documented" and not vx:
             continue  # without SSP a turn on the spot has one speed
-        bench.command(vx, yaw_rate, 2.0)
-        speeds, rates = [], []
-        for _ in range(20):
-            bench.command(vx, yaw_rate, 0.1)
-            facts = bench.robot.board.facts
-            speeds.append(facts["speed_mps"])
-            rates.append(facts["yaw_rate_radps"])
-        assert mean(speeds) == pytest.approx(vx, rel=0.05, abs=0.004), (vx, yaw_rate)
-        assert mean(rates) == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
+        speed, rate = driven(bench, vx, yaw_rate, samples=20)
+        assert speed == pytest.approx(vx, rel=0.05, abs=0.004), (vx, yaw_rate)
+        assert rate == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
     assert bench.notices == []
 
 
@@ -53,15 +61,9 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
         "source", volts=22.0, motor_inequality=0.05, dead_zone_units=dead_units
     ).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.12, 0.5), (0.11, -0.5), (0.1, 0.45), (-0.2, 0.2)):
-        bench.command(vx, yaw_rate, 2.0)
-        speeds, rates = [], []
-        for _ in range(40):
-            bench.command(vx, yaw_rate, 0.1)
-            facts = bench.robot.board.facts
-            speeds.append(facts["speed_mps"])
-            rates.append(facts["yaw_rate_radps"])
-        assert mean(speeds) == pytest.approx(vx, rel=0.05), (vx, yaw_rate)
-        assert mean(rates) == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
+        speed, rate = driven(bench, vx, yaw_rate, samples=40)
+        assert speed == pytest.approx(vx, rel=0.05), (vx, yaw_rate)
+        assert rate == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
     assert bench.notices == []
 
 

@@ -1,0 +1,93 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of the angle of the front wheel: its relay, its age and a broken sensor."""
+
+import pytest
+from fejemis_bench import DRIVE, FRONT, drive_until_refused, nominal
+
+from omnibot_driver.core.errors import CommandRefused
+
+
+def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
+    """The front board sends its angle 66 times a second.
+
+    The driver relays each one without delay.
+    """
+    bench = nominal()
+    mark = bench.now
+    bench.drive_on(0.2, 0.4, 1.0)
+    relayed = [at for at, to, data in bench.written if to == DRIVE and at > mark and b"fwl" in data]
+    assert 60 <= len(relayed) <= 68
+    assert bench.robot.drive.told_angle_deg == pytest.approx(
+        bench.robot.vehicle.servo.angle_deg, abs=1.5
+    )
+
+
+def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
+    """The angles stop while the robot drives. The driver does not wait for the next command."""
+    bench = nominal()
+    bench.drive_on()
+    mark = bench.now
+    bench.carry = lambda channel, data: b"" if channel == FRONT and b"fwl" in data else data
+    bench.run(0.08)
+    stops = [
+        at for at, to, data in bench.written if at > mark and to == DRIVE and b"rc 2 0 0" in data
+    ]
+    assert stops[0] - mark <= 0.064
+    assert any("60 ms" in text for text in bench.notices)
+
+
+SENSOR = [
+    "sensor-absent", "sensor-error", "hall-broken", "agc-unsettled", "offset-unfinished",
+    "sine-unfinished", "cosine-unfinished", "magnet-weak", "agc-high", "agc-low",
+    "cordic-overflow", "loops-unfinished", "supply-5v",
+]  # fmt: skip
+
+
+def test_a_broken_angle_sensor_stops_the_robot() -> None:
+    """The sensor sets an error bit. Motion is refused while the bit is set."""
+    bench = nominal()
+    for fault in SENSOR:
+        bench.drive_on(seconds=0.3)
+        assert not bench.robot.standing
+        told = len(bench.notices)
+        bench.robot.befall("front", fault)
+        drive_until_refused(bench)
+        assert "angle sensor" in bench.notices[told], fault
+        with pytest.raises(CommandRefused, match="angle sensor"):
+            bench.drive()
+        bench.robot.befall("front", "sensor-well")
+        bench.run(0.6)
+        assert bench.robot.standing, fault
+
+
+def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
+    """The angle sensor breaks while the robot is not driven. One notice reports it."""
+    bench = nominal()
+    bench.robot.befall("front", "hall-broken")
+    bench.run(1.0)
+    assert sum("angle sensor" in notice for notice in bench.notices) == 1
+
+
+def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
+    """The angle sensor repeats its last angle without an error bit."""
+    bench = nominal()
+    bench.robot.befall("front", "sensor-frozen")
+    with pytest.raises(CommandRefused, match="front wheel did not go where"):
+        bench.drive_on(0.0, 0.5, 2.0)
+    assert any("does not go where it is commanded" in text for text in bench.notices)
+    assert bench.robot.standing
+
+
+def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
+    """Both boards have been silent for 0.1 s, so the last angle is too old when a command comes.
+
+    The driver refuses the command.
+    """
+    bench = nominal()
+    bench.speaks = set()
+    bench.run(0.1)
+    mark = bench.now
+    with pytest.raises(CommandRefused, match="angle"):
+        bench.drive()
+    assert not [text for text in bench.lines(DRIVE, mark) if text.startswith("rc 2 .")]
