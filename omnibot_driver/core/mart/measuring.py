@@ -93,10 +93,10 @@ class Measuring(Starts):
         if self.state is State.STILL:
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
             if rested and self.odometry.motion is not Motion.NONE:
-                self._doubt_a_copy(now)
+                twice = self._doubt_a_copy(now)
                 self.odometry.rest()
                 move, self._moved_by = self._moved_by, None
-                if move is not None and self._copies_stopped_s > self._rested_s:
+                if move is not None and twice and self._copies_stopped_s > self._rested_s:
                     self._discard_goal()
                 elif move is not None:
                     self._learn_from(move, now)
@@ -108,13 +108,13 @@ class Measuring(Starts):
             self._learn(reading, now)
 
     def _discard_goal(self) -> None:
-        """Discard the goal, because the network has duplicated the last move to it."""
+        """Discard the goal, because the network may have duplicated the last move to it."""
         if self._move is None or self._move.given_up:
             return
         self._move.fail()
         self._notice(
-            "the network delivered a controlled move twice, and the driver has stopped the second"
-            " one; the driven distance is unknown, so the goal of cmd_pose is discarded: check the"
+            "the network may have delivered a controlled move twice, so the driver has sent a stop;"
+            " the driven distance is unknown, so the goal of cmd_pose is discarded: check the"
             " network, then send the goal again",
             halt=True,
         )

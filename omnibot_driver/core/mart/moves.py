@@ -107,14 +107,15 @@ class Moves(Asking):
                 self._records.used(odometry.turn.spun_rad, wheel_rad)
         self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
 
-    def _doubt_a_copy(self, now: float) -> None:
-        """Add uncertainty if the server may have run the last controlled move twice.
+    def _doubt_a_copy(self, now: float) -> bool:
+        """Return whether the server may have run the last controlled move twice.
 
-        The encoder count then covers only the second run.
+        The encoder count then covers only the second run, so the uncertainty grows.
         """
         move, self._last_move = self._last_move, None
-        if move is None or not self.conversation.disturbed(now):
-            return
+        suspected = self._copies_stopped_s > self._rested_s or self.conversation.disturbed(now)
+        if move is None or not suspected:
+            return False
         odometry = self.odometry
         done = Done(
             move,
@@ -123,7 +124,9 @@ class Moves(Asking):
             lasted_s=self._rested_s - self._started_s,
             quiet_s=now - self._rested_s + self._delay_s,
         )
-        if done.may_have_run_twice(self._delay_s):
+        twice = done.may_have_run_twice(self._delay_s)
+        if twice:
             odometry.doubt.add(
                 *((done.asked**2, 0.0) if done.is_straight else (0.0, done.asked**2))
             )
+        return twice

@@ -153,6 +153,26 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
     assert len(lost) >= 2
 
 
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
+    """Nothing is heard for 0.3 s after a turn, so the driver stops a suspected copy of the turn.
+
+    The count then is that of the whole turn. A copy that ran so briefly would have counted less.
+    """
+    bench = on(NetworkFaults(), firmware)
+    pilot = bench.board._pilot
+
+    def soon_after_the_first_turn(data: bytes) -> bool:
+        soon = 0.0 < bench.now - pilot._rested_s < 0.3 or data == b"ok BBB"
+        return soon and pilot._move is not None and pilot._move.said == 1
+
+    drops(bench.robot.network[0].from_board, soon_after_the_first_turn)
+    assert reach(bench, Pose(0.0, 0.5, math.pi / 2)) == ""
+    assert b"SS" in bench.said()
+    assert bench.truth.way_to(Pose(0.0, 0.5, 0.0)).way_m < 0.1
+    assert bench.error.way_m < 0.05
+
+
 def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
     """The reply to the check of the IMU is late, so that the driver sends HELLO meanwhile.
 
