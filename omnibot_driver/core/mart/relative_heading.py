@@ -102,6 +102,7 @@ class RelativeHeading:
             if not old or when.from_s >= stood_s:  # else it is from before RM, which may be lost
                 self._take(angle_rad, when)
                 self.from_s = when.from_s
+                self.changed_s = max(self.changed_s, at_s)  # one heading shows no standstill
             return False
         if at_s <= before_s:
             return False
