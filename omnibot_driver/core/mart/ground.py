@@ -130,6 +130,7 @@ class Ground:
         self._copies_stopped_s = -math.inf
         self._port_is_free = self._greeted_before = False
         self._moved_by: Request | None = None
+        self._rolled = False
         self._last_move: Request | None = None
         self._recorded: Request | None = None
         self._records.connect()

@@ -12,10 +12,11 @@ from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.asking import Asking
-from omnibot_driver.core.mart.goal import Done, Move, next_move
+from omnibot_driver.core.mart.goal import INCH_M, Done, Move, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
+from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
 
@@ -54,14 +55,18 @@ class Moves(Asking):
         """
         motion = self.motion
         copies_s = self._started_s + 2 * self._delay_s  # of earlier requests, and their replies
-        if sure and isinstance(reply, Ok) and now >= copies_s:
+        slow = self._is_slow_stop(reply, motion, now)  # the target was reached nevertheless
+        if sure and (slow or isinstance(reply, Ok)) and now >= copies_s:
             self.odometry.wheel.started()
         if motion is Motion.STRAIGHT:
             self.odometry.doubt.end_straight()
         self.jobs.moved(reply, now)
         self.proof.stopped(now)
         self._rest(now)
-        if isinstance(reply, Fail):
+        self._rolled = slow
+        if slow:
+            self._once(SLOW_STOP)
+        elif isinstance(reply, Fail):
             self._moved_by = None  # the move was cut short
             discarded = ""
             if self._move is not None:
@@ -89,7 +94,9 @@ class Moves(Asking):
                 self._records.asked()
                 self._recorded = move
                 return
-        self._surplus.learn(move, self.odometry.moved_m, self.odometry.turn.spun_rad)
+        asked_m = 0.0 if turns else float(move.data.split()[-1]) * INCH_M
+        if not (self._rolled and abs(self.odometry.moved_m) < asked_m):  # else maybe an obstacle
+            self._surplus.learn(move, self.odometry.moved_m, self.odometry.turn.spun_rad)
 
     def _use_turn_record(self) -> None:
         """Correct the heading by the record of the last turn, if its download has ended."""

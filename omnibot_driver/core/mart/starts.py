@@ -232,7 +232,10 @@ class Starts(Adjusting):
         self._again_s = now + AGAIN_S
         if reply.reason == words.CONFLICT:
             self.motion = Motion.UNKNOWN
-            why = "another motion is in progress; look for another program that commands the robot"
+            why = (
+                "another motion is in progress; look for another program that commands the robot,"
+                " or for a network that duplicates datagrams"
+            )
         elif word is words.RM and self._is_of_another(reply, now):
             if reply.reason in ("", words.NO_START):
                 self.health.reference_failed(now)

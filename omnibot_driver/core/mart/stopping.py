@@ -11,7 +11,14 @@ from typing import Final
 
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion
-from omnibot_driver.core.mart.words import NO_MOTION, NOT_IN_MOTION, Form, Word
+from omnibot_driver.core.mart.words import (
+    NO_MOTION,
+    NO_START,
+    NOT_IN_MOTION,
+    SLOW_STOPS,
+    Form,
+    Word,
+)
 
 REPEAT_S: Final = 0.3
 ROUNDS: Final = 3
@@ -30,6 +37,29 @@ ASK_NAME_S: Final = 0.9
 The move has then usually ended.
 """
 
+SLOW_STOP: Final = (
+    "the wheels still turned 0.6 s after a stop, so the server reports a failure; the robot is"
+    " heavy or fast, or rolls down a slope; the driver continues"
+)
+NO_START_S: Final = 0.75
+"""Time in s after which MCR and MCL do not fail any more because no wheel has turned.
+
+The server waits 0.6 s for a wheel to turn, and after the turn 0.75 s for the robot to rest.
+"""
+
+
+def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
+    """Return whether a motion failed only because the wheels turned for long after its end.
+
+    The motors are then off. The server gives the same text for a turn that did not begin.
+
+    ``lasted_s``: time from the start to the reply, without the transit times.
+    """
+    if not isinstance(reply, Fail):
+        return False
+    turned = motion is Motion.TURN and lasted_s > NO_START_S
+    return reply.reason in SLOW_STOPS or (turned and reply.reason == NO_START)
+
 
 class Stopping:
     """The stop of one motion.
@@ -39,6 +69,8 @@ class Stopping:
     ``owed``: number of missing replies that look like a reply to the stop.
 
     ``move``: the controlled move to stop, or None. Its own reply ends the stop.
+
+    ``planned``: whether nothing was wrong with the motion.
     """
 
     def __init__(
@@ -50,8 +82,9 @@ class Stopping:
         started_s: float,
         owed: int = 0,
         move: Word | None = None,
+        planned: bool = False,
     ) -> None:
-        self.motion, self.move = motion, move
+        self.motion, self.move, self.planned = motion, move, planned
         self.began_s = now
         self.result: Ok | Fail | None = None
         """The reply that shows how the motion ended, or None."""

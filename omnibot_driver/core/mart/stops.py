@@ -22,7 +22,7 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
-from omnibot_driver.core.mart.stopping import ANSWERS, Stopping
+from omnibot_driver.core.mart.stopping import ANSWERS, SLOW_STOP, Stopping, is_slow_stop
 from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
@@ -157,6 +157,7 @@ class Stops(Ground, ABC):
             started_s=-math.inf if arrived else self._started_s,
             owed=owed,
             move=move,
+            planned=not why,
         )
         self.state = State.STOPPING
 
@@ -210,7 +211,9 @@ class Stops(Ground, ABC):
             )
         if motion is Motion.STRAIGHT:
             self.odometry.doubt.end_straight()
-        if isinstance(result, Fail):
+        if result is not None and stopping.planned and self._is_slow_stop(result, motion, now):
+            self._once(SLOW_STOP)
+        elif isinstance(result, Fail):
             self._failed(motion, result, now)
         elif result is None and motion is not Motion.UNKNOWN and not self._refused:
             self._appears(now)  # the server knows of no motion, so maybe it was restarted
@@ -219,6 +222,9 @@ class Stops(Ground, ABC):
             self._swept_s = now
             self.greeted = True
         self._rest(now)
+
+    def _is_slow_stop(self, reply: Reply, motion: Motion, now: float) -> bool:
+        return is_slow_stop(reply, motion, now - self._started_s - self.conversation.trip_s)
 
     def _may_be_count(self, reply: Reply) -> bool:
         """Return whether a number in a reply may be an encoder count instead of a turn's angle."""

@@ -95,7 +95,8 @@ OBSTACLES: Final = frozenset(
 """The failure texts for an obstacle, in all the server's spellings."""
 NO_START: Final = "start timedout"
 STARTING: Final = frozenset({CONFLICT, UNSUPPORTED, "", NO_START})
-STOPPING: Final = frozenset({"stop timedout", "stop time out", NO_START})
+SLOW_STOPS: Final = frozenset({"stop timedout", "stop time out"})
+STOPPING: Final = SLOW_STOPS | {NO_START}
 GYRO: Final = "excessive gyro correct"
 MOVING: Final = STARTING | STOPPING | OBSTACLES | {IMU_LOST, GYRO}
 

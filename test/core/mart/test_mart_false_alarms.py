@@ -1,17 +1,22 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that lost replies do not look like a failure of the robot."""
+"""Tests that neither lost replies nor a heavy robot look like a failure."""
 
 import math
 
 import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
+from test_mart_goal import first_distance
 
+from omnibot_driver.core.mart.goal import INCH_M, STRETCH
 from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.relative_heading import RelativeHeading
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
+
+HEAVY_S = 0.2
+"""Time constant in s of motors that still turn when the server no longer waits for a stop."""
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
@@ -43,3 +48,61 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
         told = " ".join(bench.notices)
         assert "does not move" not in told, seed
         assert "IMU is dead" not in told, seed
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("before", [(-0.3, 0.0), (0.4, 0.0), (0.0, 0.5)])
+def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
+    before: tuple[float, float], firmware: Firmware
+) -> None:
+    """A goal follows a drive of a heavy robot, whose wheels turn for long after the stop.
+
+    The server reports this as a failure. The driver says so once, and the robot reaches the goal.
+    """
+    bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
+    bench.command(*before, 3.0)
+    bench.go_to(-0.5, 0.5, 1.0)
+    pilot = bench.board._pilot
+    bench.run_until(lambda: pilot.goal_progress.startswith("over"), 60.0)
+    bench.run(2.0)
+    assert math.hypot(bench.truth.x_m + 0.5, bench.truth.y_m - 0.5) < 0.1
+    assert sum("the wheels still turned" in notice for notice in bench.notices) == 1
+    assert not any("goal" in notice or "obstacle" in notice for notice in bench.notices)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: Firmware) -> None:
+    """New goals arrive during a straight move and during a turn of a heavy robot."""
+    bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
+    for goal, seconds in (((2.0, 0.0, 0.0), 3.0), ((0.5, -1.0, 0.0), 2.0), ((0.0, 0.0, 0.0), 60.0)):
+        bench.go_to(*goal)
+        bench.run(seconds)
+    assert math.hypot(bench.truth.x_m, bench.truth.y_m) < 0.1
+    assert len(bench.notices) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stuck", ["right", "both"])
+def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
+    """A turn that does not begin is not mistaken for one after which the wheels turned for long."""
+    bench = MartBench(motor_lag_s=HEAVY_S).ready()
+    bench.server.chassis.change(stuck=stuck)
+    bench.go_to(0.0, 1.0, 0.0)
+    bench.run(5.0)
+    assert any("start timedout; the goal" in notice for notice in bench.notices)
+
+
+@pytest.mark.slow
+def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
+    """The server reports the long stop instead of the obstacle.
+
+    The driver learns nothing from this move, and then finds the obstacle.
+    """
+    bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
+    first_distance(bench, 2.0)
+    bench.run(15.0)
+    assert any("clearance" in notice for notice in bench.notices)
+    assert 0.3 < bench.truth.x_m < 0.6
+    assert first_distance(bench, bench.truth.x_m - 2.0) <= round(2.0 / INCH_M / STRETCH) + 1
