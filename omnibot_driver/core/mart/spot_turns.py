@@ -212,22 +212,24 @@ class SpotTurns:
         return abs(told_rad - expected_rad) > most_rad
 
     def stopped(
-        self, degrees: float, uncounted_s: float, turned_s: float, *, disturbed: bool
+        self, degrees: float | None, uncounted_s: float, turned_s: float, *, disturbed: bool
     ) -> None:
-        """Evaluate the angle in the reply to the stop of a turn.
+        """Evaluate the angle in the reply to the stop of a turn, or None if there was no angle.
 
         ``uncounted_s``: time from the last count to the stop. ``disturbed``: the reply to SSP is
         uncertain, so nothing is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad
-        odometry.spin_told(degrees)
+        if degrees is not None:
+            odometry.spin_told(degrees)
         if disturbed or not (self.units and self._is_seen(turned_s)):
             return
         rate_radps = self.seen_radps
         if self._is_held(rate_radps):
             return
-        if abs(spun_rad) > TOLD_RAD:  # whole degrees are then more precise than the wheel
+        # whole degrees are more precise than the wheel if the turn is long
+        if degrees is not None and abs(spun_rad) > TOLD_RAD:
             whole_rad = abs(spun_rad + rate_radps * (uncounted_s + SLOWING_S))
             rate_radps *= abs(math.radians(degrees)) / whole_rad
         self._undo_false_lesson(abs(rate_radps / self._rate_radps))

@@ -201,17 +201,19 @@ class Stops(Ground, ABC):
             and not self.conversation.doubles(now)
         ):
             self.odometry.wheel.refused()
-        if motion is Motion.SPIN and isinstance(result, Ok) and result.form is Form.INTEGER:
+        slow = result is not None and stopping.planned and self._is_slow_stop(result, motion, now)
+        told = isinstance(result, Ok) and result.form is Form.INTEGER
+        if motion is Motion.SPIN and (told or slow or result is None):
             uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)
             self._turns.stopped(
-                result.number,
+                result.number if isinstance(result, Ok) else None,
                 uncounted_s,
                 now - self._begun_s,
                 disturbed=self.conversation.disturbed(now),
             )
         if motion is Motion.STRAIGHT:
             self.odometry.doubt.end_straight()
-        if result is not None and stopping.planned and self._is_slow_stop(result, motion, now):
+        if slow:
             self._once(SLOW_STOP)
         elif isinstance(result, Fail):
             self._failed(motion, result, now)

@@ -106,3 +106,29 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
     assert any("clearance" in notice for notice in bench.notices)
     assert 0.3 < bench.truth.x_m < 0.6
     assert first_distance(bench, bench.truth.x_m - 2.0) <= round(2.0 / INCH_M / STRETCH) + 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("faults", "robot"),
+    [
+        (NetworkFaults(), {"motor_lag_s": 0.25, "dead_zone_units": 2.0}),
+        (NetworkFaults(delay_s=0.012), {"motor_lag_s": 0.1}),
+    ],
+    ids=["a heavy robot", "a network that delays replies"],
+)
+@pytest.mark.parametrize("seed", [3, 7])
+def test_a_turn_that_is_begun_anew_has_other_units(
+    faults: NetworkFaults, robot: dict[str, float], seed: int
+) -> None:
+    """The stop of a turn at a wrong rate yields no angle, as it takes long or its reply is late.
+
+    The driver learns the rate nevertheless. So it does not begin the same turn again.
+    """
+    bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
+    since = len(bench.written)
+    bench.command(0.0, 0.5, 8.0)
+    said = [data.split()[0] for data in bench.said(since)]
+    starts = [word for word in said if word in (b"SSP", b"L")]
+    assert len(starts) > 2
+    assert starts == [b"SSP", b"L"] * (len(starts) // 2)
