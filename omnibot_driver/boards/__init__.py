@@ -46,7 +46,10 @@ class Profile(Protocol):
         """Return these parameter values in the form that ``Board.settings`` expects."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
-        """Return a function that opens the connection to the real board."""
+        """Return a function that opens the connection to the real board.
+
+        Raises ParameterError if no attempt can succeed, however often it is repeated.
+        """
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
         """Return the kinematics of the wheels, from checked values."""
@@ -64,11 +67,15 @@ def load(name: str) -> Profile:
 
 
 def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transport]:
-    """Return a function that opens the board's port, or a simulated board for ``sim://``."""
+    """Return a function that opens the board's port, or a simulated board for ``sim://``.
+
+    Raises ParameterError if no attempt can succeed, however often it is repeated.
+    """
     port = str(values["port"])
     if not port.lower().startswith("sim://"):
         return profile.opener(values)
     simulated = import_module("omnibot_driver.transports.simulated")
+    simulated.check_address(port, profile.SIMULATOR)
     return partial(simulated.SimulatedTransport, port, profile.SIMULATOR)
 
 

@@ -17,6 +17,7 @@ from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.traits import TRAITS
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.parameters import table
+from omnibot_driver.transports.serial_address import check_address
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
@@ -72,10 +73,10 @@ def settings(values: Mapping[str, Any]) -> FejemisSettings:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
     """Return a function that opens both serial devices, or one if the other device is missing."""
-    return partial(
-        Several,
-        [partial(SerialPort, values[name], USB_BAUDRATE, name) for name in ("port", "front_port")],
-    )
+    names = ("port", "front_port")
+    for name in names:
+        check_address(values[name], name, pollable=True)
+    return partial(Several, [partial(SerialPort, values[n], USB_BAUDRATE, n) for n in names])
 
 
 def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:

@@ -22,6 +22,7 @@ from omnibot_driver.core.lois_ecu import PERIOD_OFF, TerminalMode
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 from omnibot_driver.parameters import table
+from omnibot_driver.transports.serial_address import check_address
 from omnibot_driver.transports.serial_port import SerialPort
 
 SIMULATOR: Final = "omnibot_driver.simulator.lois_ecu"
@@ -86,6 +87,7 @@ def settings(values: Mapping[str, Any]) -> LoisEcuSettings:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
     """Return a function that opens the port: a device, or a URL that pyserial supports."""
+    check_address(values["port"])
     return partial(SerialPort, values["port"], values["baudrate"])
 
 

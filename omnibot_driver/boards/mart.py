@@ -11,7 +11,7 @@ from omnibot_driver.core.geometry.differential import DifferentialKinematics
 from omnibot_driver.core.mart.board import TRAITS, MartBoard
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.parameters import table
-from omnibot_driver.transports.udp import UdpPorts
+from omnibot_driver.transports.udp import UdpPorts, check_address
 
 SIMULATOR: Final = "omnibot_driver.simulator.mart"
 PARAMETERS: Final = table(
@@ -75,6 +75,7 @@ def settings(values: Mapping[str, Any]) -> MartSettings:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], UdpPorts]:
     """Return a function that opens the command port, and the stop port with the next number."""
+    check_address(values["port"], len(TRAITS.channels))
     return partial(UdpPorts, values["port"], len(TRAITS.channels))
 
 

@@ -11,6 +11,7 @@ from omnibot_driver.core.geometry.omni import OmniKinematics
 from omnibot_driver.core.imu.scale import ImuScale
 from omnibot_driver.core.omnibot import OmniBot, OmniBotSettings
 from omnibot_driver.parameters import table
+from omnibot_driver.transports.serial_address import check_address
 from omnibot_driver.transports.serial_port import SerialPort
 
 SIMULATOR: Final = "omnibot_driver.simulator.omnibot"
@@ -47,6 +48,7 @@ def settings(values: Mapping[str, Any]) -> OmniBotSettings:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
     """Return a function that opens a device, or any URL that pyserial knows."""
+    check_address(values["port"])
     return partial(SerialPort, values["port"], values["baudrate"])
 
 

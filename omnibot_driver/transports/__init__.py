@@ -14,6 +14,10 @@ from omnibot_driver.core.packets import Packet, Packets
 READ_TIMEOUT_S: Final = 0.2
 """Longest time in s for which ``read`` waits, even on a port where ``interrupt`` cannot end it."""
 WRITE_TIMEOUT_S: Final = 0.2
+NOT_POLLABLE: Final = (
+    "this kind of port does not work for a board with several ports; use a device like"
+    " /dev/ttyACM0, or sim:// for all ports"
+)
 NONE_MISSING: Final[Mapping[int, str]] = {}
 """Value of ``missing`` for a transport whose lines are either all open or all closed."""
 

@@ -1,21 +1,18 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One open serial port or pyserial URL: the only module that knows pyserial.
+"""One open serial port or pyserial URL.
 
 Every LinkError says what to do. This module knows ports; it knows neither threads nor boards.
 """
 
 import contextlib
-import errno
 import fcntl
 import io
 import os
-import re
 import select
 import socket
 import termios
 import time
-from pathlib import Path
 from typing import Final
 
 import serial
@@ -24,6 +21,7 @@ from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet, Packets, joined
 from omnibot_driver.kernel_counts import overruns
 from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S, WRITE_TIMEOUT_S
+from omnibot_driver.transports.serial_address import explain
 
 MOST_AT_ONCE: Final = 4096
 PEER_OPTIONS: Final = {
@@ -65,12 +63,12 @@ class SerialPort:
         except LinkError:
             raise
         except Exception as error:  # pyserial's URL handlers can raise any exception
-            raise LinkError(_explain(url, parameter, error)) from error
+            raise LinkError(explain(url, parameter, error)) from error
         try:
             self._settle_in()
         except (OSError, termios.error) as error:
             self.close()
-            raise LinkError(_explain(url, parameter, error)) from error
+            raise LinkError(explain(url, parameter, error)) from error
 
     @property
     def descriptors(self) -> tuple[int, ...] | None:
@@ -199,61 +197,3 @@ def _write_whole(descriptor: int, data: bytes) -> None:
         room.register(descriptor, select.POLLOUT)
         if not room.poll(max(0.0, 1e3 * (until - time.monotonic()))):
             raise TimeoutError(f"it has accepted no data for {WRITE_TIMEOUT_S:g} s")
-
-
-def _explain(url: str, parameter: str, error: Exception) -> str:
-    """Return a sentence that says why this port cannot be opened, and what to do."""
-    code = error.errno if isinstance(error, OSError) else None
-    if isinstance(error, ValueError) and "baud rate" in str(error):
-        return f"{url} cannot be set to this speed: {error}; check the parameter `baudrate`"
-    # pyserial replaces some errors by its own, without their number; the context has the original.
-    misread = TypeError | ValueError | LookupError | re.error
-    if isinstance(error, misread) or isinstance(error.__context__, misread):
-        return (
-            f"{parameter} '{url}' is not valid: give a device like /dev/ttyUSB0"
-            " or a pyserial URL like socket://host:port, or sim:// for a simulated board"
-        )
-    no_terminal = isinstance(error, termios.error) or isinstance(error.__context__, termios.error)
-    if no_terminal or code == errno.EISDIR:
-        return (
-            f"{url} is not a serial port; find the port with `ls /dev/serial/by-id/` and set"
-            f" `{parameter}`"
-        )
-    if code == errno.ENOENT:
-        return (
-            f"{url} does not exist; plug the board in, find its port with `ls /dev/serial/by-id/`"
-            f" and set the parameter `{parameter}`; without a robot try port:=sim://"
-        )
-    if code in (errno.EACCES, errno.EPERM):
-        return (
-            f"no permission to open {url}: join the group dialout with"
-            " `sudo usermod -aG dialout $USER` and log in again"
-        )
-    if code in (errno.EAGAIN, errno.EBUSY):
-        return (
-            f"{url} is in use by another program{_owner(url)}, perhaps a second driver; end it"
-            f" first (`fuser {url}` names it; the guard of a killed driver ends by itself)"
-        )
-    # pyserial's text for an error of the operating system would name the port twice.
-    source = error.__context__ if isinstance(error.__context__, OSError) else error
-    reason = getattr(source, "strerror", None) or source
-    if isinstance(source, ConnectionRefusedError):
-        return (
-            f"cannot open {url}: {reason}: check that the server is running and that this is"
-            " its port"
-        )
-    return f"cannot open {url}: {reason}; check the parameter `{parameter}`"
-
-
-def _owner(path: str) -> str:
-    """Return the process that has locked this file, in brackets; empty if it is unknown."""
-    with contextlib.suppress(OSError, ValueError):
-        status = os.stat(path)
-        device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"
-        for line in Path("/proc/locks").read_text(encoding="ascii").splitlines():
-            _, kind, _, _, pid, file, *_ = line.replace("-> ", "").split()
-            if kind == "FLOCK" and file == f"{device}:{status.st_ino}":
-                # The kernel cuts a name after 15 bytes, which may be within a character.
-                name = Path(f"/proc/{pid}/comm").read_text("utf-8", errors="replace").strip()
-                return f" (process {pid}, {name})"
-    return ""

@@ -13,7 +13,13 @@ from typing import Final, Protocol
 
 from omnibot_driver.core.errors import LinkError
 from omnibot_driver.core.packets import Packet, Packets, joined
-from omnibot_driver.transports import READ_TIMEOUT_S, WRITE_TIMEOUT_S, LinesChanged, Transport
+from omnibot_driver.transports import (
+    NOT_POLLABLE,
+    READ_TIMEOUT_S,
+    WRITE_TIMEOUT_S,
+    LinesChanged,
+    Transport,
+)
 from omnibot_driver.transports.wake_up import WakeUp
 
 FULL: Final = f"it has accepted no data for {WRITE_TIMEOUT_S:g} s"
@@ -176,10 +182,7 @@ class Several:
                 continue
             if port.descriptors is None or len(port.descriptors) != 1:
                 port.close()
-                raise LinkError(
-                    "this kind of port does not work for a board with several ports; use a"
-                    " device like /dev/ttyACM0, or sim:// for all ports"
-                )
+                raise LinkError(NOT_POLLABLE)
             with self._writing:
                 line.begin(port)
                 assert line.descriptor is not None

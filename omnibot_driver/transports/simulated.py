@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from queue import Empty, SimpleQueue
 from typing import Final
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.simulator.common import options
 from omnibot_driver.simulator.common.board import Packet, SimulatedBoard
 from omnibot_driver.simulator.common.running import UNREAD_LIMIT, RunningBoard
@@ -28,7 +28,7 @@ class SimulatedTransport:
 
     ``simulator``: full name of the board's package.
 
-    Raises LinkError if the URL is wrong, RuntimeError if the board's thread has died.
+    Raises ParameterError if the URL is wrong, RuntimeError if the board's thread has died.
     """
 
     missing = NONE_MISSING
@@ -41,16 +41,7 @@ class SimulatedTransport:
 
     def __init__(self, url: str, simulator: str) -> None:
         self._url = url
-        try:
-            self._board: InProcessBoard | None = InProcessBoard(
-                *options.from_url(url, options.load(simulator))
-            )
-        except options.OptionError as error:
-            raise LinkError(
-                f"port '{url}' is not valid: {error}; `ros2 run omnibot_driver"
-                f" {options.command(simulator)} --help` lists the options; an example is"
-                " sim://?seed=1&lose=0.001"
-            ) from error
+        self._board: InProcessBoard | None = InProcessBoard(*_board_and_lines(url, simulator))
         self._board.start()
 
     def read(self) -> Packet:
@@ -86,6 +77,22 @@ class SimulatedTransport:
         if board is not None:
             board.cancel()
             board.stop()
+
+
+def check_address(url: str, simulator: str) -> None:
+    """Raise ParameterError if the URL has an option that this simulated board does not know."""
+    _board_and_lines(url, simulator)
+
+
+def _board_and_lines(url: str, simulator: str) -> tuple[SimulatedBoard, list[Line]]:
+    try:
+        return options.from_url(url, options.load(simulator))
+    except options.OptionError as error:
+        raise ParameterError(
+            f"port '{url}' is not valid: {error}; `ros2 run omnibot_driver"
+            f" {options.command(simulator)} --help` lists the options; an example is"
+            " sim://?seed=1&lose=0.001"
+        ) from error
 
 
 class InProcessBoard(RunningBoard[SimulatedBoard]):

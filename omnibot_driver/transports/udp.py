@@ -14,7 +14,7 @@ import time
 from typing import Final
 from urllib.parse import urlsplit
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.core.packets import Packet, Packets
 from omnibot_driver.transports import NONE_MISSING, READ_TIMEOUT_S, WRITE_TIMEOUT_S
 from omnibot_driver.transports.wake_up import WakeUp
@@ -29,6 +29,8 @@ class UdpPorts:
     """A ``Transport`` with one connected socket for each channel.
 
     ``channels``: the number of channels.
+
+    Raises ParameterError if the URL is wrong.
     """
 
     ends_with_us = False
@@ -45,7 +47,7 @@ class UdpPorts:
             except BaseException:
                 self.close()
                 raise
-        except (OSError, ValueError) as error:  # an impossible host name raises ValueError
+        except OSError as error:
             reason = getattr(error, "strerror", None) or error
             raise LinkError(
                 f"cannot reach {url}: {reason}; check the parameter `port` and the network"
@@ -150,6 +152,14 @@ class UdpPorts:
         return LinkError(f"lost {place}: {error.strerror or error}; check the network")
 
 
+def check_address(url: str, channels: int = 1) -> None:
+    """Raise ParameterError if this is not the address of a host.
+
+    It accepts a host that is unknown at present, because the host may appear later.
+    """
+    _place(url, channels)
+
+
 def _is_silence(error: OSError) -> bool:
     """Return whether the error only means that the host does not listen at present."""
     return isinstance(error, BlockingIOError) or error.errno in UNREACHABLE
@@ -162,7 +172,11 @@ def _place(url: str, channels: int) -> tuple[str, int]:
         fits = port is not None and port > 0 and port + channels <= 65_536
         more = parts.path or parts.query or parts.fragment or parts.username is not None
         if parts.scheme == "udp" and host and port and fits and not more:
+            host.encode("idna")
             return host, port
     except ValueError:
         pass
-    raise LinkError(f"port '{url}' is not valid: give udp://HOST:PORT, or sim://")
+    raise ParameterError(
+        f"port '{url}' is not valid: give udp://HOST:PORT with a port up to {65_536 - channels},"
+        " or sim:// for a simulated board; check the parameter `board` too"
+    )

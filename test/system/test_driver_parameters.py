@@ -115,13 +115,13 @@ def test_help_that_is_not_read_to_its_end_is_not_an_error() -> None:
     assert (ended.returncode, ended.stderr) == (0, b"")
 
 
-OPENS_NOTHING = "import serial; serial.serial_for_url = None"
+OPENS_NOTHING = "import serial; serial.serial_for_url = lambda *_, **__: open('/')"
 """Code that keeps the driver from opening a port. A real robot may be on the default port."""
 
 
 @pytest.mark.parametrize(
     ("first_line", "said", "told"),
-    [("/other/omnibot_driver", "for this node,", 1), ("/**", "port '/dev/null' is not", 0)],
+    [("/other/omnibot_driver", "for this node,", 1), ("/**", "/dev/null is not", 0)],
 )
 def test_a_parameter_file_for_another_node_is_told(
     start_driver: Start, tmp_path: Path, first_line: str, said: str, told: int

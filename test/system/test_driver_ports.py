@@ -126,21 +126,17 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 @pytest.mark.parametrize(
     ("port", "reason"),
     [
-        ("nonsense://board", "not valid.*socket://"),
-        ("/", ": / is not a serial port.*by-id"),
         ("/dev/null", "is not a serial port.*by-id"),
-        ("socket://nohost", "not valid.*socket://"),
-        ("socket://localhost:99999", "not valid.*socket://"),
         (
             "socket://localhost:1",
             "cannot open socket://localhost:1: Connection refused: check that the server",
         ),
     ],
 )
-def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
+def test_a_port_that_cannot_be_opened_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """The port can never be opened.
+    """The port cannot be opened at present.
 
     The driver logs the reason and keeps trying until SIGINT ends it.
     """
@@ -149,6 +145,26 @@ def test_a_port_that_cannot_be_is_explained_and_the_node_lives(
     assert driver.process.poll() is None
     assert driver.end(signal.SIGINT) == 0
     assert "robot stopped" not in driver.output
+
+
+@pytest.mark.parametrize(
+    ("board", "port", "reason"),
+    [
+        ("omnibot", "nonsense://board", "port 'nonsense://board' is not valid.*socket://"),
+        ("omnibot", "/", "/ is not a serial port.*by-id"),
+        ("omnibot", "sim://?nonsense=1", "there is no option 'nonsense=1'"),
+        ("lois_ecu", "udp:/host", "port 'udp:/host' is not valid.*whole path"),
+        ("mart", "/dev/ttyUSB0", "port '/dev/ttyUSB0' is not valid.*udp://HOST:PORT"),
+        ("fejemis", "loop://", "does not work for a board with several ports"),
+    ],
+)
+def test_a_port_that_can_never_be_opened_is_refused_at_the_start(
+    start_driver: Start, board: str, port: str, reason: str
+) -> None:
+    """No attempt can succeed. The driver says why and ends with 2, which systemd does not retry."""
+    driver: Driver = start_driver(port, board=board)
+    driver.wait_for_line(f"omnibot_driver cannot start: .*{reason}")
+    assert driver.process.wait(60.0) == 2
 
 
 def test_garbage_on_the_line_is_not_published_and_does_not_end_the_driver(

@@ -11,12 +11,13 @@ import pytest
 import toy_lines
 from toy_udp import ToyServer
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 from omnibot_driver.transports.simulated import (
     UNREAD_DATAGRAMS,
     InProcessBoard,
     SimulatedTransport,
+    check_address,
 )
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
@@ -133,8 +134,8 @@ def test_options_that_this_board_does_not_know_are_refused(url: str, why: str) -
 
     The message says why, and names the command that lists the options.
     """
-    with pytest.raises(LinkError) as refusal:
-        SimulatedTransport(url, TOY)
+    with pytest.raises(ParameterError) as refusal:
+        check_address(url, TOY)
     assert f"port '{url}' is not valid: " in str(refusal.value)
     assert why in str(refusal.value)
     assert "simulator --board toy_lines --help" in str(refusal.value)

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from omnibot_driver.core.errors import LinkError
+from omnibot_driver.core.errors import LinkError, ParameterError
 from omnibot_driver.core.packets import Packet
-from omnibot_driver.transports.udp import UdpPorts
+from omnibot_driver.transports.udp import UdpPorts, check_address
 
 PATIENCE_S = 60.0
 
@@ -142,6 +142,10 @@ def test_a_read_that_waits_can_be_ended(transport: UdpPorts) -> None:
         "tcp://h:5000",
         "udp://h:65535",
         "udp://u@h:5000",
+        "udp:/h",
+        "udp://two..dots:5000",
+        f"udp://{64 * 'a'}:5000",
+        "/dev/ttyUSB0",
     ],
 )
 def test_a_url_that_means_no_place_is_refused(url: str) -> None:
@@ -149,8 +153,14 @@ def test_a_url_that_means_no_place_is_refused(url: str) -> None:
 
     Port 65535 is refused, because the second channel would need the next higher port.
     """
-    with pytest.raises(LinkError, match=r"give udp://HOST:PORT"):
-        UdpPorts(url, 2)
+    with pytest.raises(ParameterError, match=r"give udp://HOST:PORT with a port up to 65534"):
+        check_address(url, 2)
+
+
+@pytest.mark.parametrize("host", ["no-such-host.invalid", "192.168.1.50", "[::1]", "robot.local."])
+def test_a_host_that_may_appear_later_is_not_refused(host: str) -> None:
+    """The host may be unknown until it is on the network, so the check asks no resolver."""
+    check_address(f"udp://{host}:65534", 2)
 
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
@@ -164,13 +174,9 @@ def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
         transport.write(((1, bytes(100_000)),))
 
 
-@pytest.mark.parametrize("name", ["no-such-host.invalid", "robot..local", 64 * "a"])
-def test_a_host_that_is_not_known_is_refused(name: str) -> None:
-    """The host is unknown.
-
-    Any error of the resolver is reported, and no file descriptor stays open.
-    """
+def test_a_host_that_is_not_known_is_reported() -> None:
+    """The host is unknown. The error names the parameter, and no file descriptor stays open."""
     before = len(os.listdir("/proc/self/fd"))
     with pytest.raises(LinkError, match="check the parameter `port`"):
-        UdpPorts(f"udp://{name}:5000", 2)
+        UdpPorts("udp://no-such-host.invalid:5000", 2)
     assert len(os.listdir("/proc/self/fd")) == before

@@ -7,8 +7,8 @@ from contextlib import closing
 
 import pytest
 
-from omnibot_driver.core.errors import LinkError
-from omnibot_driver.transports.simulated import SimulatedTransport
+from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.transports.simulated import SimulatedTransport, check_address
 
 pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 
@@ -51,7 +51,7 @@ def test_options_that_it_does_not_know_are_refused(url: str, why: str) -> None:
 
     The error message says why, and names the command that lists the options.
     """
-    with pytest.raises(LinkError) as refusal:
-        SimulatedTransport(url, OMNIBOT)
+    with pytest.raises(ParameterError) as refusal:
+        check_address(url, OMNIBOT)
     assert why in str(refusal.value)
     assert "simulator --help" in str(refusal.value)
