@@ -85,8 +85,12 @@ def found(phrase: str) -> Iterator[str]:
 
 @pytest.mark.parametrize("phrase", PATTERNS)
 def test_the_phrase_is_not_used(phrase: str) -> None:
-    """No text uses the phrase. CONTRIBUTING.md says what to write instead."""
-    assert list(found(phrase)) == []
+    """No text uses the phrase. CONTRIBUTING.md has examples of better sentences."""
+    places = "\n".join(found(phrase))
+    assert not places, (
+        f'please write this in other words; "Write plain English" in CONTRIBUTING.md has'
+        f" examples. PATTERNS has all phrases that are rejected.\n{places}"
+    )
 
 
 def test_no_docstring_begins_with_a_conjunction() -> None:
