@@ -6,6 +6,7 @@ This module knows signals and the executor; it does not know what the node does.
 """
 
 import os
+import re
 import select
 import signal
 import sys
@@ -33,6 +34,13 @@ SETUP: Final = (
     "ROS 2 is not set up in this shell, or a library is not installed: `source"
     " /opt/ros/jazzy/setup.bash`, then `rosdep install --from-paths src`"
 )
+
+HINTS: Final = {
+    "parameter override rule": "write -p NAME:=VALUE, and quote an empty text: -p \"NAME:=''\"",
+    "remap rule": "write -r NAME:=VALUE, such as -r __ns:=/robot1",
+    "params file": "check that the file exists and is valid YAML",
+}
+"""What to do about an argument that ROS rejects, by words in the text of ROS."""
 
 
 class Ending:
@@ -91,6 +99,13 @@ def _refuse(why: str) -> int:
     return 2
 
 
+def in_plain_words(text: str) -> str:
+    """Return an error text of ROS without places in its source code, and say what to do."""
+    text = re.sub(r", at \S+:\d+", "", text).removeprefix("Failed to parse ROS arguments: ")
+    text = re.sub(r"\. Error: (error not set|Unknown YAML event|.*lexeme.*)$", "", text)
+    return "; ".join([text, *(hint for words, hint in HINTS.items() if words in text)])
+
+
 def _main(args: list[str]) -> int:
     ending = Ending()
     # This import takes half a second. Ending is ready before it, so a signal during the import
@@ -113,7 +128,9 @@ def _main(args: list[str]) -> int:
     except NameValidationException as error:  # its second line is the name, which may be long
         why = str(error).partition(":\n")[0]
         return _refuse(f"{why}; give another namespace or name: --ros-args -r __ns:=/robot1")
-    except (ParameterError, ParameterException, RCLError) as error:
+    except RCLError as error:
+        return _refuse(in_plain_words(str(error)))
+    except (ParameterError, ParameterException) as error:
         return _refuse(str(error))
     finally:
         rclpy.try_shutdown()

@@ -18,6 +18,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import DescribeParameters, SetParameters, SetParametersAtomically
 
 from omnibot_driver.boards.omnibot import PARAMETERS
+from omnibot_driver.driver import in_plain_words
 
 Start = Callable[..., Any]
 
@@ -82,6 +83,51 @@ def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list
     assert ended.returncode == 2
     assert f"cannot start: unknown argument {' '.join(words)}; give parameters" in ended.stderr
     assert ended.stderr.endswith("like this: --ros-args -p port:=/dev/ttyUSB0\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            "Failed to parse ROS arguments: Couldn't parse parameter override rule: '-p port=x'."
+            " Error: Expected lexeme type (22) not found, search ended at index 4, at"
+            " /src/rcl/lexer_lookahead.c:239, at /src/rcl/arguments.c:352",
+            "Couldn't parse parameter override rule: '-p port=x'; write -p NAME:=VALUE, and quote"
+            " an empty text: -p \"NAME:=''\"",
+        ),
+        (
+            "Couldn't parse params file: '--params-file a.yaml'. Error: Error opening YAML file, at"
+            " ./src/parser.c:271, at ./src/rcl/arguments.c:415",
+            "Couldn't parse params file: '--params-file a.yaml'. Error: Error opening YAML file;"
+            " check that the file exists and is valid YAML",
+        ),
+        ("failed to create a node", "failed to create a node"),
+    ],
+)
+def test_an_error_text_of_ros_is_shortened_and_says_what_to_do(text: str, words: str) -> None:
+    """Places in the source code of ROS and its parser's terms do not help the user."""
+    assert in_plain_words(text) == words
+
+
+@pytest.mark.parametrize(
+    ("arguments", "remedy"),
+    [
+        (["-p", "port=sim"], "; write -p NAME:=VALUE"),
+        (["-p", "port:="], "; write -p NAME:=VALUE"),
+        (["-r", "__ns:=robot1"], "; write -r NAME:=VALUE, such as -r __ns:=/robot1"),
+        (["--params-file", "no-such-file.yaml"], "; check that the file exists"),
+    ],
+)
+def test_an_argument_that_ros_rejects_is_told_with_the_remedy(
+    arguments: list[str], remedy: str
+) -> None:
+    """The text of this computer's ROS is recognised."""
+    command = [sys.executable, "-m", "omnibot_driver.driver", "--ros-args", *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+    assert ended.returncode == 2
+    assert remedy in ended.stderr
+    assert ", at " not in ended.stderr
+    assert "lexeme" not in ended.stderr
 
 
 WITHOUT_ROS = """
