@@ -86,7 +86,8 @@ def _read(path: Path) -> dict[Any, Any]:
     except FileNotFoundError:
         return {}
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise _bad(path, f"cannot be read ({' '.join(str(error).split())})") from error
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
+        raise _bad(path, f"cannot be read ({reason})") from error
     if content is None:
         return {}
     if not isinstance(content, dict):
@@ -96,5 +97,6 @@ def _read(path: Path) -> dict[Any, Any]:
 
 def _bad(path: Path, what: str) -> ParameterError:
     return ParameterError(
-        f"the calibration_file {path} {what}: correct it, or remove it and calibrate again"
+        f"the calibration_file {path} {what}: correct the file or the path, or remove the"
+        " file and calibrate again"
     )

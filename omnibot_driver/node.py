@@ -80,8 +80,13 @@ class OmniBotDriver(Node):
                 hardware_id=port,
                 to_check=self._board.traits.to_check,
             )
-        if advice := selfcheck.clock_advice(port, self.get_parameter("use_sim_time").value):
-            self.get_logger().warning(advice)
+        simulated_time = self.get_parameter("use_sim_time").value
+        for advice in (
+            selfcheck.clock_advice(port, simulated_time),
+            selfcheck.prefix_advice(self._values["frame_prefix"]),
+        ):
+            if advice:
+                self.get_logger().warning(advice)
         self.get_logger().info(f"core: {selfcheck.core_kind()}")
         self._publishing.publish_state()
         self._link.start()

@@ -65,6 +65,16 @@ def waiting_advice(port: str, now_ns: int) -> str:
     )
 
 
+def prefix_advice(prefix: str) -> str:
+    """Return a warning if nothing separates the prefix from the names of frames; else empty."""
+    if not prefix[-1:].isalnum():
+        return ""
+    return (
+        f"frame_prefix '{prefix}' does not end with a slash, so the frame odom is named"
+        f" {prefix}odom; if you do not want this, set frame_prefix to {prefix}/"
+    )
+
+
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     """Return a warning if another node has this full name; otherwise empty.
 

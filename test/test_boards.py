@@ -211,7 +211,8 @@ def test_a_parameter_of_another_board_is_refused_by_that_boards_name(
         boards.check_all({"board": "few", "delta_frame": "earth"})
     assert (
         str(refused.value)
-        == "parameter 'delta_frame' belongs to board omnibot, not to few; remove it"
+        == "parameter 'delta_frame' belongs to board omnibot, not to few; remove it, or set the"
+        " parameter `board`"
     )
     with pytest.raises(ParameterError, match="'tow_distance' belongs to board few, not to omnib"):
         boards.check_all({"tow_distance": 1.0})

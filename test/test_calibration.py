@@ -63,14 +63,14 @@ def test_a_file_that_makes_no_sense_is_an_error_that_says_what_to_do(
     """The file is invalid. The error names the file and says what to do."""
     path = tmp_path / "robot.yaml"
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
-    with pytest.raises(ParameterError, match="correct it, or remove it") as caught:
+    with pytest.raises(ParameterError, match="correct the file or the path, or remove") as caught:
         calibration.load(path, PARAMETERS)
     assert str(path) in str(caught.value)
 
 
 def test_a_folder_is_not_a_file(tmp_path: Path) -> None:
     """The file's path is that of a folder. The error says that it cannot be read."""
-    with pytest.raises(ParameterError, match="cannot be read"):
+    with pytest.raises(ParameterError, match=r"cannot be read \(Is a directory\): correct the"):
         calibration.load(tmp_path, PARAMETERS)
 
 

@@ -76,6 +76,20 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
     assert not warned or (port in text and "use_sim_time:=false" in text)
 
 
+@pytest.mark.parametrize("prefix", ["", "robot1/", "robot1_", "a/b/"])
+def test_a_prefix_that_ends_with_a_separator_is_left_alone(prefix: str) -> None:
+    """The name of a frame is easy to tell from its prefix."""
+    assert selfcheck.prefix_advice(prefix) == ""
+
+
+@pytest.mark.parametrize("prefix", ["robot1", "a/b"])
+def test_a_prefix_without_its_slash_is_told_of_with_the_remedy(prefix: str) -> None:
+    """The warning shows the name of a frame, and what to give instead."""
+    advice = selfcheck.prefix_advice(prefix)
+    assert f"is named {prefix}odom;" in advice
+    assert advice.endswith(f"set frame_prefix to {prefix}/")
+
+
 @pytest.mark.parametrize(
     ("port", "now_ns", "warned"),
     [

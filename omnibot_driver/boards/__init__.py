@@ -98,8 +98,8 @@ def check_all(given: Mapping[str, object]) -> dict[str, Value]:
     for name in given:
         if name not in table.by_name and (owners := owners_of(name)):
             raise ParameterError(
-                f"parameter '{name}' belongs to board {' and '.join(owners)}, not to"
-                f" {table.board}; remove it"
+                f"parameter '{name}' belongs to board {' or '.join(owners)}, not to"
+                f" {table.board}; remove it, or set the parameter `board`"
             )
     return table.check_all(given)
 

@@ -145,7 +145,7 @@ def test_the_monitor_shows_what_the_board_has(
         ),
         (
             {"gyro_bias": "[0.0,0.0,0.0]"},
-            "'gyro_bias' belongs to board omnibot and fejemis, not to plain",
+            "'gyro_bias' belongs to board omnibot or fejemis, not to plain; remove it, or set",
         ),
         ({"track_widt": 0.3}, "no parameter 'track_widt'; the nearest is 'track_width'"),
         ({"gain": 10.0}, "'gain' must be 0 to 9 1, not 10.0"),
