@@ -24,6 +24,7 @@ NO_PYTHON = There is no $(PYTHON) here: please install Python 3.12, or name anot
   make PYTHON=...
 NO_VENV = $(PYTHON) cannot create virtual environments: please install its venv module (on Debian \
   and Ubuntu: apt install $(notdir $(PYTHON))-venv) and run make again.
+UNFORMATTED = Please run make format. It formats these files.
 
 # A ROS installation sourced in this shell must not mix with the one in .venv.
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
@@ -78,13 +79,14 @@ soak: $(VENV)/.test  ## random faults for MINUTES (10)
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)
 
 lint: $(VENV)/.test  ## check formatting, style and types
-	$(PY) -m ruff format --check
+	$(PY) -m ruff format --check || { echo "$(UNFORMATTED)" >&2; exit 1; }
 	$(PY) -m ruff check
 	$(PY) -m mypy
 
-format: $(VENV)/.test  ## format the code and fix what can be fixed
-	$(PY) -m ruff check --fix
+format: $(VENV)/.test  ## format the code, fix what can be fixed, and show the rest
+	$(PY) -m ruff check --fix-only
 	$(PY) -m ruff format
+	$(PY) -m ruff check
 
 clean:  ## remove .venv and everything else that was generated
 	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache build install log *.egg-info

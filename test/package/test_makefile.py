@@ -64,6 +64,36 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
     assert (tmp_path / "theirs/kept").exists()
 
 
+@pytest.fixture
+def venv_with_errors(tmp_path: Path) -> Path:
+    """Return a finished ``.venv`` whose Python notes its arguments, and finds errors in a check."""
+    venv = tmp_path / "venv"
+    (venv / "bin").mkdir(parents=True)
+    python = venv / "bin/python"
+    python.write_text(
+        f'#!/bin/sh\necho "$@" >> {tmp_path}/calls\ncase "$*" in *--check | *check) exit 1; esac\n'
+    )
+    python.chmod(0o755)
+    for stamp in (".runtime", ".test"):
+        (venv / stamp).touch()
+    return venv
+
+
+def test_files_are_formatted_although_errors_remain(venv_with_errors: Path) -> None:
+    """Long lines are errors that the formatter corrects. The remaining errors are shown last."""
+    done = make("format", f"VENV={venv_with_errors}")
+    calls = (venv_with_errors.parent / "calls").read_text().splitlines()
+    assert calls == ["-m ruff check --fix-only", "-m ruff format", "-m ruff check"]
+    assert done.returncode != 0
+
+
+def test_a_file_without_format_is_told_with_the_remedy(venv_with_errors: Path) -> None:
+    """The check of the format fails. One line says which target corrects it."""
+    done = make("lint", f"VENV={venv_with_errors}")
+    assert "Please run make format." in done.stderr
+    assert done.returncode != 0
+
+
 def test_make_alone_lists_every_target() -> None:
     """The default target describes each of the other targets in one line."""
     listed = {line.split()[1] for line in make().stdout.splitlines()}
