@@ -1,0 +1,90 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests that the driver reads each parameter, so that setting it has an effect."""
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from omnibot_driver import boards
+
+PACKAGE = Path(boards.__file__).parent.parent
+PROGRAMS = {"demo", "simulator", "tools"}
+"""Folders of programs that do not receive the driver's parameters."""
+
+
+class Watched(Mapping[str, Any]):
+    """A mapping that records in ``read`` the keys whose values are read."""
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        self._values, self.read = values, set[str]()
+
+    def __getitem__(self, key: str) -> Any:
+        self.read.add(key)
+        return self._values[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+
+@cache
+def strings(file: Path) -> list[str]:
+    """Return patterns of the strings in a module, without the names of parameters' rows.
+
+    An f-string such as ``f"{kind}_minimum"`` is a pattern that matches every kind.
+    """
+    found, rows = [], set[int]()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Parameter":
+            rows.update(id(argument) for argument in node.args[:1])
+        elif isinstance(node, ast.JoinedStr):
+            parts = [
+                re.escape(part.value) if isinstance(part, ast.Constant) else r"\w+"
+                for part in node.values
+            ]
+            if max(map(len, parts)) > len(r"\w+"):
+                found.append("".join(parts))
+        elif (
+            isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in rows
+        ):
+            found.append(re.escape(node.value))
+    return found
+
+
+def own_files(board: str) -> Iterator[Path]:
+    """Yield the driver's modules that may read a parameter of this board."""
+    for file in PACKAGE.rglob("*.py"):
+        parts = file.relative_to(PACKAGE).parts
+        others = tuple(name for name in boards.PROFILES if name != board)
+        of_another = (
+            len(parts) > 1 and parts[0] in {"boards", "core"} and parts[1].startswith(others)
+        )
+        if not of_another and not PROGRAMS & set(parts):
+            yield file
+
+
+@pytest.mark.parametrize("board", boards.PROFILES)
+def test_every_parameter_is_read(board: str) -> None:
+    """Each parameter is a setting of the board, or the driver's code has its name elsewhere."""
+    profile = boards.load(board)
+    watched = Watched(boards.check_all({"board": board}))
+    profile.settings(watched)
+    patterns = {pattern for file in own_files(board) for pattern in strings(file)}
+    named = re.compile("|".join(patterns))
+    without = [
+        row.name
+        for row in profile.PARAMETERS.rows
+        if row.name not in watched.read and not named.fullmatch(row.name)
+    ]
+    assert not without, (
+        f"no code reads these parameters, so they have no effect: {', '.join(without)}. Did you"
+        f" fill the field in `settings` of boards/{board}.py?"
+    )
