@@ -259,4 +259,4 @@ def test_every_source_file_says_whose_it_is() -> None:
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
     files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
     without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]
-    assert not without
+    assert not without, f"the first line must be: {line}"
