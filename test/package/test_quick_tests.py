@@ -38,7 +38,7 @@ def test_none_of_them_imports_ros() -> None:
 def test_a_property_of_many_examples_is_marked_slow() -> None:
     """A property that tries many examples has the mark ``slow``.
 
-    ``make check`` leaves out such tests, so it takes at most a minute.
+    ``make check`` leaves out such tests, so that it stays quick.
     """
     for name, module in modules():
         for node in ast.walk(module):

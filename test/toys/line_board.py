@@ -23,6 +23,7 @@ from omnibot_driver.core.readings import DisplacementReading, Reading
 from omnibot_driver.core.traits import Traits
 from omnibot_driver.parameters import Parameter, table
 from omnibot_driver.transports import Transport
+from omnibot_driver.transports.serial_address import check_address
 from omnibot_driver.transports.serial_port import SerialPort
 from omnibot_driver.transports.several import Several
 
@@ -105,6 +106,8 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
     names = "port", "sense_port"
+    for name in names:
+        check_address(values[name], name, pollable=True)
     return partial(Several, [partial(SerialPort, values[name], 115200, name) for name in names])
 
 

@@ -27,7 +27,7 @@ from omnibot_driver.core.readings import DisplacementReading, Reading
 from omnibot_driver.core.traits import Traits
 from omnibot_driver.parameters import table
 from omnibot_driver.transports import Transport
-from omnibot_driver.transports.udp import UdpPorts
+from omnibot_driver.transports.udp import UdpPorts, check_address
 
 POLL_S, ANSWER_S, HALT_S = 0.1, 1.0, 0.05
 HALT = packed(b"HALT", 1)
@@ -162,6 +162,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], Transport]:
+    check_address(values["port"], 2)
     return partial(UdpPorts, values["port"], 2)
 
 
