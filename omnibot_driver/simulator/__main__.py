@@ -55,7 +55,8 @@ def run(module: SimulatorModule, name: str, argv: Sequence[str] | None) -> int:
     """Run the board of ``module`` until SIGINT, SIGTERM or ``quit``; return the exit code."""
     arguments = _parser(module).parse_args(argv)
     board, lines = options.from_arguments(arguments, module)
-    links = getattr(arguments, "link", None) or []
+    # The driver refuses relative paths, and the hint is for another terminal.
+    links = [os.path.abspath(link) for link in getattr(arguments, "link", None) or []]
     try:
         with (
             _signals_as_readable() as signalled,

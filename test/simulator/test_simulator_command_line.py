@@ -80,6 +80,17 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
     assert f"-p board:=toy_lines -p port:={links[0]} -p front_port:={links[1]}\n" in err
 
 
+def test_the_hint_has_the_whole_path_of_a_link(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The user gives a relative path. The hint works in a terminal with another folder."""
+    monkeypatch.chdir(tmp_path)
+    with toy("toy_lines", "--link", "toy") as process:
+        line(process), line(process)
+        _, err = process.communicate("quit\n", timeout=PATIENCE_S)
+    assert f"-p port:={tmp_path}/toy-drive -p front_port:={tmp_path}/toy-front\n" in err
+
+
 def test_a_board_on_the_network_prints_its_address() -> None:
     """A board on the network prints its UDP address, and has options for network faults.
 
