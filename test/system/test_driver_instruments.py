@@ -106,7 +106,7 @@ def test_a_calibration_that_cannot_be_saved_is_applied_and_says_so(robot: Robot)
     assert not answer.success
     assert answer.message.startswith("gyro bias (0.0")
     assert "it is applied, but not saved" in answer.message
-    assert "correct it" in answer.message
+    assert "correct the file" in answer.message
     assert robot.file.read_text() == "gyro_bias: [1, 2"
 
 
@@ -117,7 +117,7 @@ def test_a_calibration_file_that_makes_no_sense_ends_the_driver(
     path = tmp_path / "robot.yaml"
     path.write_text("gyro_bias: [1, 2")
     driver = start_driver("/dev/null", calibration_file=path)
-    driver.wait_for_line("calibration_file.*correct it, or remove it")
+    driver.wait_for_line("calibration_file.*correct the file or the path, or remove")
     assert driver.end() == 2
 
 
