@@ -48,7 +48,7 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or 
 test: lint $(VENV)/.docs  ## run every check and test
 	$(PY) -m pytest -n 6 --dist loadfile --no-loadscope-reorder  # the longest files first: conftest.py
 
-check: lint  ## check formatting, style and types, and run the quick tests (1 to 5 minutes)
+check: lint  ## check formatting, style and types, and run the quick tests (a minute if the computer is idle)
 	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)
 
 compiled: $(VENV)/.test  ## compile the core into build/compiled, and run its quick tests on that (5 minutes)
