@@ -162,7 +162,9 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
     since_s = server.now_s - motion.moved_s
     if motion.limited and since_s >= motion.stop_after_s:
         stop_motors(server, motion)
-    if since_s <= CORRECTS_AFTER_S or motion.stopping:
+    if since_s <= CORRECTS_AFTER_S:
+        return
+    if motion.stopping and not server.quirks.corrects_after_stop:
         return
     proportional, integral, differential = GAINS
     angle = motion.angle_deg

@@ -14,7 +14,7 @@ from typing import Literal
 class Quirks:
     """Deviations of the public server from its manual: none by default.
 
-    The last three were found in the public source, not on the running server.
+    The last four were found in the public source, not on the running server.
 
     stop_port_keeps_motion: SL stops F, B and RM, but the motion stays "in progress". Later motions
         are refused; a later SM or SRM hangs the command port.
@@ -41,6 +41,8 @@ class Quirks:
     heading_in_reference_moves_only: the heading of RMRA changes in RM only.
     probe_turns: MCR 0 runs the motors until the wheel moves, or 0.5 s with a dead IMU.
     heading_starts_off: RM's first sample adds half the turn rate * time since the previous RM.
+    corrects_after_stop: a heading correction in the sample in which TF, TB, MCF or MCB stops by
+        itself leaves one motor on, usually with one unit.
     """
 
     stop_port_keeps_motion: bool = False
@@ -65,10 +67,16 @@ class Quirks:
     heading_in_reference_moves_only: bool = False
     probe_turns: bool = False
     heading_starts_off: bool = False
+    corrects_after_stop: bool = False
 
 
 DOCUMENTED = Quirks()
-_SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_starts_off")
+_SOURCE_ALONE = (
+    "heading_in_reference_moves_only",
+    "probe_turns",
+    "heading_starts_off",
+    "corrects_after_stop",
+)
 FIRMWARE = Quirks(
     **{field.name: True for field in fields(Quirks) if field.name not in _SOURCE_ALONE}
 )

@@ -15,7 +15,12 @@ from mart_rig import INCH_M, Rig
 from omnibot_driver.simulator.mart import COMMAND, DOCUMENTED, FIRMWARE, SOURCE, Kind, Quirks
 
 CONFLICT = "fail conflicting action in progress"
-IN_SOURCE_ALONE = ("heading_in_reference_moves_only", "probe_turns", "heading_starts_off")
+IN_SOURCE_ALONE = (
+    "heading_in_reference_moves_only",
+    "probe_turns",
+    "heading_starts_off",
+    "corrects_after_stop",
+)
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
@@ -203,6 +208,19 @@ def heading_starts_off(quirks: Quirks) -> bool:
         rig.ask("SRM")
         rig.run(1000.0)
     return abs(first) > 5.0
+
+
+def corrects_after_stop(quirks: Quirks) -> bool:
+    """Return whether the robot creeps after one of forty straight moves has ended."""
+    rig = Rig(quirks, dead_zone_units=0.0)
+    for _ in range(40):
+        assert rig.ask("TF 12").startswith("ok")
+        rig.run(0.5)
+        before = rig.yaw_deg
+        rig.run(2.0)
+        if abs(rig.yaw_deg - before) > 0.5:
+            return True
+    return False
 
 
 SEEN: dict[str, Callable[[Quirks], bool]] = {
