@@ -43,6 +43,9 @@ SLOW_S, DISTURBED_S = 0.06, 5.0
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
 
+NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
+"""The kinds of commands whose replies can look like the reply to another query."""
+
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
@@ -125,6 +128,10 @@ class Conversation:
     def heard(self, form: Form, now: float) -> None:
         """Record that a reply of this form came; its duplicate may come within ``delay_s``."""
         self._copies_until_s[form] = now + self.delay_s
+
+    def answered(self, word: Word, reply: Ok, now: float) -> None:
+        """Record a reply to ``word`` that did not come through ``hear``; a copy of it may come."""
+        self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
         """Record that ``reply`` was late. No other late reply of its form is expected then.
@@ -235,26 +242,31 @@ class Conversation:
         return Answer(pending.request, reply, took_s, when)
 
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
-        """Return whether a reply to the query ``word`` is a duplicate of another query's reply.
+        """Return whether a reply to the query ``word`` is a duplicate of another command's reply.
 
-        This is assumed if another query has just had an equal reply, and the last reply to ``word``
-        was different.
+        This is assumed if another query or a move has just had an equal reply, and the last reply
+        to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA
         before, _ = self._answers.get(word, (reply, now))
-        return reply != before and self._has_come(reply, now, but=word, kind=Kind.QUERY)
+        return reply != before and self._has_come(reply, now, but=word, kinds=NUMBERS)
 
     def _has_come(
-        self, reply: Ok | Fail, now: float, *, but: Word | None = None, kind: Kind | None = None
+        self,
+        reply: Ok | Fail,
+        now: float,
+        *,
+        but: Word | None = None,
+        kinds: frozenset[Kind] = frozenset(Kind),
     ) -> bool:
         """Return whether an identical reply came within the last ``delay_s``.
 
-        ``but``: this command's replies are ignored. ``kind``: only this kind's replies are
-        compared.
+        ``but``: this command's replies are ignored. ``kinds``: only the replies to these kinds of
+        commands are compared.
         """
         return isinstance(reply, Ok) and any(
-            each == reply and until_s > now and word is not but and kind in (None, word.kind)
+            each == reply and until_s > now and word is not but and word.kind in kinds
             for word, (each, until_s) in self._answers.items()
         )
 

@@ -83,18 +83,22 @@ class Done:
         number = float(self.request.data.split()[-1])
         return number * INCH_M if self.is_straight else math.radians(number)
 
+    @property
+    def usual_s(self) -> float:
+        """The usual duration of the move, in s."""
+        number = float(self.request.data.split()[-1])
+        slow = 2 if b"SLOW" in self.request.data.split() else 1
+        return SETTLES_S + slow * number * (S_PER_IN if self.is_straight else S_PER_DEG)
+
     def may_have_run_twice(self, delay_s: float) -> bool:
         """Return whether the server may have run the move twice, from a duplicated datagram.
 
         The encoder count then covers only the second run.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
-        number = float(self.request.data.split()[-1])
-        slow = 2 if b"SLOW" in self.request.data.split() else 1
-        usual_s = SETTLES_S + slow * number * (S_PER_IN if self.is_straight else S_PER_DEG)
         like = abs(seen - self.asked) <= LEAST_LIKE * self.asked
-        short = self.lasted_s <= LONGER * usual_s + 2 * delay_s
-        return not (like and short and self.quiet_s < usual_s / 2)
+        short = self.lasted_s <= LONGER * self.usual_s + 2 * delay_s
+        return not (like and short and self.quiet_s < self.usual_s / 2)
 
 
 class Surplus:

@@ -127,7 +127,9 @@ class Ground:
         self._start: Word | None = None
         self._refused = False
         self._moved_last = False
-        self._copies_stopped_s = -math.inf
+        self._start_owed_until_s = -math.inf
+        self._copies_stopped_s = self._first_copy_stop_s = -math.inf
+        self._port_free_s = math.inf
         self._port_is_free = self._greeted_before = False
         self._moved_by: Request | None = None
         self._rolled = False

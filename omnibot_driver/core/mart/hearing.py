@@ -50,9 +50,10 @@ class Hearing(Measuring):
             late = isinstance(reply, Ok) and self._may_be_late(reply, now)
             if isinstance(reply, Ok):
                 self.conversation.heard(reply.form, now)
-            if late or self._may_be_count(reply):
+            likely = not self._may_be_count(reply)
+            if late or not likely:
                 if isinstance(reply, Ok):
-                    self._stopping.doubt(reply)
+                    self._stopping.doubt(reply, likely=likely)
                 return
             if self._stopping.hear(reply, now):
                 self._stopped(now)
@@ -85,6 +86,8 @@ class Hearing(Measuring):
         if self.state is State.MOVING and now >= self._started_s + GREET_S:
             self._free_s = min(self._free_s, now + self._delay_s)  # the reply may be on its way
         if now >= self._started_s + 2 * self._delay_s and not self._greeted_before:
+            if not self._port_is_free:
+                self._port_free_s = now
             self._port_is_free = True  # a copy of the move would be ahead of HELLO in the queue
         if self.state is State.ASKING:
             self._named_s = now
@@ -123,6 +126,7 @@ class Hearing(Measuring):
             self._moved(reply, now, sure=not answer.when.doubtful)
         elif word is words.SSP:
             if not self._turns.answered(reply):
+                self.imu.again_s = now + self._delay_s  # until then, a copy may look like its reply
                 self._once(SETTING_REFUSED)
         else:
             self.jobs.answered(answer, now)

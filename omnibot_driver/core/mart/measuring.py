@@ -93,10 +93,11 @@ class Measuring(Starts):
         if self.state is State.STILL:
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
             if rested and self.odometry.motion is not Motion.NONE:
-                twice = self._doubt_a_copy(now)
-                self.odometry.rest()
                 move, self._moved_by = self._moved_by, None
-                if move is not None and twice and self._copies_stopped_s > self._rested_s:
+                stopped = move is not None and self._stopped_a_copy(move, now)
+                twice = self._doubt_a_copy(now, suspected=stopped)
+                self.odometry.rest()
+                if stopped and twice:
                     self._discard_goal()
                 elif move is not None:
                     self._learn_from(move, now)
@@ -113,9 +114,9 @@ class Measuring(Starts):
             return
         self._move.fail()
         self._notice(
-            "the network may have delivered a controlled move twice, so the driver has sent a stop;"
-            " the driven distance is unknown, so the goal of cmd_pose is discarded: check the"
-            " network, then send the goal again",
+            "the server did not answer in time after a controlled move, so the driver has stopped a"
+            " possible copy of it; the driven distance is unknown, so the goal of cmd_pose is"
+            " discarded: check the network, then send the goal again",
             halt=True,
         )
 

@@ -7,6 +7,7 @@ time.
 """
 
 import math
+from typing import Final
 
 from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.errors import RequestRefused
@@ -18,6 +19,9 @@ from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
 from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
+
+LEAST_STOP_S: Final = 0.3
+"""Shortest time in s from SL or SS until the server answers again, if they stop a move."""
 
 
 class Moves(Asking):
@@ -114,26 +118,44 @@ class Moves(Asking):
                 self._records.used(odometry.turn.spun_rad, wheel_rad)
         self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
 
-    def _doubt_a_copy(self, now: float) -> bool:
-        """Return whether the server may have run the last controlled move twice.
+    def _done(self, move: Request, free_s: float) -> Done:
+        """Return the last move with its measurements.
+
+        ``free_s``: time of the first reply after the move.
+        """
+        return Done(
+            move,
+            self.odometry.moved_m,
+            self.odometry.turn.spun_rad,
+            lasted_s=self._rested_s - self._started_s,
+            quiet_s=free_s - self._rested_s + self._delay_s,
+        )
+
+    def _stopped_a_copy(self, move: Request, now: float) -> bool:
+        """Return whether SL and SS may have stopped a copy of ``move``.
+
+        They have not if the server has answered sooner than it can end a motion. A copy that had
+        ended by itself would have taken less than half of its usual time.
+        """
+        if self._copies_stopped_s < self._rested_s:
+            return False
+        free_s = min(now, self._port_free_s)
+        quick = free_s < self._first_copy_stop_s + LEAST_STOP_S
+        done = self._done(move, free_s)
+        return not (quick and done.quiet_s < done.usual_s / 2)
+
+    def _doubt_a_copy(self, now: float, *, suspected: bool) -> bool:
+        """Return whether the server may have run the last controlled move twice, by its count.
 
         The encoder count then covers only the second run, so the uncertainty grows.
         """
         move, self._last_move = self._last_move, None
-        suspected = self._copies_stopped_s > self._rested_s or self.conversation.disturbed(now)
-        if move is None or not suspected:
+        if move is None or not (suspected or self.conversation.disturbed(now)):
             return False
-        odometry = self.odometry
-        done = Done(
-            move,
-            odometry.moved_m,
-            odometry.turn.spun_rad,
-            lasted_s=self._rested_s - self._started_s,
-            quiet_s=now - self._rested_s + self._delay_s,
-        )
+        done = self._done(move, now)
         twice = done.may_have_run_twice(self._delay_s)
         if twice:
-            odometry.doubt.add(
+            self.odometry.doubt.add(
                 *((done.asked**2, 0.0) if done.is_straight else (0.0, done.asked**2))
             )
         return twice

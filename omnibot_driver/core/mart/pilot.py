@@ -174,6 +174,8 @@ class Pilot(Hearing):
             self._halt(now, "" if why == "wanted" else why)
             return self._keep_stopping(now)
         if now >= self._copy_stop_s:
+            if self._copies_stopped_s < self._rested_s:
+                self._first_copy_stop_s = now
             self._copies_stopped_s = now
             return self._send((words.SL, words.SS), now)
         if self.state is State.MOVING and now >= self._free_s:

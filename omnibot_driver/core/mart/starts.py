@@ -152,6 +152,8 @@ class Starts(Adjusting):
             if self.imu.dead and not was_dead:
                 self.jobs.cancel(self.health.refusal)
                 self._notice(self.health.refusal, halt=True)
+            if self.imu.word is not answer.word:
+                self.imu.again_s = now + self._delay_s  # a copy may look like the next reply
             return
         self._again_s = self.imu.again_s = now + AGAIN_S
         reason = reply.reason if isinstance(reply, Fail) else ""
@@ -168,6 +170,7 @@ class Starts(Adjusting):
         self._moved_last = start.word.kind is Kind.MOVE
         self.state, self.motion = State.STARTING, STARTS[start.word]
         self._recorded, self._port_is_free = None, False
+        self._port_free_s, self._start_owed_until_s = math.inf, -math.inf
         self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused = start.word, False
         self._started_s = now
@@ -218,6 +221,8 @@ class Starts(Adjusting):
         copies_s = self._started_s + 2 * self._delay_s  # of RST IMU, whose reply is ok too
         sure = not self.conversation.disturbed(now) or now >= copies_s
         self.odometry.started(now, sure=sure and not answer.when.doubtful)
+        if not sure:  # the start's own reply may still come
+            self._start_owed_until_s = self._started_s + answer.word.takes_s + 2 * self._delay_s
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
 
@@ -233,8 +238,8 @@ class Starts(Adjusting):
         if reply.reason == words.CONFLICT:
             self.motion = Motion.UNKNOWN
             why = (
-                "another motion is in progress; look for another program that commands the robot,"
-                " or for a network that duplicates datagrams"
+                "another motion is in progress: the network has delivered the command twice, or"
+                " another program commands the robot"
             )
         elif word is words.RM and self._is_of_another(reply, now):
             if reply.reason in ("", words.NO_START):

@@ -99,7 +99,7 @@ class Stopping:
         self._own_from_s = started_s + 2 * delay_s
         self._unsure_until_s = -math.inf
         self._owed = owed
-        self._doubtful: list[Ok] = []
+        self._doubtful: list[tuple[Ok, bool]] = []
         self._rounds = 0
         self._negative: set[str] = set()
         longest_s = max((word.takes_s for word in HALTS[motion]), default=0.0)
@@ -163,18 +163,24 @@ class Stopping:
             self._negative.add(reply.reason)
         return self.motion is not Motion.UNKNOWN or len(self._negative) == len(HALTS[self.motion])
 
-    def doubt(self, reply: Ok) -> None:
-        """Record a reply that may belong to the stop, but may also be late or a copy."""
+    def doubt(self, reply: Ok, *, likely: bool = True) -> None:
+        """Record a reply that may belong to the stop, but may also be late or a copy.
+
+        ``likely``: whether the number in it is plausible for the reply to the stop.
+        """
         if reply.form in ANSWERS.get(self.motion, ()):
-            self._doubtful.append(reply)
+            self._doubtful.append((reply, likely))
 
     @property
     def doubtful_result(self) -> Ok | None:
-        """The last doubtful reply, if it is probably the reply to the stop; else None.
+        """The doubtful reply that is probably the reply to the stop, or None.
 
-        It is, on a good network, if more replies came than were missing.
+        On a good network, there is one if more replies came than were missing: the last likely one.
         """
-        return self._doubtful[-1] if len(self._doubtful) > self._owed else None
+        if len(self._doubtful) <= self._owed:
+            return None
+        likely = [reply for reply, likely in self._doubtful if likely]
+        return likely[-1] if likely else self._doubtful[-1][0]
 
     def _is_answer(self, reply: Reply) -> bool:
         words = HALTS[self.motion]

@@ -147,6 +147,8 @@ class Stops(Ground, ABC):
         pending = self.conversation.pending
         answers = ANSWERS.get(self.motion, ())
         owed = int(pending is not None and any(form in answers for form in pending.word.forms))
+        # a copy of the check's reply may have been taken for the start's
+        owed += now < self._start_owed_until_s and self.conversation.doubles(now)
         self.conversation.give_up(now)
         move = self._start if self.motion in (Motion.STRAIGHT, Motion.TURN) else None
         self.odometry.stopping(now)
@@ -193,6 +195,8 @@ class Stops(Ground, ABC):
         if stopping.move is not None and result is None:
             for form in stopping.move.forms:
                 self.conversation.owes(form, now)  # the reply to the move
+        elif stopping.move is not None and isinstance(result, Ok):
+            self.conversation.answered(stopping.move, result, now)
         if stopping.began:
             self.odometry.wheel.started()
         elif (

@@ -1,0 +1,182 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests that a reply is not taken for another one on a network that delays or duplicates it."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from mart_bench import MartBench
+from test_mart_goal_network import drops, on, reach
+
+from omnibot_driver.core.events import Notice
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.replies import Ok
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.stopping import Stopping
+from omnibot_driver.core.mart.words import Form
+from omnibot_driver.simulator.common.network import NetworkFaults
+
+pytestmark = pytest.mark.slow
+
+
+def texts(bench: MartBench, since: int = 0) -> list[str]:
+    """Return the driver's messages since the event with this number."""
+    return [each.text for each in bench.events[since:] if isinstance(each, Notice)]
+
+
+def once(chosen: Callable[[bytes], bool]) -> Callable[[bytes], bool]:
+    """Return a function that is true only for the first datagram for which ``chosen`` is true."""
+    seen: list[bytes] = []
+
+    def first(data: bytes) -> bool:
+        if seen or not chosen(data):
+            return False
+        seen.append(data)
+        return True
+
+    return first
+
+
+def twice(path: Any, copied: Any, later_s: float) -> None:
+    """Let ``path`` deliver a copy of each datagram for which ``copied`` is true."""
+    real = path.send
+
+    def send(data: bytes, at_s: float) -> None:
+        real(data, at_s)
+        if copied(data):
+            real(data, at_s + later_s)
+
+    path.send = send
+
+
+def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
+    """SM overtakes ENC. So the count comes after the angle.
+
+    The count is far from the expected angle. The driver must not learn from it how fast the motors
+    turn.
+    """
+    bench = on(NetworkFaults(), "source")
+    path = bench.robot.network[0].to_board
+    real = path.send
+    path.send = lambda data, at_s: real(data, at_s + (0.03 if data == b"ENC" else 0.0))
+    bench.command(0.0, 0.5, 4.0)
+    lines = [(line.slope, line.offset) for line in bench.board._pilot.loop.lines()]
+    pilot = bench.board._pilot
+
+    def waits_for_count() -> bool:
+        pending = pilot.conversation.pending
+        return pending is not None and pending.word is words.ENC
+
+    bench.run_until(waits_for_count)
+    bench.try_command(0.0, 0.0)
+    since = len(bench.odometry)
+    bench.run(2.0)
+    assert bench.said()[-1] == b"SM"
+    errors = [abs(math.remainder(each.pose.yaw_rad - 2.0, math.tau)) for each in bench.odometry]
+    assert max(errors[since:]) < 1.0
+    for before, line in zip(lines, pilot.loop.lines(), strict=True):
+        assert line.slope == pytest.approx(before[0], rel=0.3)
+    bench.command(-0.2, 0.0, 4.0)
+    assert texts(bench) == []
+
+
+def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
+    """Two numbers came although one reply was missing. The likely one is the angle."""
+    stopping = Stopping(Motion.SPIN, 10.0, delay_s=0.3, started_s=0.0, owed=1)
+    stopping.doubt(Ok(Form.INTEGER, "137"))
+    assert stopping.doubtful_result is None
+    stopping.doubt(Ok(Form.INTEGER, "1214"), likely=False)
+    assert stopping.doubtful_result == Ok(Form.INTEGER, "137")
+
+
+def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
+    """A documented server has neither SSP nor RST IMU. Each of its refusals comes twice."""
+    bench = on(NetworkFaults(), "documented")
+    twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
+    bench.command(0.3, 0.0, 3.0)  # from now on, the driver checks the IMU by MCR SLOW 0
+    bench.run(2.0)
+    bench.command(0.0, 0.9, 4.0)
+    assert not bench.robot.stands
+    assert not any("check of the IMU failed" in each for each in texts(bench))
+
+
+def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
+    """The reply to a stopped move comes twice, the second time before the count."""
+    bench = on(NetworkFaults(), "firmware")
+    network, pilot = bench.robot.network[0].from_board, bench.board._pilot
+    real = network.send
+
+    def send(data: bytes, at_s: float) -> None:
+        number = data[3:].isdigit()
+        late = number and bench.written[-1][1] == b"ENC" and pilot._rested_s > bench.now - 0.2
+        real(data, at_s + (0.1 if late else 0.0))
+        if number and pilot._stopping is not None:
+            real(data, at_s + 0.05)
+
+    network.send = send
+    bench.go_to(2.0, 0.0, 0.0)
+    bench.run_until(lambda: bench.truth.x_m > 0.5)
+    bench.try_command(0.0, 0.0)
+    bench.run(4.0)
+    assert bench.error.way_m < 0.05
+    assert texts(bench) == []
+
+
+@pytest.mark.parametrize("copied", [False, True])
+def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
+    """All replies are late by 0.28 s, so the driver stops a possible copy of each move.
+
+    Each HELLO in a move is lost. Its answer would come soon after the move. Without a copy, the
+    replies come sooner than a server that stops a copy can send them.
+    """
+    bench = on(NetworkFaults(), "source")
+    network = bench.robot.network[0]
+    real = network.from_board.send
+    network.from_board.send = lambda data, at_s: real(data, at_s + 0.28)
+    pilot = bench.board._pilot
+    drops(network.to_board, lambda data: data == b"HELLO" and pilot.state is State.MOVING)
+    if copied:
+        twice(network.to_board, lambda data: data.startswith(b"TF"), 0.1)
+    said = reach(bench, Pose(1.5, 0.0, 0.0))
+    assert b"SL" in bench.said()
+    assert ("discarded" in said) is copied
+    if not copied:
+        assert said == ""
+        assert bench.truth.way_to(Pose(1.5, 0.0, 0.0)).way_m < 0.12
+
+
+def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
+    """A copy of the check's ``ok`` is taken for the reply to B. The stop of B is lost once.
+
+    The true reply to B comes after the stop. The driver must not take it for that of the stop.
+    """
+    bench = on(NetworkFaults(), "firmware")
+    network = bench.robot.network[0]
+    real = network.from_board.send
+
+    def send(data: bytes, at_s: float) -> None:
+        said = bench.said()[-1]
+        real(data, at_s + (0.28 if data == b"ok" and said in (b"B SLOW", b"SM") else 0.0))
+        if data == b"ok" and said == b"RST IMU":
+            real(data, at_s + 0.1)
+            real(data, at_s + 0.11)
+        elif bench.written[-1][1] == b"RMRA" and data != b"ok":
+            real(data, at_s + 0.005)
+
+    network.from_board.send = send
+    bench.run(1.0)
+    stops = drops(network.to_board, once(lambda data: data == b"SM"))
+    bench.command(-0.17, 0.0, 0.1)  # at this speed, no CS is needed
+    bench.run_until(lambda: bench.said()[-1] == b"B SLOW")
+    began_s = bench.now
+    while bench.now < began_s + 0.35:
+        bench.command(-0.17, 0.0, 0.1)
+    bench.try_command(0.0, 0.0)
+    bench.run(0.2)
+    assert stops
+    bench.run(1.0)
+    assert bench.robot.stands
+    assert texts(bench) == []  # the driver has not taken the motion for that of another program
