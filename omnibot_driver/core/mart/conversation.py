@@ -7,7 +7,7 @@ it does not know what the requests are for. The caller passes the time.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from omnibot_driver.core.mart.moment import Moment
@@ -196,6 +196,11 @@ class Conversation:
             self._owes_until(word, self.pending.sent_s)
         self.pending = None
         return word
+
+    def hurry(self, until_s: float) -> None:
+        """Wait for the reply to the pending request until ``until_s`` at most."""
+        if self.pending is not None:
+            self.pending = replace(self.pending, until_s=min(self.pending.until_s, until_s))
 
     def overdue(self, now: float) -> Word | None:
         """Give up the pending request if its reply is overdue; return its command, else None."""

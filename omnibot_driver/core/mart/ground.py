@@ -48,6 +48,8 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 
 The silence is ABSENT_S (s), plus the duration of ABSENT_TRIPS exchanges.
 """
+PRESENT_S: Final = 0.35
+"""Silence in s up to which a server has certainly not been restarted."""
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
 
@@ -128,6 +130,7 @@ class Ground:
         self._refused = False
         self._moved_last = False
         self._start_owed_until_s = -math.inf
+        self._greetings: list[float] = []  # times of HELLOs without an answer
         self._copies_stopped_s = self._first_copy_stop_s = -math.inf
         self._port_free_s = math.inf
         self._port_is_free = self._greeted_before = False
@@ -138,6 +141,7 @@ class Ground:
         self._records.connect()
         self._file_s = -math.inf
         self._started_s = self._begun_s = self._harmful_s = self._halted_s = -math.inf
+        self._present_s = self._served_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._blocked: Motion = Motion.NONE
         self._obstacle_told = False
@@ -177,10 +181,23 @@ class Ground:
         """Return the odometry, predicted to ``now``."""
         return self.odometry.told(now, blind_since_s=self.blind_since_s)
 
+    @property
+    def _absent_s(self) -> float:
+        """Silence in s after which a server that need not be busy is regarded as absent."""
+        return ABSENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
+
+    @property
+    def _seems_present(self) -> bool:
+        """Whether the server was not absent, not even for a short restart, since ``_present_s``."""
+        most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
+        return self.heard_s <= self._present_s + most_s
+
     def _hears(self, now: float) -> None:
         """Record a reply, and whether it is the first one after an absence of the server."""
-        most_s = ABSENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
-        if self.state is State.CHECKING:
+        most_s = self._absent_s
+        if self.heard_s <= self._served_s:
+            most_s = ABSENT_BUSY_S  # the driver has waited for pieces of a file
+        elif self.state is State.CHECKING:
             most_s += self.imu.word.takes_s
         elif self.state not in (State.STILL, *ROLLING):
             most_s = ABSENT_BUSY_S
@@ -253,6 +270,7 @@ class Ground:
 
     def _greet(self, now: float) -> Packets:
         self._greeted_s = now
+        self._greetings.append(now)
         return ((words.COMMAND, words.HELLO.request().data),)
 
     def _ask(self, request: Request, now: float) -> Packets:

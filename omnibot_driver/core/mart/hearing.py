@@ -9,12 +9,12 @@ import math
 from typing import Final
 
 from omnibot_driver.core.mart import words
-from omnibot_driver.core.mart.conversation import Answer
+from omnibot_driver.core.mart.conversation import QUICKEST_S, SLOW_S, Answer
 from omnibot_driver.core.mart.ground import GREET_S
 from omnibot_driver.core.mart.measuring import Measuring
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.spot_turns import SETTING_REFUSED
-from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.core.mart.states import ROLLING, Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
@@ -89,11 +89,34 @@ class Hearing(Measuring):
             if not self._port_is_free:
                 self._port_free_s = now
             self._port_is_free = True  # a copy of the move would be ahead of HELLO in the queue
+        self._hurry(now)
         if self.state is State.ASKING:
             self._named_s = now
         if self.state is State.LOST:
             self._ask_what_moves(now)
             self._named_s = self._name_from_s
+
+    def _hurry(self, now: float) -> None:
+        """Wait no longer for a reply, because the server has answered a later HELLO before it."""
+        greeted_s = self._greeted_of_name(now)
+        network = self.conversation
+        pending = network.pending
+        if pending is None or greeted_s <= pending.sent_s:
+            return
+        if self.state is State.STARTING:
+            if self._seems_present:
+                self._present_s = now
+            if greeted_s >= self._started_s + self._delay_s:  # HELLO has not overtaken the start
+                network.hurry(now + min(self._delay_s, 3 * network.answered_trip_s))
+        elif self.state in ROLLING and network.answered_trip_s < SLOW_S:
+            network.hurry(now)
+
+    def _greeted_of_name(self, now: float) -> float:
+        """Return the earliest time at which the answered HELLO may have been sent."""
+        longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self.conversation.answered_trip_s)
+        recent = [each for each in self._greetings if each >= now - longest_s]
+        self._greetings = recent[1:]
+        return recent[0] if recent else -math.inf
 
     def _named_in_a_move(self, now: float) -> None:
         """Stop any motion, because the server gives its name although a move should keep it busy.

@@ -155,9 +155,9 @@ class Pilot(Hearing):
         if (word := self.conversation.overdue(now)) is not None:
             self._missed(word, now)
         self.jobs.tick(now)
-        if self.state is State.SERVING and not self.jobs.collecting:
-            pending = self.conversation.pending
-            self.state = State.STILL if pending is None else self.state
+        busy = self.jobs.collecting or self.conversation.pending is not None
+        if self.state is State.SERVING and not busy:
+            self.state, self._served_s = State.STILL, now
         if self.state is State.UNKNOWN:
             self._halt(now)
         if self.state is State.STOPPING:
@@ -193,6 +193,8 @@ class Pilot(Hearing):
         """The time at which to send HELLO. An answer shows that the server is not absent."""
         if self.state is State.MOVING:
             return self._greet_s
+        if self.state is State.STARTING:
+            return max(self._started_s + self._delay_s, self._greeted_s + GREET_AGAIN_S)
         if self.state in (State.STILL, State.CHECKING, *ROLLING):
             silent_s = SILENT_S + 2 * self.conversation.answered_trip_s
             if self.state is State.CHECKING:

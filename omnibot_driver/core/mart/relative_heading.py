@@ -42,6 +42,8 @@ class RelativeHeading:
     ``from_s``: earliest time of the last heading that certainly answers RMRA.
 
     ``changed_s``: time of the last change of heading.
+
+    ``same``: number of equal headings since then.
     """
 
     def __init__(self) -> None:
@@ -50,6 +52,7 @@ class RelativeHeading:
         self._angle_rad: float | None = None
         self._before_rad = 0.0
         self._turned_rad = 0.0
+        self.same = 0
         self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 
@@ -81,6 +84,7 @@ class RelativeHeading:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
         self._turned_rad = 0.0
         self._track.clear()
+        self.same = 0
         self.changed_s = now
 
     def started(self) -> None:
@@ -118,8 +122,9 @@ class RelativeHeading:
         if not (when.doubtful and turn_rad):
             self.from_s = when.from_s
         self._take(angle_rad, when)
+        self.same += 1
         if turn_rad:
-            self.changed_s = at_s
+            self.changed_s, self.same = at_s, 0
         return bool(turn_rad)
 
     def _take(self, angle_rad: float, when: Moment) -> None:

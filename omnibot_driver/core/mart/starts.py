@@ -173,7 +173,7 @@ class Starts(Adjusting):
         self._port_free_s, self._start_owed_until_s = math.inf, -math.inf
         self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused = start.word, False
-        self._started_s = now
+        self._started_s = self._present_s = now
         self.imu.used()
         _, twist = self._wish(now)
         self.commanded = twist

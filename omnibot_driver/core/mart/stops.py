@@ -26,12 +26,14 @@ from omnibot_driver.core.mart.stopping import ANSWERS, SLOW_STOP, Stopping, is_s
 from omnibot_driver.core.mart.words import Form
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
-BLIND_S, TRIPS = 0.8, 3
+BLIND_S, TRIPS = 0.8, 5
 """Longest allowed drive without measurements: BLIND_S (s), plus TRIPS exchange durations."""
-FROZEN_S: Final = 0.5
-"""The robot is stopped if the heading is constant for this time in s plus two exchanges.
+FROZEN_S, FROZEN_TIMES = 0.5, 3
+"""The robot is stopped if the heading is constant, because the IMU is dead or the robot is stuck.
 
-The IMU is dead, or the robot is stuck.
+``FROZEN_S``: for this time in s plus two exchanges. ``FROZEN_TIMES``: in this number of replies.
+
+On a slow network, fewer replies may be equal by chance, or come before the wag (see WAG_S).
 """
 NO_START_S: Final = 1.5
 """Time in s after a start within which the robot must begin to move."""
@@ -113,7 +115,8 @@ class Stops(Ground, ABC):
         if self.state is State.DRIVING and self.loop.blocked_s > BLOCKED_S:
             return HALF_STUCK
         longest_s = FROZEN_S + 2 * self.conversation.trip_s
-        if self._heading_is_told and self._frozen_s > longest_s:
+        frozen = odometry.heading.same >= FROZEN_TIMES and self._frozen_s > longest_s
+        if self._heading_is_told and frozen:
             if self.motion is not Motion.SPIN and abs(odometry.speeds.means[0]) < CREEP_MPS:
                 return STUCK
             return "the relative heading does not change: the IMU is dead"
@@ -222,7 +225,9 @@ class Stops(Ground, ABC):
         elif isinstance(result, Fail):
             self._failed(motion, result, now)
         elif result is None and motion is not Motion.UNKNOWN and not self._refused:
-            self._appears(now)  # the server knows of no motion, so maybe it was restarted
+            lost = self._begun_s < self._started_s and self._seems_present
+            if not lost:
+                self._appears(now)  # the server knows of no motion, so maybe it was restarted
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
             self._swept_s = now

@@ -1,0 +1,141 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests that the robot drives as commanded on a network that loses and delays datagrams."""
+
+import math
+
+import pytest
+from mart_bench import MartBench
+from test_mart_goal_network import EVERY_FIRMWARE, drops, on
+from test_mart_late_replies import once, texts
+
+from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.simulator.common.network import NetworkFaults
+from omnibot_driver.simulator.mart import Firmware
+
+pytestmark = pytest.mark.slow
+
+
+def seconds_to_move(bench: MartBench, vx: float, limit_s: float = 9.0) -> float:
+    """Command the speed until the robot moves, and return how long that takes, in s."""
+    began_s: float = bench.now
+    while bench.robot.stands and bench.now < began_s + limit_s:
+        bench.command(vx, 0.0, 0.1)
+    return float(bench.now - began_s)
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("vx", [0.3, -0.2])
+def test_a_drive_goes_on_although_datagrams_take_up_to_three_tenths_of_a_second(
+    vx: float, seed: int, firmware: Firmware
+) -> None:
+    """An exchange takes up to 0.6 s, and the driver makes up to four between two counts."""
+    bench = on(NetworkFaults(delay_s=0.3), firmware, seed)
+    bench.command(vx, 0.0, 5.0)
+    began_m = bench.truth.x_m
+    bench.command(vx, 0.0, 5.0)
+    assert texts(bench) == []
+    assert bench.truth.x_m - began_m == pytest.approx(5.0 * vx, rel=0.12)
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+@pytest.mark.parametrize("seed", range(6))
+def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
+    seed: int, firmware: Firmware
+) -> None:
+    """Each tenth datagram is lost in both directions. Only a lost start may stop the robot."""
+    bench = on(NetworkFaults(lose=0.1), firmware, seed)
+    bench.command(0.3, 0.0, 10.0)
+    assert set(texts(bench)) <= {"the controller did not answer RM; robot stopped"}
+
+
+def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> None:
+    """All replies to RMRA in the first 0.9 s of a drive are lost.
+
+    The heading that comes then is the first one, so it cannot be constant.
+    """
+    bench, started_s = on(NetworkFaults(), "firmware"), math.inf
+
+    def lost(data: bytes) -> bool:
+        return bool(bench.written[-1][1] == b"RMRA" and bench.now < started_s + 0.9)
+
+    drops(bench.robot.network[0].from_board, lost)
+    bench.command(0.1, 0.0, seconds_to_move(bench, 0.1))
+    started_s = bench.now
+    bench.command(0.1, 0.0, 3.0)
+    assert texts(bench) == []
+    assert not bench.robot.stands
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) -> None:
+    """On a network with late replies, two headings are often equal by chance."""
+    for seed in (5, 12, 14):
+        bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
+        for _ in range(3):
+            bench.command(-0.2, 0.0, 6.0)
+            bench.command(0.3, 0.0, 6.0)
+        assert not any("IMU" in each for each in texts(bench))
+
+
+def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
+    """The server answers one request after the other, so a count would have come before.
+
+    The driver queries the count again within 0.25 s, and not after 0.36 s.
+    """
+    bench = on(NetworkFaults(), "firmware")
+    bench.command(0.3, 0.0, 3.0)
+    first = len(bench.written)
+    path = bench.robot.network[0].from_board
+    gone = drops(path, once(lambda data: bench.written[-1][1] == b"ENC"))
+    bench.run_until(lambda: bool(gone))
+    lost_s = bench.now
+    asked = sum(data == b"ENC" for _, data in bench.written[first:])
+    while sum(data == b"ENC" for _, data in bench.written[first:]) == asked:
+        bench.run(0.01)
+    assert bench.now - lost_s < 0.25
+
+
+@pytest.mark.parametrize(("vx", "start"), [(0.3, b"RM"), (-0.2, b"B SLOW")])
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: bytes) -> None:
+    """The first start command is lost. An answer to HELLO shows that, so the server was present."""
+    bench = on(NetworkFaults(), firmware)
+    path = bench.robot.network[0].to_board
+    lost = drops(path, once(lambda data: data.startswith(start)))
+    assert seconds_to_move(bench, vx) < 1.5
+    assert len(lost) == 1
+
+
+def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
+    """The server is absent for 0.5 s from the start on. The next motion waits for 1.5 s."""
+    bench = on(NetworkFaults(), "firmware")
+    network, away_s = bench.robot.network[0], math.inf
+
+    def lost(data: bytes) -> bool:
+        nonlocal away_s
+        if data.startswith(b"RM ") and math.isinf(away_s):
+            away_s = bench.now
+        return bench.now < away_s + 0.5 and not math.isinf(away_s)
+
+    drops(network.to_board, lost)
+    seconds_to_move(bench, 0.3)
+    starts_s = [at_s for at_s, _, data in bench.server.received if data.startswith(b"RM ")]
+    assert bench.now - away_s > 2.0
+    assert starts_s
+
+
+def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
+    """The driver waits for a lost piece for 1 s. After that, the next drive begins at once."""
+    bench = on(NetworkFaults(), "firmware")
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(2.0)
+    assert bench.job(Job.LOG).success
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(2.0)
+    drops(bench.robot.network[0].from_board, once(lambda data: len(data) == 512))
+    assert "were lost" in bench.job(Job.LAST_MOVE).message
+    bench.run(0.1)
+    assert not bench.board._pilot.jobs.log_may_be_lost
+    assert seconds_to_move(bench, 0.3) < 0.8
