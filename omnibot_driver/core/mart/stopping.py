@@ -38,8 +38,8 @@ The move has then usually ended.
 """
 
 SLOW_STOP: Final = (
-    "the wheels still turned 0.6 s after a stop, so the server reports a failure; the robot is"
-    " heavy or fast, or rolls down a slope; the driver continues"
+    "the wheels still turned 0.6 s after the server's stop: the robot is heavy or fast, or rolls"
+    " down a slope, or the server has left a motor on; the driver continues"
 )
 NO_START_S: Final = 0.75
 """Time in s after which MCR and MCL do not fail any more because no wheel has turned.

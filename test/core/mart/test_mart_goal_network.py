@@ -92,7 +92,7 @@ def test_losses_end_few_goals_and_the_odometry_stays_right(firmware: Firmware) -
         for _ in range(4):
             goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
             discarded += "discarded" in reach(bench, goal)
-            assert bench.error.way_m < 0.1
+            assert bench.error.way_m < 0.15
             assert yaw_error(bench) < 0.2 + 2 * bench.odometry[-1].covariance.yaw_yaw ** 0.5
     assert discarded <= 8
 
