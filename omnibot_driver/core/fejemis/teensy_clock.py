@@ -23,6 +23,9 @@ AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """A new clock begins after ``AGAIN`` implausible times in a row, over ``AGAIN_AFTER_S``, that agree
 with their arrivals within ``AGREE_S``."""
+EARLIES_WITHIN_S: Final = 1.0
+"""Time in s within which ``AGAIN`` lines that seem early show that the clock began with a late
+line. Other lines may come between them: those were late themselves."""
 SMALLEST_STEP_S: Final = 1e-6
 
 
@@ -45,6 +48,8 @@ class TeensyClock:
 
         ``_odd``: the first of these times, and when it arrived.
         """
+        self._earlies: list[tuple[float, float]] = []
+        """Times that seem early, but are otherwise plausible, each with its arrival."""
         self._last_s = 0.0
 
     @property
@@ -75,11 +80,14 @@ class TeensyClock:
         if self._fit is not None:
             late_s = now - self.host_s(board_s)
             plausible = -EARLY_S <= late_s <= LATE_S and board_s >= self._last_s - EARLY_S
-            if not plausible and not self._is_new_time(board_s, now):
+            early = -LATE_S <= late_s < -EARLY_S and self._began_late(board_s, now)
+            if not plausible and not early and not self._is_new_time(board_s, now):
                 return False
         else:
             self._begin_at(board_s, now)
         self._odd = None
+        if self._earlies and board_s <= self._earlies[-1][0]:
+            self._earlies = []  # that time was damaged, because the board's time only increases
         self._last_s = board_s
         tick = int(board_s / TICK_S)
         assert self._fit is not None
@@ -99,9 +107,28 @@ class TeensyClock:
         self._begin_at(board_s, now)
         return True
 
+    def _began_late(self, board_s: float, now: float) -> bool:
+        """Return whether enough early times agree; if they do, begin the clock again.
+
+        No line arrives early. So if a clock began with a line that had waited for the host, only
+        lines that have waited as long seem plausible. If reads are rare, that can last for ever.
+        """
+        agree = all(
+            before_s < board_s
+            and now - at <= EARLIES_WITHIN_S
+            and abs((board_s - before_s) - (now - at)) < AGREE_S
+            for before_s, at in self._earlies
+        )
+        self._earlies = [*self._earlies, (board_s, now)] if agree else [(board_s, now)]
+        if len(self._earlies) < AGAIN:
+            return False
+        self._begin_at(board_s, board_s + min(at - early_s for early_s, at in self._earlies))
+        return True
+
     def _begin_at(self, board_s: float, now: float) -> None:
         tick = int(board_s / TICK_S)
         self._fit = ClockFit(TICK_S, (tick, now - (board_s - tick * TICK_S)))
+        self._earlies = []
 
 
 class StampedReadings:

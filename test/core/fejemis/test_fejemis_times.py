@@ -100,6 +100,57 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
     assert clock.host_s(0.28) == pytest.approx(5.88, abs=0.01)
 
 
+@pytest.mark.parametrize("waited_s", [0.012, 0.03, 0.2])
+def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
+    """The first line waits for the host. Then every read brings two lines, 20 ms apart.
+
+    The older line of each read seems plausible, and the newer one early. Three times are lost.
+    """
+    clock = TeensyClock()
+    clock.see(100.0, 5.0 + waited_s)
+    arrivals = [
+        (0.04 * read + 0.02 * line, 0.04 * read + 0.02) for read in range(50) for line in (0, 1)
+    ]
+    lost = [not clock.see(100.3 + sent_s, 5.3 + read_s) for sent_s, read_s in arrivals]
+    assert sum(lost) <= 3
+    assert not any(lost[10:])
+    assert clock.host_s(110.0) == pytest.approx(15.0, abs=0.001)
+
+
+def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
+    """Every third time is damaged in the same digit, so that damaged times agree.
+
+    The right times between them are smaller. This shows the damage.
+    """
+    clock = TeensyClock()
+    for n in range(100):
+        damaged = n % 3 == 2
+        assert clock.see(100.0 + 0.02 * n + 0.1 * damaged, 5.0 + 0.02 * n) is not damaged
+        assert not clock.restarted
+    assert clock.host_s(102.0) == pytest.approx(7.0, abs=0.001)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rare_reads_lose_no_odometry(seed: int) -> None:
+    """The driver reads each port every 50 ms, so each read brings two or three poses.
+
+    The time that the first line waits depends on the seed.
+    """
+    bench, chance = Bench(), random.Random(seed)
+    for _ in range(chance.randrange(2000)):
+        bench.now += bench.robot.tick_s
+        bench.robot.advance()
+    bench.read_s = 0.05
+    bench._read_at = [bench.now - chance.uniform(0.0, 0.05) for _ in (DRIVE, FRONT)]
+    bench.open()
+    bench.run_until(lambda: bench.session.state == "nominal")
+    bench.run(1.0)
+    bench.events.clear()
+    bench.run(2.0)
+    assert len(bench.odometry) == pytest.approx(100, abs=3)
+    assert len(bench.imu) == pytest.approx(200, abs=6)
+
+
 def test_stamps_of_a_kind_go_forward_and_are_not_from_the_future() -> None:
     """If a stamp is not after the previous stamp, it is increased.
 
