@@ -132,12 +132,12 @@ class SafetyStops:
 
     def tick(self, now: float) -> None:
         """End the command after a short silence of the board. Forget the mode after a long one."""
-        if self._policy.current and self._liveness.unheard(now):
-            self._policy.halt(now)
-        if not self._liveness.fell_silent(now):
+        liveness = self._liveness
+        if self._policy.current and liveness.unheard(now):
+            self._reporter.notify(self._commanding.stop_unheard(liveness.unheard_s, now))
+        if not liveness.fell_silent(now):
             return
         self.react(self._measurement.release(), now)
-        liveness = self._liveness
         self._reporter.silent(  # a board that loses power leaves a partial frame
             liveness.silence_s,
             bytes_came=liveness.came_at - liveness.heard_at > liveness.silence_s / 2,

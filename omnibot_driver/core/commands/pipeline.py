@@ -233,6 +233,21 @@ class CommandPipeline:
         )
         return f" (commanded {commanded}; measured {measured})"
 
+    def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
+        """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
+
+        A velocity is commanded again and again, so its sender goes on or is refused. A goal is
+        commanded only once.
+        """
+        had_goal = isinstance(self.policy.current, GoalSetpoint)
+        self.policy.halt(now)
+        if not had_goal:
+            return []
+        return [
+            f"the goal of cmd_pose is discarded: no data from the board for {unheard_s:g} s; check"
+            " its power and cable, then send the goal again"
+        ]
+
     def check_goal(self, estimates: Sequence[Estimate], now: float) -> list[str]:
         """Drop the goal if it is invalid, or if the robot drives away from it; return notices.
 

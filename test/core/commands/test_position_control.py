@@ -199,6 +199,22 @@ def test_whatever_discards_a_command_discards_a_goal(
     assert where(bench) == pytest.approx((x + 0.2, y + 0.1, yaw_rad - 0.3), abs=0.01)
 
 
+def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) -> None:
+    """No data arrives for 0.35 s, for example because the computer is busy.
+
+    This ends the goal. Its sender does not send it again, so the driver must say so.
+    """
+    bench.go_to(3.0, 0.0, 0.0)
+    bench.run(1.0)
+    bench.speaks = False
+    bench.run(0.35)
+    bench.speaks = True
+    bench.run(3.0)
+    assert bench.board.truth.x_m < 2.5
+    (said,) = (notice for notice in bench.notices if "goal" in notice)
+    assert "the goal of cmd_pose is discarded: no data from the board for 0.3 s" in said
+
+
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
     """The odometry is reset, so the driver sends Stop.
 
