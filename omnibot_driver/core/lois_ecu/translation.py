@@ -41,6 +41,10 @@ RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count by rolling back.
 A larger fall shows a restart."""
+ROLLED_OUT_TICKS: Final = 10
+STARTING_TICKS_PER_S: Final = 20.0
+"""``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count after a restart, while a
+wheel rolls out and starts again."""
 CONTRADICTED_S: Final = 1.0
 """Longest assumed time in s of rolling back while the unit of the board's clock is forgotten. The
 clock then cannot confirm the time since the last ticks."""
@@ -163,7 +167,8 @@ class Translation:
         rolled = RESTARTED_TICKS_PER_S * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
-        if late or fewer > RESTARTED_TICKS:
+        began = contradicted and left + right > 0 and _began_within(duration_s, ticks)
+        if late or began or fewer > RESTARTED_TICKS:
             self.restarts += 1
             age_s = ticks.time_counts * UNIT_S["ms"] if self._unit == "ms" else None
             self.odometry.restarted(now, age_s)  # a clock in ns wraps every 4.3 s
@@ -215,6 +220,13 @@ class Translation:
             return None
         day = _days_since_1970(2000 + date.year, date.month, date.day)
         return day * DAY_S + time.hours * 3600 + time.minutes * 60 + time.seconds
+
+
+def _began_within(duration_s: float, ticks: Ticks) -> bool:
+    """Return whether the clock, read in ns, and the counts began at zero within ``duration_s``."""
+    age_s = ticks.time_counts * UNIT_S["ns"]
+    most = ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * age_s
+    return age_s <= duration_s and max(abs(ticks.left), abs(ticks.right)) <= most
 
 
 def _is_date(date: GpsDate) -> bool:
