@@ -6,7 +6,7 @@ import math
 
 import pytest
 from mart_bench import MartBench
-from test_mart_goal_network import EVERY_FIRMWARE, drops, on
+from mart_goals import EVERY_FIRMWARE, drops, on
 from test_mart_late_replies import once, texts
 
 from omnibot_driver.core.mart.jobs import Job

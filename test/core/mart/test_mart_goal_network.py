@@ -8,61 +8,13 @@ from typing import Any
 
 import pytest
 from mart_bench import MartBench
+from mart_goals import EVERY_FIRMWARE, drops, on, random_goal, reach, yaw_error
 
-from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.simulator.common.network import NetworkFaults, NetworkPath
+from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
 pytestmark = pytest.mark.slow
-
-EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
-
-
-def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
-    """Return a bench that is ready, and whose network has these faults from now on."""
-    bench = MartBench(firmware, seed=seed).ready()
-    bench.robot._good = False
-    for channel in bench.robot.network:
-        channel.to_board._faults = channel.from_board._faults = network
-    return bench
-
-
-def reach(bench: MartBench, goal: Pose) -> str:
-    """Command the goal, and wait for its end. Return the driver's messages."""
-    since = len(bench.events)
-
-    def messages() -> str:
-        return " ".join(each.text for each in bench.events[since:] if isinstance(each, Notice))
-
-    bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
-    bench.run(0.1)
-    pilot = bench.board._pilot
-    bench.run_until(
-        lambda: pilot.goal_progress.startswith("over") or "discarded" in messages(), 120.0
-    )
-    bench.run(3.0)
-    assert bench.robot.stands
-    return messages()
-
-
-def yaw_error(bench: MartBench) -> float:
-    """Return the size of the error of the odometry's heading, in rad."""
-    return abs(math.remainder(bench.error.yaw_rad, math.tau))
-
-
-def drops(path: NetworkPath, lost: Any) -> list[bytes]:
-    """Let ``path`` lose each datagram for which ``lost`` is true. Return the list of the lost."""
-    gone, real = list[bytes](), path.send
-
-    def send(data: bytes, at_s: float) -> None:
-        if lost(data):
-            gone.append(data)
-        else:
-            real(data, at_s)
-
-    path.send = send  # type: ignore[method-assign]
-    return gone
 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
@@ -73,7 +25,7 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
     """Replies come late and in another order. The driver takes none of it for a duplicated move."""
     bench, random = on(NetworkFaults(delay_s=0.1), firmware, seed), Random(seed)
     for _ in range(3):
-        goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
+        goal = random_goal(random)
         assert reach(bench, goal) == ""
         assert bench.truth.way_to(goal).way_m < 0.12
         assert bench.error.way_m < 0.1
@@ -90,7 +42,7 @@ def test_losses_end_few_goals_and_the_odometry_stays_right(firmware: Firmware) -
     for seed in range(12):
         bench, random = on(NetworkFaults(lose=0.1, delay_s=0.05), firmware, seed), Random(seed)
         for _ in range(4):
-            goal = Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
+            goal = random_goal(random)
             discarded += "discarded" in reach(bench, goal)
             assert bench.error.way_m < 0.15
             assert yaw_error(bench) < 0.2 + 2 * bench.odometry[-1].covariance.yaw_yaw ** 0.5

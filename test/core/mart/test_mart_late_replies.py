@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 from mart_bench import MartBench
-from test_mart_goal_network import drops, on, reach
+from mart_goals import drops, on, reach
 
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.se2 import Pose

@@ -8,7 +8,7 @@ to a motor that it has just switched off.
 
 import pytest
 from mart_bench import MartBench
-from test_mart_goal_network import drops, reach
+from mart_goals import drops, reach
 
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart.jobs import Job

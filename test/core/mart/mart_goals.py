@@ -1,0 +1,110 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Goals on a network with faults: helpers of the tests, and a measurement of many goals.
+
+``PYTHONPATH=.:test:test/core python test/core/mart/mart_goals.py 25``: 100 goals for each network.
+Results: docs/boards/mart.md.
+"""
+
+import math
+import sys
+from collections.abc import Callable
+from random import Random
+
+from mart_bench import MartBench
+
+from omnibot_driver.core.events import Notice
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.simulator.common.network import NetworkFaults, NetworkPath
+from omnibot_driver.simulator.mart import Firmware
+
+NETWORKS = {
+    "good": NetworkFaults(),
+    "late by up to 0.1 s": NetworkFaults(delay_s=0.1),
+    "late by up to 0.3 s": NetworkFaults(delay_s=0.3),
+    "3 % lost, late by up to 0.1 s": NetworkFaults(lose=0.03, delay_s=0.1),
+    "10 % lost, late by up to 50 ms": NetworkFaults(lose=0.1, delay_s=0.05),
+    "3 % lost and doubled, late by up to 0.1 s": NetworkFaults(
+        lose=0.03, duplicate=0.03, delay_s=0.1
+    ),
+}
+NEAR_M = 0.12
+GOALS = 4
+
+EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
+
+
+def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
+    """Return a bench that is ready, and whose network has these faults from now on."""
+    bench = MartBench(firmware, seed=seed).ready()
+    bench.robot._good = False
+    for channel in bench.robot.network:
+        channel.to_board._faults = channel.from_board._faults = network
+    return bench
+
+
+def reach(bench: MartBench, goal: Pose) -> str:
+    """Command the goal, and wait for its end. Return the driver's messages."""
+    since = len(bench.events)
+
+    def messages() -> str:
+        return " ".join(each.text for each in bench.events[since:] if isinstance(each, Notice))
+
+    bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
+    bench.run(0.1)
+    pilot = bench.board._pilot
+    bench.run_until(
+        lambda: pilot.goal_progress.startswith("over") or "discarded" in messages(), 120.0
+    )
+    bench.run(3.0)
+    assert bench.robot.stands
+    return messages()
+
+
+def yaw_error(bench: MartBench) -> float:
+    """Return the size of the error of the odometry's heading, in rad."""
+    return abs(math.remainder(bench.error.yaw_rad, math.tau))
+
+
+def drops(path: NetworkPath, lost: Callable[[bytes], bool]) -> list[bytes]:
+    """Let ``path`` lose each datagram for which ``lost`` is true. Return the list of the lost."""
+    gone, real = list[bytes](), path.send
+
+    def send(data: bytes, at_s: float) -> None:
+        if lost(data):
+            gone.append(data)
+        else:
+            real(data, at_s)
+
+    path.send = send  # type: ignore[method-assign]
+    return gone
+
+
+def random_goal(random: Random) -> Pose:
+    return Pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3))
+
+
+def main() -> None:
+    """Print a row of results for each kind of network."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    print(
+        "| Network | Goals reached | Discarded | Largest error of the odometry |\n"
+        + "|---" * 4
+        + "|"
+    )
+    for name, faults in NETWORKS.items():
+        reached = discarded = 0
+        worst_m = 0.0
+        for seed in range(count):
+            bench, random = on(faults, EVERY_FIRMWARE[seed % 3], seed), Random(seed)
+            for _ in range(GOALS):
+                goal = random_goal(random)
+                discarded += "discarded" in reach(bench, goal)
+                reached += bench.truth.way_to(goal).way_m < NEAR_M
+                worst_m = max(worst_m, bench.error.way_m)
+        goals = GOALS * count
+        print(f"| {name} | {reached} of {goals} | {discarded} | {worst_m:.2f} m |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
