@@ -96,7 +96,6 @@ class Ground:
         self.readings: list[Reading] = []
         self.lost = 0
         self.now_s = 0.0
-        self._motor_may_be_on = False
         self.connect()
 
     @property
@@ -128,7 +127,7 @@ class Ground:
         self._stopping: Stopping | None = None
         self._move: Move | None = None
         self._start: Word | None = None
-        self._refused = self._switches_off = False
+        self._refused = False
         self._moved_last = False
         self._start_owed_until_s = -math.inf
         self._greetings: list[float] = []  # times of HELLOs without an answer

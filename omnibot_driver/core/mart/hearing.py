@@ -158,9 +158,6 @@ class Hearing(Measuring):
     def _missed(self, word: Word, now: float) -> None:
         if self.state is State.ASKING:
             self._unanswered(word)
-        elif word.kind is Kind.START and self._switches_off:
-            self._motor_may_be_on = True
-            self._halt(now)
         elif word.kind is Kind.START:
             self._halt(now, f"the controller did not answer {word.text}")
         elif word.kind is Kind.MOVE:

@@ -40,12 +40,6 @@ AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 """Longest duration of a controlled move: 3 s, plus this time in s for each inch or degree."""
-SWITCH_OFF: Final = words.RM.request(0)
-"""The request that switches both motors off.
-
-The public server corrects the heading once more after TF or TB has ended, and can so leave a motor
-on. SRM, SM, SL and SS do not end this. RM 0 does, and then fails.
-"""
 REFERENCE_FAILS: Final = 2
 """After this number of bare ``fail`` replies to RM in a row, the driver stops trying.
 
@@ -80,8 +74,6 @@ class Starts(Adjusting):
         if self.imu.retries(now):
             return self._check(now)
         start = self._next_start(now)
-        if start is None and self._motor_may_be_on and not self.refusal:
-            start = SWITCH_OFF
         if start is None:
             return self._job(now)
         if now < self._again_s:
@@ -89,8 +81,7 @@ class Starts(Adjusting):
         if why := self.refusal:
             self._notice(why, halt=True)
             return NO_PACKETS
-        late = self._moves_may_come if start == SWITCH_OFF else self._copies_may_come
-        if late(now) or self._name_may_come(start, now):
+        if self._copies_may_come(now) or self._name_may_come(start, now):
             return NO_PACKETS
         if start.word in NEEDS_IMU and not self.imu.fresh(now):
             return self._check(now)
@@ -113,10 +104,8 @@ class Starts(Adjusting):
 
         A move would block the command port, a stop end the motion.
         """
-        return self._moves_may_come(now) or now < self._halted_s + self._delay_s
-
-    def _moves_may_come(self, _now: float) -> bool:
-        return self.odometry.wheel.from_s < self._harmful_s + self._delay_s
+        moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
+        return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether HELLO may arrive after ``start``, which is then a controlled move.
@@ -184,8 +173,6 @@ class Starts(Adjusting):
         self._port_free_s, self._start_owed_until_s = math.inf, -math.inf
         self._greeted_before = now < self._greeted_s + self._delay_s
         self._start, self._refused = start.word, False
-        self._switches_off = start == SWITCH_OFF
-        self._motor_may_be_on = self.motion is Motion.STRAIGHT
         self._started_s = self._present_s = now
         self.imu.used()
         _, twist = self._wish(now)
@@ -212,9 +199,6 @@ class Starts(Adjusting):
         return self.conversation.ask(start, now, _longest_s(start) + 2 * self._delay_s)
 
     def _started(self, answer: Answer, now: float) -> None:
-        if isinstance(answer.reply, Fail) and self._switches_off:
-            self._halt(now)
-            return
         if isinstance(answer.reply, Fail):
             # a restarted server has forgotten the speed of turns on the spot
             forgot = self.motion is Motion.SPIN and self._turns.may_be_forgotten(now)

@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from typing import Final
 
-from omnibot_driver.core.commands.orders import Drive, EmergencyStop, GoTo
+from omnibot_driver.core.commands.orders import Drive, GoTo
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.ground import Ground
@@ -75,8 +75,6 @@ class Stops(Ground, ABC):
     def _agrees(self, now: float) -> bool:
         """Return whether the present motion fits the present command or job."""
         motion, twist = self._wish(now)
-        if self._switches_off and self.state is State.STARTING:
-            return not isinstance(self._wanted, EmergencyStop)
         if self.motion in (Motion.STRAIGHT, Motion.TURN):
             return self._move is not None or self.jobs.moving or self._rescue
         if motion is not self.motion:
