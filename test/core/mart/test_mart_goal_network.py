@@ -31,22 +31,24 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
         assert bench.error.way_m < 0.1
 
 
-@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
-def test_losses_end_few_goals_and_the_odometry_stays_right(firmware: Firmware) -> None:
+def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
     """Each tenth datagram is lost in both directions: moves, replies, counts and headings.
 
-    The network duplicates nothing. The driver discards at most one goal in six, because it cannot
+    The network duplicates nothing. The driver discards at most one goal in ten, because it cannot
     exclude a duplicated move. Where the odometry is wrong, its covariance says so.
     """
     discarded = 0
-    for seed in range(12):
-        bench, random = on(NetworkFaults(lose=0.1, delay_s=0.05), firmware, seed), Random(seed)
+    for seed in range(15):
+        bench, random = (
+            on(NetworkFaults(lose=0.1, delay_s=0.05), EVERY_FIRMWARE[seed % 3], seed),
+            Random(seed),
+        )
         for _ in range(4):
             goal = random_goal(random)
             discarded += "discarded" in reach(bench, goal)
             assert bench.error.way_m < 0.15
             assert yaw_error(bench) < 0.2 + 2 * bench.odometry[-1].covariance.yaw_yaw ** 0.5
-    assert discarded <= 8
+    assert discarded <= 6
 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
