@@ -8,6 +8,7 @@ does not know commands. The caller passes the time.
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import Final
 
 from omnibot_driver.core.mart.motor_line import MOST_DEAD, MotorLine
@@ -30,6 +31,8 @@ SETTLE_S, LEARN_S = 0.45, 0.35
 ``SETTLE_S``: pause after a large change of units. ``LEARN_S``: shortest averaging window.
 """
 LARGE_UNITS: Final = 3
+MOST_MISSED: Final = 4
+"""Largest number of unanswered changes that are judged together by the measured speeds."""
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
 """Effect of slow exchanges with the server on learning.
 
@@ -104,6 +107,8 @@ class SpeedLoop(Motors):
         self._rate_changed_s = now
         self._unsure = 0.0
         self.part = 0.0
+        self._change = (0, 0)
+        self._missed: list[tuple[int, int]] = []
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
@@ -195,6 +200,7 @@ class SpeedLoop(Motors):
             side.window_units_s += side.units * seconds
             side.window_m += self._direction * (way_m + turned_rad * out_m)
         if self._window_s >= LEARN_S + LEARN_TRIPS * self.trip_s:
+            self._judge_missed(right_only=right_only)
             before = self._right.line.slope, self._right.line.offset
             self._learn(self._right)
             if right_only:
@@ -205,6 +211,31 @@ class SpeedLoop(Motors):
                 self._learn(self._left)
                 self._balance_is_measured = True
             self._clear(now)
+
+    def _judge_missed(self, *, right_only: bool) -> None:
+        """Correct the units by those unanswered changes that have not arrived.
+
+        These are the changes without which the units agree best with the measured speeds.
+        """
+
+        def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:
+            lost = [each for each, came in zip(self._missed, arrived, strict=True) if not came]
+            return sum(right for right, _ in lost), sum(left for _, left in lost)
+
+        def off(side: _Side, less: int) -> float:
+            expected = side.line.speed(side.window_units_s / self._window_s - less)
+            return side.window_m / self._window_s / self.per_unit_mps - max(0.0, expected)
+
+        def error(lacking: tuple[int, int]) -> float:
+            right, left = lacking
+            return off(self._right, right) ** 2 + (0 if right_only else off(self._left, left) ** 2)
+
+        every = product((True, False), repeat=len(self._missed))
+        best = min((lacks(arrived) for arrived in every), key=error)
+        for side, less in zip((self._right, self._left), best, strict=True):
+            side.units -= less
+            side.window_units_s -= less * self._window_s
+        self._missed.clear()
 
     def _learn(self, side: _Side) -> None:
         units = side.window_units_s / self._window_s
@@ -241,14 +272,17 @@ class SpeedLoop(Motors):
         """Record that a change was sent. The motors are assumed to obey it."""
         self.part = abs(right) / max(1, self._right.units) + abs(left) / max(1, self._left.units)
         self._unsure += (COPIED if self._is_slow else 0.0) * self.part**2
+        before = self._right.units, self._left.units
         self._right.units = min(MOST_UNITS, max(0, self._right.units + right))
         self._left.units = min(MOST_UNITS, max(0, self._left.units + left))
+        self._change = self._right.units - before[0], self._left.units - before[1]
         if max(abs(right), abs(left)) >= LARGE_UNITS:
             self._clear(now + SETTLE_S)
 
     def missed(self) -> None:
         """Add uncertainty, because the last change was not answered and may not have arrived."""
         self._unsure += MISSED * self.part**2
+        self._missed = [*self._missed, self._change][-MOST_MISSED:]
 
     @property
     def _is_slow(self) -> bool:

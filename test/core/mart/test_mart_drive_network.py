@@ -139,3 +139,33 @@ def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
     bench.run(0.1)
     assert not bench.board._pilot.jobs.log_may_be_lost
     assert seconds_to_move(bench, 0.3) < 0.8
+
+
+@pytest.mark.parametrize("lost_way", ["request", "reply"])
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
+    firmware: Firmware, lost_way: str
+) -> None:
+    """The request for a large change is lost, or its reply.
+
+    The measured speeds show whether the motors have obeyed. So the next changes are right.
+    """
+    bench = on(NetworkFaults(), firmware)
+    bench.command(0.2, 0.4, 4.0)
+    way = bench.robot.network[0]
+    lost: list[bytes] = []
+
+    def hides(data: bytes) -> bool:
+        changed = bench.written[-1][1].startswith(b"RMCS")
+        return changed and not lost and (lost_way == "reply" or data.startswith(b"RMCS"))
+
+    path = way.to_board if lost_way == "request" else way.from_board
+    drops(path, lambda data: hides(data) and lost.append(data) is None)
+    bench.command(0.2, -0.4, 3.0)
+    rates = []
+    for _ in range(10):
+        bench.command(0.2, -0.4, 0.1)
+        rates.append(bench.robot.board.facts["yaw_rate_radps"])
+    assert lost
+    assert sum(rates) / len(rates) == pytest.approx(-0.4, abs=0.04)
+    assert texts(bench) == []

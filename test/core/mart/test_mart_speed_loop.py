@@ -115,3 +115,32 @@ def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_unit
         assert loop.first_units(0.0, 0.0) >= then
     assert loop.first_units(0.0, 0.0) < 30
     assert loop.spin_units(0.1) > 12
+
+
+CHANGES = st.lists(
+    st.tuples(st.integers(-15, 15), st.integers(-15, 15), st.booleans()), min_size=1, max_size=3
+)
+
+
+@given(CHANGES)
+def test_unanswered_changes_are_judged_by_the_measured_speeds(
+    changes: list[tuple[int, int, bool]],
+) -> None:
+    """Some changes of the motors' units are not answered, and each may have arrived or not.
+
+    The wheels' speeds show it. So the driver knows both motors' units again.
+    """
+    settings = MartSettings()
+    loop, now = SpeedLoop(settings), 0.0
+    loop.begin(50, False, now)
+    true = [50, 50]
+    for right, left, arrives in changes:
+        loop.changed(right, left, now)
+        loop.missed()
+        true = [true[0] + right, true[1] + left] if arrives else true
+    for _ in range(12):
+        now += STEP_S
+        right_mps, left_mps = (units * settings.speed_per_unit for units in true)
+        turn_radps = (right_mps - left_mps) / settings.track_m
+        loop.measured((right_mps + left_mps) / 2 * STEP_S, turn_radps * STEP_S, STEP_S, now)
+    assert [loop._right.units, loop._left.units] == true
