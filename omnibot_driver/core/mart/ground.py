@@ -48,6 +48,8 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 
 The silence is ABSENT_S (s), plus the duration of ABSENT_TRIPS exchanges.
 """
+MOST_GREETINGS: Final = 10
+"""Number of HELLOs whose answers the driver expects. Older ones are lost."""
 PRESENT_S: Final = 0.35
 """Silence in s up to which a server has certainly not been restarted."""
 ABSENT_BUSY_S: Final = 2.5
@@ -271,6 +273,7 @@ class Ground:
     def _greet(self, now: float) -> Packets:
         self._greeted_s = now
         self._greetings.append(now)
+        del self._greetings[:-MOST_GREETINGS]
         return ((words.COMMAND, words.HELLO.request().data),)
 
     def _ask(self, request: Request, now: float) -> Packets:

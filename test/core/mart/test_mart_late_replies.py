@@ -13,6 +13,7 @@ from mart_goals import drops, on, reach
 from omnibot_driver.core.events import Notice
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.ground import MOST_GREETINGS
 from omnibot_driver.core.mart.replies import Ok
 from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.stopping import Stopping
@@ -180,3 +181,12 @@ def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
     bench.run(1.0)
     assert bench.robot.stands
     assert texts(bench) == []  # the driver has not taken the motion for that of another program
+
+
+def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
+    """A lost server answers none of the many HELLOs. The driver remembers only the last ones."""
+    bench = on(NetworkFaults(lose=1.0), "firmware")
+    bench.run(120.0)
+    greetings = sum(data == b"HELLO" for _, data in bench.written)
+    assert greetings > 50
+    assert len(bench.board._pilot._greetings) <= MOST_GREETINGS
