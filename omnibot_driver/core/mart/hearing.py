@@ -107,13 +107,18 @@ class Hearing(Measuring):
             if self._seems_present:
                 self._present_s = now
             if greeted_s >= self._started_s + self._delay_s:  # HELLO has not overtaken the start
-                network.hurry(now + min(self._delay_s, 3 * network.answered_trip_s))
+                network.hurry(now + min(self._delay_s, 3 * max(self._trip_s, now - greeted_s)))
         elif self.state in ROLLING and network.answered_trip_s < SLOW_S:
             network.hurry(now)
 
+    @property
+    def _trip_s(self) -> float:
+        """Time in s that an exchange takes now, by the queries and the last check of the IMU."""
+        return max(self.conversation.answered_trip_s, self.imu.transit_s)
+
     def _greeted_of_name(self, now: float) -> float:
         """Return the earliest time at which the answered HELLO may have been sent."""
-        longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self.conversation.answered_trip_s)
+        longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self._trip_s)
         recent = [each for each in self._greetings if each >= now - longest_s]
         self._greetings = recent[1:]
         return recent[0] if recent else -math.inf

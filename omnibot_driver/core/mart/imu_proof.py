@@ -38,6 +38,8 @@ class ImuProof:
     ``word``: the command that checks the IMU of this server.
 
     ``dead``: whether the last checks found no working IMU.
+
+    ``transit_s``: time in s by which the last successful check exceeded its usual duration.
     """
 
     def __init__(self) -> None:
@@ -47,6 +49,7 @@ class ImuProof:
         """Begin a new connection, and forget the results of earlier checks."""
         self.word: Word = RESET
         self.dead = False
+        self.transit_s = 0.0
         self.again_s = self._proved_s = -math.inf
         self._fails = 0
 
@@ -78,7 +81,8 @@ class ImuProof:
         """
         if isinstance(reply, Ok):
             self.dead, self._fails = False, 0
-            self._proved_s = now - max(0.0, took_s - PROBE_S[word]) / 2
+            self.transit_s = max(0.0, took_s - PROBE_S[word])
+            self._proved_s = now - self.transit_s / 2
             self.again_s = now
         elif reply.reason == UNSUPPORTED and word is RESET:
             self.word = CHECK
