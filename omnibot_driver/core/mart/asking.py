@@ -35,7 +35,7 @@ class Asking(Stops):
         self._stopping = None
         self.conversation.give_up(now)
         self.state, self.motion = State.ASKING, Motion.UNKNOWN
-        self.greeted = self._conflict = False
+        self.greeted = self._conflict = self._released = False
         self._turns.forget_setting()
         self._asked_count = None
         self._name_from_s = now + 2 * self._delay_s
@@ -48,7 +48,10 @@ class Asking(Stops):
             return ()
         self._ask_s = now + REPEAT_S
         if self._named_s >= self._name_from_s:
-            return self._ask((words.ENC if self._conflict else words.RESET).request(), now)
+            word = words.RESET
+            if self._conflict:
+                word = words.ENC if self._released else words.MSM
+            return self._ask(word.request(), now)
         if now < self._stop_again_s:
             return self._greet(now)
         self._stop_again_s, self._name_from_s = now + STOP_AGAIN_S, now + 2 * self._delay_s
@@ -61,6 +64,9 @@ class Asking(Stops):
             self._conflict = isinstance(reply, Fail) and reply.reason == words.CONFLICT
             if not self._conflict:
                 self._sweep(now)
+        elif answer.word is words.MSM:
+            self._released, self._conflict = True, False
+            self._ask_s = self.conversation.certain_from_s(words.RESET)
         elif not isinstance(reply, Fail):
             self._compare(signed(int(reply.number)), answer.when.from_s, now)
 

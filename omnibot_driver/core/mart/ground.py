@@ -33,6 +33,7 @@ from omnibot_driver.core.mart.states import (
     may_say,
 )
 from omnibot_driver.core.mart.stopping import Stopping
+from omnibot_driver.core.mart.switch_off import SwitchOff
 from omnibot_driver.core.mart.turn_record import TurnRecords
 from omnibot_driver.core.mart.words import Request, Word
 from omnibot_driver.core.packets import Packets
@@ -92,6 +93,7 @@ class Ground:
         self.jobs = Jobs()
         self.proof = StopProof()
         self._surplus = Surplus()
+        self._switch_off = SwitchOff()
         self._records = TurnRecords()
         self._turns = SpotTurns(settings, self.odometry, self.loop)
         self._polls = Polls()
@@ -119,6 +121,7 @@ class Ground:
         self.jobs.cancel("the connection was lost meanwhile; call again once it is back")
         self.jobs.forget_log()
         self.odometry.connect()
+        self._switch_off.connect()
         self._turns.connect()
         self._polls.connect()
         self.health.connect()
@@ -152,7 +155,7 @@ class Ground:
         self._rested_s = -math.inf
         self._counted_at_rest = 0
         self._fresh = False
-        self._conflict = self._lost_told = False
+        self._conflict = self._released = self._lost_told = False
         self._asked_count: tuple[int, float] | None = None
         self._greet_s = self._free_s = math.inf
         self._greeted_s = -math.inf

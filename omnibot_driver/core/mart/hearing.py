@@ -156,6 +156,8 @@ class Hearing(Measuring):
             if not self._turns.answered(reply):
                 self.imu.again_s = now + self._delay_s  # until then, a copy may look like its reply
                 self._once(SETTING_REFUSED)
+        elif word in (words.MCS, words.MSM):
+            self._switch_off.answered(word, reply)
         else:
             self.jobs.answered(answer, now)
             self.state = State.SERVING if self.jobs.collecting else State.STILL

@@ -87,7 +87,8 @@ class Pilot(Hearing):
         if self.state in (State.LOST, State.ASKING):
             return LAST_HALTS[self.motion] or LAST_HALTS[Motion.UNKNOWN]
         if self.motion is Motion.NONE:
-            return HALTS[Motion.UNKNOWN]
+            release = (words.MSM,) if self._switch_off.underway else ()
+            return HALTS[Motion.UNKNOWN] + release
         if self._stopping is not None and self._stopping.last_port:
             return LAST_HALTS[self.motion]
         return HALTS[self.motion]

@@ -11,8 +11,8 @@ from typing import Final
 
 from omnibot_driver.core.commands.orders import EmergencyStop, GoTo
 from omnibot_driver.core.mart import words
-from omnibot_driver.core.mart.adjusting import Adjusting
 from omnibot_driver.core.mart.conversation import SLOW_S, Answer
+from omnibot_driver.core.mart.failed_starts import AGAIN_S, FailedStarts
 from omnibot_driver.core.mart.ground import (
     ESTOP_REPEAT_S,
     GREET_S,
@@ -31,23 +31,17 @@ from omnibot_driver.core.mart.states import (
     Motion,
     State,
 )
+from omnibot_driver.core.mart.switch_off import RELEASE
 from omnibot_driver.core.mart.words import Form, Kind, Request
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
 TIMED_OUT_S: Final = 0.5
 """After a start, the server waits at least this time in s before it reports that no wheel turns."""
-AGAIN_S: Final = 1.0
-"""Pause in s after a start that failed."""
 STRAIGHT_S_PER_IN, TURN_S_PER_DEG = 0.5, 0.06
 """Longest duration of a controlled move: 3 s, plus this time in s for each inch or degree."""
-REFERENCE_FAILS: Final = 2
-"""After this number of bare ``fail`` replies to RM in a row, the driver stops trying.
-
-A single one is normal after a long stop.
-"""
 
 
-class Starts(Adjusting):
+class Starts(FailedStarts):
     """The part of the pilot that starts motions."""
 
     def _act(self, now: float) -> Packets:
@@ -71,9 +65,13 @@ class Starts(Adjusting):
             return NO_PACKETS
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
+        if self._switch_off.underway:
+            return self._switch_motors_off(now)
         if self.imu.retries(now):
             return self._check(now)
         start = self._next_start(now)
+        if self._switch_off.needed and (start is None or now < self._again_s or self.refusal):
+            return self._switch_motors_off(now)
         if start is None:
             return self._job(now)
         if now < self._again_s:
@@ -98,6 +96,23 @@ class Starts(Adjusting):
         if network.disturbed(now) and now < network.certain_from_s(words.SSP):
             return None  # a copy of another reply would be taken for that to SSP
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
+
+    def _switch_motors_off(self, now: float) -> Packets:
+        """Return the next request of SwitchOff, unless a late reply could be taken for its reply.
+
+        RELEASE also waits until no copy of OFF can come after it.
+        """
+        request = self._switch_off.next()
+        certain_s = self.conversation.certain_from_s(request.word)
+        if request is RELEASE:
+            certain_s = max(certain_s, self._harmful_s + self._delay_s)
+        if now < certain_s:
+            return NO_PACKETS
+        self._require(request.word)
+        if request.word in HARMFUL_LATE:
+            self._harmful_s = now
+        self._switch_off.sent()
+        return self._ask(request, now)
 
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
@@ -160,6 +175,7 @@ class Starts(Adjusting):
         why = f"the check of the IMU failed: {reason or 'the server gives no reason'}"
         if reason == words.CONFLICT:
             why += "; look for another program that commands the robot"
+            self._switch_off.refused()
             self.motion = Motion.UNKNOWN
             self._halt(now, why)
         else:
@@ -182,6 +198,7 @@ class Starts(Adjusting):
         self.proof.moved()
         self.odometry.speeds.forget()
         self.odometry.begin(self.motion, now)
+        self._switch_off.begins(straight=self.motion is Motion.STRAIGHT)
         if start.word.kind is Kind.MOVE:
             self._last_move = start
             # a docking move ends at the dock, and a rescue turn begins with the robot in motion
@@ -225,53 +242,6 @@ class Starts(Adjusting):
             self._start_owed_until_s = self._started_s + answer.word.takes_s + 2 * self._delay_s
         self._polls.press(words.RMRA)
         self._polls.press(words.ENC)
-
-    def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
-        """Stop the robot after a failed start, because it may move nevertheless.
-
-        ``arrived``: the reply certainly belongs to this start, and a copy is unlikely.
-        """
-        word = self._start
-        assert word is not None
-        self._refused = True
-        self._again_s = now + AGAIN_S
-        if reply.reason == words.CONFLICT:
-            self.motion = Motion.UNKNOWN
-            why = (
-                "another motion is in progress: the network has delivered the command twice, or"
-                " another program commands the robot"
-            )
-        elif word is words.RM and self._is_of_another(reply, now):
-            if reply.reason in ("", words.NO_START):
-                self.health.reference_failed(now)
-            if not reply.reason and self.health.reference_fails == 1:
-                self._again_s = now  # after a stop that took long, an intact server fails once
-            why = "the driver tries again"
-            if self.health.reference_fails >= REFERENCE_FAILS:
-                self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
-                why = (
-                    "the motors may be stuck or without power; forward motion is refused until"
-                    " the command ends"
-                )
-        elif reply.reason == words.NO_START:
-            why = "no wheel has turned, so the driver tries again; check motors and power"
-        else:
-            why = self._obstacle(reply, self.motion)
-        if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
-            self._turns.refused()
-        failed = f"{word.text} failed ({reply.reason or 'no reason given'})"
-        self._halt(now, f"{failed}: {why}", arrived=arrived)
-
-    def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure text of RM may be about another motion, e.g. the last B.
-
-        An obstacle is believed if the front sonar sees it or RM repeats it.
-        """
-        if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
-            self._obstacle_told = False
-            return reply.reason not in words.OBSTACLES
-        told, self._obstacle_told = self._obstacle_told, True
-        return not told
 
     def _job(self, now: float) -> Packets:
         request = self.jobs.next(now, stands=self.proof.proved)

@@ -22,7 +22,9 @@ from omnibot_driver.core.mart.words import (
     LOG,
     MCL,
     MCR,
+    MCS,
     MCSTAT,
+    MSM,
     RESET,
     RM,
     RMCS,
@@ -88,7 +90,7 @@ QUICK: Final = frozenset({ENC, RMRA, VOLTS, MCSTAT, DOCKED, HELLO})
 MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.UNKNOWN: frozenset({HELLO, SRM, SM}),
     State.STILL: QUICK
-    | {SFC, SRC, TD, RESET, CHECK, SSP, RM, B, R, L, TF, TB, MCR, MCL, SRM, SM, SL, SS}
+    | {SFC, SRC, TD, RESET, CHECK, SSP, MCS, MSM, RM, B, R, L, TF, TB, MCR, MCL, SRM, SM, SL, SS}
     | {SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT},
     State.CHECKING: frozenset(),
     State.STARTING: frozenset({SRM, SM}),
@@ -98,7 +100,7 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
     State.MOVING: frozenset({SL, SS}),
     State.SERVING: frozenset(),
     State.STOPPING: frozenset({SRM, SM, SL, SS}),
-    State.ASKING: frozenset({HELLO, ENC, RESET, SL, SS}),
+    State.ASKING: frozenset({HELLO, ENC, RESET, MSM, SL, SS}),
     State.LOST: frozenset({HELLO, SRM, SM, SL, SS}),
 }
 """The commands that are allowed in each state.
@@ -150,7 +152,7 @@ With a dead IMU, the server drives and never answers, or waits. MCR and MCL noti
 servers after a turn of 0.5 s.
 """
 
-HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, TIME})
+HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
 """Commands whose duplicate does harm if it arrives after another motion has begun.
 
 The driver waits for duplicates before the next start's IMU check.

@@ -140,6 +140,10 @@ Some servers start the motors on this command.
 """
 SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
 
+# MCS writes both motors, MSM ends this
+MCS = _word("MCS", Kind.SERVICE, _OK, 0.05, {CONFLICT, UNSUPPORTED})
+MSM = _word("MSM", Kind.SERVICE, _OK, 0.05, {UNSUPPORTED})
+
 # RM drives forward, B backward; R and L turn on the spot
 RM = _word("RM", Kind.START, _OK, 1.2, STARTING | OBSTACLES | {"improper command format"})
 B = _word("B", Kind.START, _OK, 1.5, STARTING | OBSTACLES)
@@ -171,7 +175,7 @@ LAST_TURN = _word("LAST TURN", Kind.SERVICE, {Form.FILE}, 2.0, {NO_FILE, ""})
 EXIT = _word("EXIT", Kind.SERVICE, {Form.FILE, Form.NOTHING}, 2.0)
 
 WORDS: Final = (
-    *(HELLO, ENC, RMRA, VOLTS, MCSTAT, DOCKED, SFC, SRC, TD, RESET, CHECK, SSP),
+    *(HELLO, ENC, RMRA, VOLTS, MCSTAT, DOCKED, SFC, SRC, TD, RESET, CHECK, SSP, MCS, MSM),
     *(RM, B, R, L, RMCS, CS),
     *(SRM, SM, SL, SS, TF, TB, MCR, MCL, SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT),
 )
@@ -182,8 +186,6 @@ NEVER_SAID: Final = {
     "F": "RM drives forward as well, and can turn",
     "SDR": "limits a move that has no distance; the driver never starts such a move",
     "TFSFC": "undocumented; changes the clearance that stops the robot",
-    "MCS": "undocumented; drives, but the server then detects no obstacles and reports no heading",
-    "MSM": "undocumented; stops MCS",
     "MNLV": "undocumented; reports a speed from calibration files; the encoder measures it better",
     "MD": "undocumented; reports a distance that the server computes from time",
     "MCF": "undocumented; like the command TF, but does not check the clearance",

@@ -43,6 +43,8 @@ class Driver(NamedTuple):
     ``counted``: whether the encoder was read after the stop, without harmful copies left.
 
     ``greeted``: whether the driver has stopped the server once.
+
+    ``underway``: whether MCS may be in progress, as far as the driver knows.
     """
 
     state: State = State.UNKNOWN
@@ -53,6 +55,7 @@ class Driver(NamedTuple):
     moved: bool = False
     counted: bool = False
     greeted: bool = False
+    underway: bool = False
 
 
 class World(NamedTuple):
@@ -85,6 +88,12 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
         BY_TEXT[copy] in HARMFUL_LATE for copy in world.copies
     ):
         return False
+    if driver.underway and (row in STARTS or row.kind is Kind.CHECK):
+        return False
+    if word == "MCS":
+        return driver.moved and not driver.underway
+    if word == "MSM" and driver.state is State.STILL:
+        return driver.underway and "MCS" not in world.copies
     unproved = not driver.counted or (row in NEEDS_IMU and not driver.proved)
     if row in STARTS and driver.state is State.STILL and unproved:
         return False
@@ -164,7 +173,7 @@ def _waits(world: World) -> Iterator[Step]:
     if state is State.CHECKING:
         yield "no reply", world._replace(driver=driver._replace(state=State.STILL, pending=""))
     if state is State.STILL and server.port == "free" and server.moving:
-        stray = Driver(State.STOPPING, Motion.UNKNOWN, moved=driver.moved, greeted=True)
+        stray = _rests(driver)._replace(state=State.STOPPING, motion=Motion.UNKNOWN)
         yield "a poll sees it move", world._replace(driver=stray)
     late = any(BY_TEXT[copy] in HARMFUL_LATE for copy in world.copies)
     if state is State.STILL and server.port == "free" and not server.moving and not late:
@@ -198,7 +207,9 @@ def _asked(world: World) -> Step:
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
-    _, reply = execute(world.server, "CHECK")
+    server, _ = execute(world.server, "MSM")
+    world = world._replace(server=server)
+    _, reply = execute(server, "CHECK")
     driver = Driver(State.STOPPING, Motion.UNKNOWN)
     if reply == "conflict" and not world.server.moving:
         return "a motion that stands is found", world._replace(
@@ -215,6 +226,10 @@ def _said(word: str, world: World) -> Iterator[Step]:
         state = State.MOVING if row.kind is Kind.MOVE else State.STARTING
         moves = row.kind is Kind.MOVE
         driver = Driver(state, STARTS[row], pending=word, moved=moves, greeted=True)
+    elif word == "MCS":
+        driver = driver._replace(underway=True)
+    elif word == "MSM":
+        driver = driver._replace(pending=word)
     elif word == "CHECK":
         driver = driver._replace(state=State.CHECKING, pending=word, proved=False)
     elif driver.state is State.STOPPING:
@@ -259,13 +274,24 @@ def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     state = driver.state
     if state is State.CHECKING and not late:
         copies = tuple(copy for copy in world.copies if copy != "CHECK")
-        after = driver._replace(state=State.STILL, pending="", proved=reply == "ok")
+        refused = driver.underway or reply == "conflict"
+        after = driver._replace(
+            state=State.STILL, pending="", proved=reply == "ok", underway=refused
+        )
         yield what, world._replace(driver=after, copies=copies)
+    elif state is State.STILL and (driver.pending, reply) == ("MSM", "ok") and not late:
+        yield what, world._replace(driver=driver._replace(pending="", underway=False))
     elif state is State.STARTING and reply == "ok":
         yield what, world._replace(driver=driver._replace(state=WHILE[driver.motion], pending=""))
     elif state is State.STARTING and reply != "no motion":
         motion = Motion.UNKNOWN if reply == "conflict" else driver.motion
-        after = driver._replace(state=State.STOPPING, motion=motion, pending="", unanswered=0)
+        after = driver._replace(
+            state=State.STOPPING,
+            motion=motion,
+            pending="",
+            unanswered=0,
+            underway=reply == "conflict",
+        )
         yield what, world._replace(driver=after)
     elif state is State.MOVING and not late:
         yield what, world._replace(driver=_rests(driver))
@@ -279,4 +305,6 @@ def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
 
 
 def _rests(driver: Driver) -> Driver:
-    return Driver(State.STILL, Motion.NONE, moved=driver.moved, greeted=True)
+    return Driver(
+        State.STILL, Motion.NONE, moved=driver.moved, greeted=True, underway=driver.underway
+    )

@@ -35,6 +35,8 @@ def trouble(world: World) -> str:
         return ""
     if server.released:
         return "a motion is released by the stop port, and the next stop will hang"
+    if server.manual and not driver.underway:
+        return "the server refuses motions, and the driver does not know it"
     if server.moving and not _can_stop(world):
         return "nothing stops the robot"
     return ""

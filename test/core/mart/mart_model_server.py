@@ -11,7 +11,7 @@ from omnibot_driver.core.mart.states import Motion
 
 START_WORDS: Final = ("RM", "B", "R", "L", "TF", "MCR")
 """Commands that start a motion. In this model TB behaves as TF, and MCL as MCR."""
-SAID: Final = (*START_WORDS, "CHECK", "SRM", "SM", "SL", "SS")
+SAID: Final = (*START_WORDS, "CHECK", "SRM", "SM", "SL", "SS", "MCS", "MSM")
 KIND: Final = {
     "RM": Motion.REFERENCE,
     "B": Motion.REVERSE,
@@ -29,6 +29,8 @@ class Server(NamedTuple):
     "hung".
 
     ``released``: the stop port has stopped a motion that the server believes in progress.
+
+    ``manual``: MCS is in progress, so motions are refused.
     """
 
     motion: Motion = Motion.NONE
@@ -37,6 +39,7 @@ class Server(NamedTuple):
     released: bool = False
     imu: bool = True
     crashed: bool = False
+    manual: bool = False
 
 
 Reply = str | None
@@ -51,9 +54,13 @@ def execute(server: Server, word: str) -> tuple[Server, Reply]:
     if server.port != "free":
         return server, None  # it waits in the queue, which has the effect of a late copy
     motion = server.motion
-    if word == "CHECK":
-        if motion is not Motion.NONE:
+    if word == "MSM":
+        return server._replace(manual=False), "ok"
+    if word in ("CHECK", "MCS"):
+        if motion is not Motion.NONE or server.manual:
             return server, "conflict"
+        if word == "MCS":
+            return server._replace(manual=True), "ok"
         return server, "ok" if server.imu else "imu lost"
     if word in START_WORDS:
         return _start(server, word)
@@ -73,7 +80,7 @@ def _start(server: Server, word: str) -> tuple[Server, Reply]:
     motion = server.motion
     if motion is Motion.REFERENCE and word == "L":
         return server._replace(port="hung", moving=True), None
-    if motion is not Motion.NONE:
+    if motion is not Motion.NONE or server.manual:
         return server, "conflict"
     kind = KIND[word]
     if server.imu:

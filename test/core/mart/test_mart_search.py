@@ -29,6 +29,7 @@ ON_THE_WIRE: Final = {
     "B": b"B SLOW",
     "R": b"R SLOW",
     "L": b"L SLOW",
+    "MCS": b"MCS 128 128",
 }
 KINDS: Final = {
     None: Motion.NONE,
@@ -128,7 +129,15 @@ class Desk:
         motion = KINDS[server.motion]
         moving = server.moving
         released = motion is not Motion.NONE and port == "free" and not moving
-        return Server(motion, moving, port, released, server.imu.alive, bool(server.crashed))
+        return Server(
+            motion,
+            moving,
+            port,
+            released,
+            server.imu.alive,
+            bool(server.crashed),
+            server.manual,
+        )
 
 
 def compared(server: Server) -> Server:

@@ -1,0 +1,74 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""What the pilot does after a start command that the server answers by a failure.
+
+This module knows the failure texts and their usual causes; it does not know when a motion starts.
+The caller passes the time.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.mart import words
+from omnibot_driver.core.mart.adjusting import Adjusting
+from omnibot_driver.core.mart.replies import Fail
+from omnibot_driver.core.mart.states import Motion
+
+AGAIN_S: Final = 1.0
+"""Pause in s after a start that failed."""
+REFERENCE_FAILS: Final = 2
+"""After this number of bare ``fail`` replies to RM in a row, the driver stops trying.
+
+A single one is normal after a long stop.
+"""
+
+
+class FailedStarts(Adjusting):
+    """The part of the pilot that evaluates failed starts."""
+
+    def _start_failed(self, reply: Fail, now: float, *, arrived: bool) -> None:
+        """Stop the robot after a failed start, because it may move nevertheless.
+
+        ``arrived``: the reply certainly belongs to this start, and a copy is unlikely.
+        """
+        word = self._start
+        assert word is not None
+        self._refused = True
+        self._again_s = now + AGAIN_S
+        if reply.reason == words.CONFLICT:
+            self._switch_off.refused()
+            self.motion = Motion.UNKNOWN
+            why = (
+                "another motion is in progress: the network has delivered the command twice, or"
+                " another program commands the robot"
+            )
+        elif word is words.RM and self._is_of_another(reply, now):
+            if reply.reason in ("", words.NO_START):
+                self.health.reference_failed(now)
+            if not reply.reason and self.health.reference_fails == 1:
+                self._again_s = now  # after a stop that took long, an intact server fails once
+            why = "the driver tries again"
+            if self.health.reference_fails >= REFERENCE_FAILS:
+                self._blocked, self.health.reference_fails = Motion.REFERENCE, 0
+                why = (
+                    "the motors may be stuck or without power; forward motion is refused until"
+                    " the command ends"
+                )
+        elif reply.reason == words.NO_START:
+            why = "no wheel has turned, so the driver tries again; check motors and power"
+        else:
+            why = self._obstacle(reply, self.motion)
+        if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
+            self._turns.refused()
+        failed = f"{word.text} failed ({reply.reason or 'no reason given'})"
+        self._halt(now, f"{failed}: {why}", arrived=arrived)
+
+    def _is_of_another(self, reply: Fail, now: float) -> bool:
+        """Return whether the failure text of RM may be about another motion, e.g. the last B.
+
+        An obstacle is believed if the front sonar sees it or RM repeats it.
+        """
+        if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
+            self._obstacle_told = False
+            return reply.reason not in words.OBSTACLES
+        told, self._obstacle_told = self._obstacle_told, True
+        return not told

@@ -1,0 +1,61 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The commands that switch off a motor that the server may have left on after TF or TB.
+
+The public server corrects the heading once more after such a move has ended. No stop ends this:
+the server knows of no motion. MCS writes both motors; then the server refuses all motions until
+MSM. This module knows commands and replies; it does not know when the robot is at rest.
+"""
+
+from typing import Final
+
+from omnibot_driver.core.mart.replies import Fail, Ok
+from omnibot_driver.core.mart.words import MCS, MSM, UNSUPPORTED, Request, Word
+
+OFF: Final = MCS.request(128, 128)
+"""The request that writes "stop" to both motors."""
+RELEASE: Final = MSM.request()
+"""The request that ends MCS. Without MCS in progress, it does nothing."""
+
+
+class SwitchOff:
+    """What remains to be done until the motors are off and the server accepts motions.
+
+    ``needed``: whether a motor may be on.
+
+    ``underway``: whether MCS may be in progress, so that the server refuses motions.
+    """
+
+    def __init__(self) -> None:
+        self.connect()
+
+    def connect(self) -> None:
+        """Begin a new connection. Another client may have left a motor on, or MCS in progress."""
+        self.needed, self.underway = True, False
+        self._supported = True
+
+    def begins(self, *, straight: bool) -> None:
+        """Record that a motion begins; ``straight``: by TF or TB. It overwrites both motors."""
+        self.needed = straight and self._supported
+
+    def refused(self) -> None:
+        """Record that the server has refused a request because of another action."""
+        self.underway = self._supported
+
+    def next(self) -> Request:
+        """Return the next request: OFF, then RELEASE."""
+        return OFF if self.needed else RELEASE
+
+    def sent(self) -> None:
+        """Record that the next request was sent."""
+        self.underway = True
+
+    def answered(self, word: Word, reply: Ok | Fail) -> None:
+        """Evaluate the reply to MCS or MSM.
+
+        A conflict shows that MCS is in progress, because an earlier MCS has arrived.
+        """
+        self.needed = False
+        if isinstance(reply, Fail) and reply.reason == UNSUPPORTED:
+            self._supported = False
+        self.underway = word is MCS and self._supported

@@ -1,0 +1,267 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests that no motor stays on after a straight move, whose end the public server can miss.
+
+In the sample in which the move ends, the server corrects the heading once more. That writes a unit
+to a motor that it has just switched off.
+"""
+
+from collections.abc import Callable
+
+import pytest
+from mart_bench import MartBench
+from mart_goals import drops, reach
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.mart import MartSettings as Settings
+from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.states import Motion, State
+from omnibot_driver.simulator.mart import Firmware
+
+pytestmark = pytest.mark.slow
+
+OFF = (128, 128)
+BOTH = [b"MCS 128 128", b"MSM"]
+
+
+def registers(bench: MartBench) -> tuple[int, int]:
+    return bench.server.chassis.right, bench.server.chassis.left
+
+
+def creeping(firmware: Firmware = "source") -> MartBench:
+    """Return a bench whose robot has just driven straight, and whose left motor is still on."""
+    bench = MartBench(firmware).ready()
+    bench.robot._good = False
+    bench.go_to(0.5, 0.0, 0.0)
+    pilot = bench.board._pilot
+    bench.run_until(lambda: pilot.motion is Motion.STRAIGHT, 10.0)
+    bench.run_until(lambda: pilot.motion is Motion.NONE, 10.0)
+    bench.server.drive(128, 127)
+    return bench
+
+
+def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
+    """Return whether a datagram is the ``number``-th of this command from now on."""
+    since = len(bench.written)
+    return lambda data: data.startswith(word) and bench.said(since).count(data) == number
+
+
+def test_a_motor_that_the_server_has_left_on_is_switched_off() -> None:
+    """The driver writes "stop" to both motors once, and then releases the server.
+
+    MSM waits for a late copy of MCS.
+    """
+    bench = creeping()
+    since, notices = len(bench.written), len(bench.notices)
+    bench.run_until(lambda: registers(bench) == OFF, 0.3)
+    assert bench.server.manual
+    bench.run(0.25)
+    assert bench.server.manual
+    bench.run(0.5)
+    assert bench.said(since) == BOTH
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+    assert len(bench.notices) == notices
+    assert bench.error.way_m < 0.05
+
+
+@pytest.mark.parametrize("word", [b"MCS", b"MSM"])
+def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
+    """The network loses the first MCS or MSM. The driver misses its reply, and repeats it."""
+    bench = creeping()
+    since = len(bench.written)
+    lost = drops(bench.robot.network[0].to_board, nth(bench, word, 1))
+    bench.run(4.0)
+    assert len(lost) == 1
+    assert bench.said(since).count(lost[0]) == 2
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+
+
+def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
+    """The server refuses a second MCS as conflicting action. The driver knows this conflict."""
+    bench = creeping()
+    since, notices = len(bench.written), len(bench.notices)
+    drops(
+        bench.robot.network[0].from_board,
+        lambda data: data == b"ok" and bench.said(since) == [BOTH[0]],
+    )
+    bench.run(4.0)
+    assert bench.said(since) == [BOTH[0], *BOTH]
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+    assert len(bench.notices) == notices
+
+
+def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
+    """A copy of MCS arrives 0.29 s late. A drive that is commanded meanwhile begins after MSM."""
+    bench = creeping()
+    since = len(bench.written)
+    bench.run_until(lambda: bench.server.manual, 0.3)
+    for _ in range(29):
+        bench.try_command(0.2, 0.0)
+        bench.run(0.01)
+    bench.server.receive(BOTH[0], 0, None, bench.server.now_s)
+    bench.command(0.2, 0.0, 2.0)
+    said = bench.said(since)
+    assert said[:2] == BOTH
+    assert any(each.startswith(b"RM ") for each in said)
+    assert bench.board._pilot.state is State.DRIVING
+    assert not bench.notices or "conflicting" not in bench.notices[-1]
+
+
+def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
+    """The reply to MCS is lost, so MCS is sent again and refused. A copy of the second one is late.
+
+    It begins MCS anew if it arrives after MSM. So MSM waits for this copy.
+    """
+    bench = creeping()
+    since = len(bench.written)
+    drops(
+        bench.robot.network[0].from_board,
+        lambda data: data == b"ok" and bench.said(since) == [BOTH[0]],
+    )
+    bench.run_until(lambda: bench.said(since).count(BOTH[0]) == 2, 2.0)
+    bench.run(0.29)
+    bench.server.receive(BOTH[0], 0, None, bench.server.now_s)
+    bench.run(1.0)
+    assert bench.said(since) == [BOTH[0], *BOTH]
+    assert not bench.server.manual
+
+
+def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
+    """A controlled turn writes both motors, and leaves them off."""
+    bench = MartBench("source").ready()
+    since = len(bench.written)
+    reach(bench, Pose(0.5, 0.0, 1.5))
+    bench.run(2.0)
+    said = bench.said(since)
+    straight = max(n for n, each in enumerate(said) if each.startswith(b"TF"))
+    assert said[straight + 1] == b"RST IMU"
+    assert b"MCS 128 128" not in said
+
+
+def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
+    """The e-stop is latched before MCS was sent. MCS and MSM follow, and the stops continue."""
+    bench = creeping()
+    since = len(bench.written)
+    bench.estop(True)
+    bench.run(3.0)
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+    assert [each for each in bench.said(since) if each in BOTH] == BOTH
+    mark = len(bench.written)
+    bench.run(1.0)
+    assert bench.said(mark).count(b"SRM") >= 5
+
+
+def test_a_motor_is_switched_off_with_a_dead_imu() -> None:
+    """MCS and MSM need no IMU."""
+    bench = creeping()
+    bench.robot.board.server.imu.alive = False
+    since = len(bench.written)
+    bench.run(5.0)
+    assert bench.said(since)[:2] == BOTH
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+
+
+def test_a_docking_move_is_followed_by_a_switch_off() -> None:
+    """A docking drives straight too."""
+    bench = MartBench("source", dock_m=0.4).ready()
+    bench.job(Job.DOCK, "DOCK", 12)
+    bench.run(2.0)
+    assert bench.said()[-2:] == BOTH
+
+
+def test_a_server_without_these_commands_is_asked_once() -> None:
+    """A server by the manual does not know MCS. The driver does not send it again."""
+    bench = MartBench("documented").ready()
+    for way_m in (0.5, 1.0):
+        reach(bench, Pose(way_m, 0.0, 0.0))
+        bench.run(1.0)
+    assert [each for each in bench.said() if each in BOTH] == [BOTH[0]]
+
+
+def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None:
+    """The words that the guard would send include MSM as long as MCS may be in progress."""
+    bench = creeping()
+    bench.run_until(lambda: bench.server.manual, 0.3)
+    assert (0, b"MSM") in bench.board.stop()
+    bench.run(1.0)
+    assert (0, b"MSM") not in bench.board.stop()
+
+
+@pytest.mark.parametrize("away_s", [0.0, 8.0])
+def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
+    away_s: float,
+) -> None:
+    """The first motion is refused, so the driver sends MSM; the next motion begins.
+
+    If the server is away at first, the driver uses the stop port, and must then find out whether a
+    motion is in progress.
+    """
+    bench = MartBench("source")
+    bench.robot._good = False
+    bench.server.receive(BOTH[0], 0, None, 0.0)
+    bench.run(0.1)
+    assert bench.server.manual
+    lost = drops(bench.robot.network[0].to_board, lambda _: bench.now < began_s + away_s)
+    drops(bench.robot.network[1].to_board, lambda _: bench.now < began_s + away_s)
+    began_s = bench.now
+    bench.open()
+    bench.run(away_s)
+    assert bool(lost) == bool(away_s)
+    bench.run_until(lambda: bench.session.state == "nominal", 30.0)
+    bench.run(2.0)
+    for _ in range(3):
+        bench.command(0.2, 0.0, 2.0)
+        bench.run(1.5)
+    assert not bench.server.manual
+    assert bench.truth.way_m > 0.3
+
+
+def test_a_driver_that_begins_switches_the_motors_off() -> None:
+    """The driver before it was killed directly after a straight move, so a motor may be on."""
+    bench = MartBench("source")
+    bench.server.drive(128, 127)
+    bench.ready()
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+    assert [each for each in bench.said() if each in BOTH] == BOTH
+
+
+def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
+    """The stop port has stopped RM, of which the server still knows: SRM would hang it.
+
+    The driver asks whether a motion is in progress. It sends MSM, whose ``ok`` comes twice. The
+    next RST IMU is lost.
+    """
+    bench = MartBench("source", settings=Settings(network_delay_s=0.5))
+    bench.robot._good = False
+    bench.server.receive(b"RM 30", 0, None, 0.0)
+    bench.run(0.5)
+    began_s = bench.now
+    to_board, from_board = bench.robot.network[0].to_board, bench.robot.network[0].from_board
+    released_s = list[float]()
+    send = from_board.send
+
+    def doubles(data: bytes, at_s: float) -> None:
+        send(data, at_s)
+        if data == b"ok" and bench.said()[-1] == b"MSM":
+            released_s.append(bench.now)
+            send(data, at_s + 0.45)
+
+    from_board.send = doubles
+    drops(
+        to_board,
+        lambda data: (
+            bench.now < began_s + 4.0
+            or (data == b"RST IMU" and bool(released_s) and bench.now < released_s[0] + 1.0)
+        ),
+    )
+    bench.open()
+    bench.run(15.0)
+    assert released_s
+    assert any("still reports a motion" in text for text in bench.notices)
+    assert not bench.server.hung
