@@ -158,6 +158,7 @@ class Hearing(Measuring):
                 self._once(SETTING_REFUSED)
         elif word in (words.MCS, words.MSM):
             self._switch_off.answered(word, reply)
+            self._rescue &= not self._switch_off.underway
         else:
             self.jobs.answered(answer, now)
             self.state = State.SERVING if self.jobs.collecting else State.STILL

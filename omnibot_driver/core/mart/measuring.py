@@ -141,10 +141,10 @@ class Measuring(Starts):
         if unknown and self._negative_sweep and now - self._swept_s < 2.0:
             self._stray_s = now
             self._rescue = True
+            self._switch_off.doubt()
             self._notice(
-                "robot moves, but the server knows of no motion; to stop the robot, the driver"
-                " starts a turn by 1 degree, at the end of which the server switches the motors"
-                " off",
+                "robot moves, but the server knows of no motion; the driver switches the motors off"
+                " (a server that does not know MCS has to turn the robot by 1 degree for that)",
                 halt=True,
             )
             return

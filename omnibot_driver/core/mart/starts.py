@@ -63,10 +63,10 @@ class Starts(FailedStarts):
             return self._send(HALTS[Motion.UNKNOWN], now)
         if now < self.appeared_s + STARTS_UP_S:
             return NO_PACKETS
+        if self._switch_off.underway or (self._rescue and self._switch_off.needed):
+            return self._switch_motors_off(now)
         if self._rescue:
             return self._begin(words.MCR.request("SLOW", 1), now)
-        if self._switch_off.underway:
-            return self._switch_motors_off(now)
         if self.imu.retries(now):
             return self._check(now)
         start = self._next_start(now)

@@ -230,6 +230,8 @@ class Stops(Ground, ABC):
                 self._appears(now)  # the server knows of no motion, so maybe it was restarted
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
+            if self._negative_sweep:
+                self._switch_off.doubt()
             self._swept_s = now
             self.greeted = True
         self._rest(now)

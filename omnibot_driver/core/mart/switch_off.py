@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The commands that switch off a motor that the server may have left on after TF or TB.
+"""The commands that switch off a motor that is on although the server knows of no motion.
 
-The public server corrects the heading once more after such a move has ended. No stop ends this:
-the server knows of no motion. MCS writes both motors; then the server refuses all motions until
-MSM. This module knows commands and replies; it does not know when the robot is at rest.
+The public server may leave one on after TF or TB, and a restarted one any. No stop ends this. MCS
+writes both motors; then the server refuses all motions until MSM. This module knows commands and
+replies; it does not know when the robot is at rest.
 """
 
 from typing import Final
@@ -30,9 +30,13 @@ class SwitchOff:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection. Another client may have left a motor on, or MCS in progress."""
-        self.needed, self.underway = True, False
+        """Begin a new connection, in which the server may know MCS."""
+        self.needed = self.underway = False
         self._supported = True
+
+    def doubt(self) -> None:
+        """Record that a motor may be on, although the server knows of no motion."""
+        self.needed = self._supported
 
     def begins(self, *, straight: bool) -> None:
         """Record that a motion begins; ``straight``: by TF or TB. It overwrites both motors."""

@@ -122,6 +122,34 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
     assert not bench.robot.stands
 
 
+def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
+    """Return a bench whose server was restarted in a move, and has had time to be stopped."""
+    bench = MartBench(firmware).ready()
+    bench.go_to(3.0, 0.0, 0.0)
+    bench.run_until(lambda: not bench.robot.stands, 5.0)
+    bench.run(0.6)
+    bench.server.restart(0.3)
+    bench.server.imu.alive = alive
+    bench.run(8.0)
+    return bench
+
+
+@pytest.mark.parametrize("firmware", ["firmware", "source"])
+def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Firmware) -> None:
+    """The robot moves, and no motion can begin. MCS needs no IMU, so it stops the robot."""
+    bench = rescued(firmware, alive=False)
+    assert bench.robot.stands
+    assert b"MCS 128 128" in bench.said()
+    assert b"MCR SLOW 1" not in bench.said()
+
+
+def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree() -> None:
+    """A documented server refuses MCS. The driver then sends a controlled turn."""
+    bench = rescued("documented", alive=True)
+    assert bench.robot.stands
+    assert b"MCR SLOW 1" in bench.said()
+
+
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
