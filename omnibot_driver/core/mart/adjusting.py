@@ -19,7 +19,9 @@ from omnibot_driver.core.readings import DisplacementReading
 WAG_S, WAG_UNITS = 0.2, 2
 """A small turn that shows whether a constant heading means a dead IMU or a straight drive.
 
-``WAG_S``: time in s of constant heading. ``WAG_UNITS``: added left, subtracted right.
+``WAG_S``: time in s for which the heading is constant before the driver makes this turn.
+
+``WAG_UNITS``: motor units added to the left motor, and subtracted from the right one.
 """
 
 STARTED_M: Final = 0.01
@@ -83,7 +85,10 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty: the left wheel has no encoder and may have turned for ``seconds``."""
+        """Add uncertainty to the odometry: the left wheel may have turned for ``seconds``.
+
+        The left wheel has no encoder.
+        """
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds
         turn_rad = min(math.pi, most_m / self._settings.track_m)
@@ -92,7 +97,7 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Record that the present motor units are too small to turn the motors.
 
-        Ignored if the robot has moved in this motion: something blocks it.
+        Nothing is recorded if the robot has moved in this motion: then an obstacle blocks it.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.turn.spun_rad) * self._settings.track_m / 2

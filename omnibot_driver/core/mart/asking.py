@@ -2,8 +2,8 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-SM or SRM may then hang the server (docs/boards/mart.md). This module knows commands and replies; it
-does not know why the stop port was used. The caller passes the time.
+After the stop port was used, SM or SRM may hang the server (docs/boards/mart.md). This module knows
+commands and replies; it does not know why the stop port was used. The caller passes the time.
 """
 
 import math
@@ -22,7 +22,7 @@ from omnibot_driver.core.packets import Packets
 STOP_AGAIN_S: Final = 3.0
 """Interval in s at which SL and SS are repeated while the server is silent.
 
-They also end a controlled move.
+SL and SS also end a controlled move, in which the server is silent.
 """
 APART_S: Final = 0.4
 """Least time in s between two encoder counts that are compared to see whether the robot moves."""
@@ -80,7 +80,7 @@ class Asking(Stops):
             self._lose(now, "the robot is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
-        """Stop any motion with SRM and SM. In this state they cannot hang the server."""
+        """Stop any motion with SRM and SM, which are now certain not to hang the server."""
         if self._lost_told:
             self._lost_told = False
             self._notice("the server answers again; the driver first stops any motion", halt=True)
@@ -88,5 +88,5 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """Ask for the server's name again, because a server that did not answer may be gone."""
+        """Query the server's name again: it did not answer ``word``, so it may be gone."""
         self._named_s = -math.inf

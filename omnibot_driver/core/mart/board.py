@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The MART controller as a ``Board`` of the driver. The pilot does the work.
+"""The MART controller as a ``Board`` of the driver. The pilot decides what is sent.
 
 The controller only answers queries. It is silent during a controlled move.
 """
@@ -49,9 +49,10 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""If the last reading is older than this time in s, the next reply gives at least NOTHING_MEASURED.
+"""Longest usual time in s between two readings from the replies of a server that answers.
 
-A moving robot is measured more often.
+After it, the next reply yields at least NOTHING_MEASURED, which shows that the server answers. A
+moving robot is measured more often.
 """
 EXPECTED_EVERY_S: Final = 0.2
 
@@ -122,9 +123,10 @@ class MartBoard(Board):
         self._mode = Mode.UNKNOWN
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
-        """Return the readings that a datagram from this channel brings.
+        """Return the readings that a datagram from this channel yields.
 
-        The result is at least NOTHING_MEASURED after UNREAD_S without a reading.
+        After UNREAD_S without a reading, a reply yields at least NOTHING_MEASURED: a reading
+        without values, which shows that the server answers.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -152,9 +154,9 @@ class MartBoard(Board):
         return self._pilot.take()
 
     def elapse(self, now: float) -> list[Reading]:
-        """Return the readings that are due without a datagram: jobs, odometry, expected silence.
+        """Return the readings that are due without a datagram, such as odometry or a job's result.
 
-        During expected silence, NOTHING_MEASURED is added.
+        While the server is expected to be silent, NOTHING_MEASURED is regularly among them.
         """
         readings = self._pilot.take()
         pilot = self._pilot

@@ -31,14 +31,17 @@ QUICKEST_S: Final = 0.1
 """Shortest time in s to wait for the reply to a query, in addition to the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
-"""After an unanswered query, ``trip_s`` becomes ``LOSS * trip_s + LOSS_S`` (s).
+"""Increase of the average duration of a query (``trip_s``) after an unanswered query.
 
-The reply may only be late, so the next query waits longer.
+It becomes ``LOSS * trip_s + LOSS_S`` (s). The driver then waits longer for the next reply, because
+the missing reply may only be late.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """Times in s. While the network is disturbed, a reply may answer an earlier query.
 
-``SLOW_S``: a longer exchange is a sign of it. ``DISTURBED_S``: assumed duration after a sign.
+``SLOW_S``: a longer exchange is a sign of a disturbance.
+
+``DISTURBED_S``: the network is regarded as disturbed for this time after the last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
 """Queries that are sent at once, even if a late reply of the same form may still come."""
@@ -49,7 +52,7 @@ NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
-All other replies to a check take at least ``least_s``.
+All other replies to a check take at least the shortest duration of the check.
 """
 
 
@@ -97,7 +100,7 @@ class Conversation:
 
     ``trip_s``: average duration of a query, in s; each unanswered query increases it.
 
-    ``answered_trip_s``: average duration of answered queries.
+    ``answered_trip_s``: average duration of answered queries, in s.
 
     ``missed_s``: time at which a reply was last overdue.
     """
@@ -117,9 +120,10 @@ class Conversation:
         self._disturbed_s = self._doubled_s = self.missed_s = -math.inf
 
     def may_ask(self, word: Word, now: float) -> bool:
-        """Return whether ``word`` may be sent now: no request is pending.
+        """Return whether ``word`` may be sent now. It must wait while a request is pending.
 
-        Queries outside PRESSING also wait until no late reply can be mistaken for theirs.
+        A query that is not urgent (PRESSING) also waits until no late reply can be mistaken for
+        its reply.
         """
         if self.pending is not None:
             return False
@@ -130,11 +134,13 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def answered(self, word: Word, reply: Ok, now: float) -> None:
-        """Record a reply to ``word`` that did not come through ``hear``; a copy of it may come."""
+        """Record a reply to ``word`` that was not passed to ``hear``. A copy of it may follow."""
         self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
-        """Record that ``reply`` was late. No other late reply of its form is expected then.
+        """Record that ``reply`` answers an earlier request.
+
+        After that, no other late reply of the same form is expected.
 
         Ignored if ``reply`` is a copy.
         """
@@ -177,7 +183,7 @@ class Conversation:
     def ask(self, request: Request, now: float, patience_s: float | None = None) -> Packets:
         """Return the packets with the request, and begin to wait for its reply.
 
-        ``patience_s``: longest wait in s; by default from the command.
+        ``patience_s``: longest wait in s; None for the usual wait after this command.
         """
         if patience_s is None:
             patience_s = self._patience_s(request.word)
@@ -187,7 +193,7 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        The missing reply is recorded, except a controlled move's: ``Stopping`` waits for that.
+        Its reply is recorded as missing. Exception: ``Stopping`` waits for a controlled move's.
         """
         if self.pending is None:
             return None
@@ -215,7 +221,7 @@ class Conversation:
     def hear(self, reply: Reply, now: float) -> Answer | None:
         """Return the reply with its request, or None if the reply is late, duplicate or foreign.
 
-        Not for replies to HELLO: it may be sent during another request.
+        Replies to HELLO must not be passed: HELLO may be sent while another request is pending.
         """
         pending = self.pending
         if isinstance(reply, Ok):
@@ -267,8 +273,8 @@ class Conversation:
     ) -> bool:
         """Return whether an identical reply came within the last ``delay_s``.
 
-        ``but``: this command's replies are ignored. ``kinds``: only the replies to these kinds of
-        commands are compared.
+        ``but``: the command whose replies are ignored. ``kinds``: only the replies to these kinds
+        of commands are compared.
         """
         return isinstance(reply, Ok) and any(
             each == reply and until_s > now and word is not but and word.kind in kinds

@@ -25,31 +25,33 @@ It grows with the square root of the time (random walk).
 WHEEL_HEADING: Final = 0.06
 """Relative standard deviation of a turn on the spot that only the right wheel measures."""
 END_M, END_RAD = 0.004, math.radians(0.4)
-"""Standard deviations of the errors of one motion's start and coasting.
+"""Standard deviations of the errors that the start and the coasting of a motion cause.
 
 ``END_M``: position, in m. ``END_RAD``: heading, in rad.
 """
 TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 """Standard deviations of the angle that the server reports for a turn on the spot.
 
-``TOLD_TURN_RAD``: in rad, from rounding to whole degrees. ``TOLD_TURN``: as a fraction.
+``TOLD_TURN_RAD``: in rad, from rounding to whole degrees.
+
+``TOLD_TURN``: a further error, as a fraction of the angle.
 """
 PIVOT: Final = 0.01
-"""Distance from the robot's centre to the point about which it turns on the spot.
+"""Standard deviation of the distance between the robot's centre and the point about which it turns.
 
-It is a standard deviation, as a fraction of the track width.
+It is a fraction of the track width, and applies to turns on the spot.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Random error of a turn known only from the commands, divided by its constant error.
+"""Ratio of the random and the constant error of a turn that is known only from the commands.
 
-Both are standard deviations. The random error is independent in each step.
+Both errors are standard deviations. The random error is independent in each step.
 """
 ASTRAY: Final = 0.7
-"""Relative error of a driven distance, per variance of the heading (rad²).
+"""Relative error of a driven distance, divided by the variance of the heading (rad²).
 
-The error has the same size along and across the motion: at most the distance.
+The relative error is at most 1. It applies along the motion, and also across the motion.
 """
 SPREAD: Final = 0.3
 """Standard deviation of a time that is equally likely anywhere in an interval of length 1.
@@ -87,8 +89,9 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
-        ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn. ``aside_m``:
-        across the motion.
+        ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn.
+
+        ``aside_m``: standard deviation of the position across the motion, in m.
         """
         middle_rad = heading_rad + turn_rad / 2
         cos, sin = math.cos(middle_rad), math.sin(middle_rad)
@@ -121,7 +124,7 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Record that a motion has begun. ``heading_told`` can later remove its heading error."""
+        """Record that a motion begins, so that ``heading_told`` can remove its heading error."""
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
@@ -150,20 +153,25 @@ class Doubt:
         self.add(0.0, STRAIGHT_STDDEV_RAD**2)
 
     def end_turn(self, spun_rad: float, told_rad: float | None) -> None:
-        """Add the errors of a turn on the spot that has ended; arguments as in ``turn``."""
+        """Add the errors of a turn on the spot that has ended.
+
+        ``spun_rad``: the turn that the wheel measured. ``told_rad``: the turn that the server
+        reported, or None.
+        """
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
         """Replace the wheel's heading error in the last turn by the gyro's smaller error.
 
-        The server has recorded the angle by the gyro. Call this before the position changes.
+        The server has recorded the gyro's angle. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 
     def turn(self, spun_rad: float, told_rad: float | None) -> Errors:
         """Return the errors of a turn on the spot so far, including a small sideways motion.
 
-        ``spun_rad``: the turn by the wheel. ``told_rad``: the turn by the server, or None.
+        ``spun_rad``: the turn that the wheel measured. ``told_rad``: the turn that the server
+        reported, or None.
         """
         variance = _by_wheel(spun_rad) if told_rad is None else _by_gyro(told_rad)
         pivot_m = PIVOT * self.settings.track_m * min(1.0, abs(spun_rad))

@@ -16,9 +16,9 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed."""
 REFERENCE_FAILS: Final = 2
-"""After this number of bare ``fail`` replies to RM in a row, the driver stops trying.
+"""Number of failed starts of RM in a row after which the driver stops trying.
 
-A single one is normal after a long stop.
+A single failed start is normal after a long stop.
 """
 
 
@@ -63,9 +63,10 @@ class FailedStarts(Adjusting):
         self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure text of RM may be about another motion, e.g. the last B.
+        """Return whether the failure text of RM may be about an earlier motion, e.g. the last B.
 
-        An obstacle is believed if the front sonar sees it or RM repeats it.
+        A reported obstacle is an obstacle of RM if the front sonar also detects it, or if RM
+        reports it again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -39,16 +39,20 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""Each turn since the last straight move adds WIDER * NEAR_RAD to the allowed heading error.
+"""Growth of the allowed heading error by each turn since the last straight move.
 
-Turns overshoot.
+It is a fraction of the initial allowed error. Without it, the robot could turn to and fro, because
+turns overshoot.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. After them, the driver gives the goal up."""
 
 
 LEAST_LIKE: Final = 0.35
-"""If a move differs from its request by more than this fraction, it may have run twice."""
+"""Largest relative difference between a measured move and its request.
+
+If the difference is larger, the server may have run the move twice.
+"""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
@@ -63,7 +67,7 @@ class Done:
 
     ``way_m``, ``turned_rad``: distance and turn by the encoder.
 
-    ``quiet_s``: longest possible time from the start of a duplicate move to the encoder's count.
+    ``quiet_s``: longest time in s for which a duplicate of the move may have run after the move.
     """
 
     request: Request
@@ -93,7 +97,7 @@ class Done:
     def may_have_run_twice(self, delay_s: float) -> bool:
         """Return whether the server may have run the move twice, from a duplicated datagram.
 
-        The encoder count then covers only the second run.
+        After two runs, the encoder count covers only the second run.
         """
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         like = abs(seen - self.asked) <= LEAST_LIKE * self.asked
@@ -150,7 +154,8 @@ class Move:
 
     ``turns``: number of turns since the last straight move.
 
-    ``given_up``: no further move is sent: arrived, failed, or MOST_MOVES sent.
+    ``given_up``: whether no further move is sent. The robot has arrived, a move has failed, or
+    MOST_MOVES moves were sent.
     """
 
     place: Pose
@@ -166,7 +171,8 @@ class Move:
     def repeated(self) -> "Move":
         """Return the progress to continue with when ``place`` is commanded again.
 
-        A failed goal begins anew. A finished goal needs moves only beyond ENOUGH_M.
+        A failed goal begins anew. At a goal that the robot has reached, it drives again only if it
+        is more than ENOUGH_M (m) away.
         """
         if not self.given_up:
             return self

@@ -50,7 +50,7 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 The silence is ABSENT_S (s), plus the duration of ABSENT_TRIPS exchanges.
 """
 MOST_GREETINGS: Final = 10
-"""Number of HELLOs whose answers the driver expects. Older ones are lost."""
+"""Largest number of HELLOs whose answers the driver expects. Older HELLOs are regarded as lost."""
 PRESENT_S: Final = 0.35
 """Silence in s up to which a server has certainly not been restarted."""
 ABSENT_BUSY_S: Final = 2.5
@@ -193,7 +193,10 @@ class Ground:
 
     @property
     def _seems_present(self) -> bool:
-        """Whether the server was not absent, not even for a short restart, since ``_present_s``."""
+        """Whether the server has not been restarted since the driver sent the last start command.
+
+        Replies without a longer pause between them show this.
+        """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
 

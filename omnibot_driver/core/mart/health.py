@@ -61,9 +61,10 @@ class Health:
 
     ``heading_changes``: number of these changes in the present motion.
 
-    ``reference_fails``: number of bare ``fail`` replies to RM in a row.
+    ``reference_fails``: number of starts of RM in a row that have failed.
 
-    ``outlived``: a stop was answered only after the stop port. The next stop can fail.
+    ``outlived``: whether the server has answered a stop only after the stop port was used. The
+    next stop can then fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -124,7 +125,7 @@ class Health:
     def _is_of_another(self, word: Word, inches: float) -> bool:
         """Return whether the distance is probably the reply to another query.
 
-        That is assumed for 0 inches, and for the last value of the other sonar.
+        That is assumed for 0 inches, and for a distance that equals the other sonar's last one.
         """
         other = self._before.get(SRC if word is SFC else SFC)
         return inches == 0 or (inches > 0 and inches == other)
@@ -155,14 +156,15 @@ class Health:
     def heading_changed(self, motion: Motion) -> None:
         """Record that the heading (RMRA) has changed in this motion.
 
-        HEADING_CHANGES changes prove that the server reports the heading in this kind of motion.
+        A few changes (HEADING_CHANGES) prove that the server reports the heading in motions of
+        this kind.
         """
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
     def reference_failed(self, now: float) -> None:
-        """Record that RM was answered by a bare ``fail``, without a reason."""
+        """Record that RM has failed without a reason, or because no wheel has turned."""
         self.reference_fails += 1
         self._reference_failed_s = now
 

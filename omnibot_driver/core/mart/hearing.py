@@ -18,9 +18,9 @@ from omnibot_driver.core.mart.states import ROLLING, Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest ``part`` (see ``SpeedLoop``) that may stay unanswered while the heading is unknown.
+"""Largest relative change of the motors' units whose reply may be missing in an unmeasured turn.
 
-Above it, the driver stops the robot: the robot may turn unnoticed.
+After a larger change without a reply, the driver stops the robot, because it may turn unnoticed.
 """
 
 
@@ -65,7 +65,7 @@ class Hearing(Measuring):
     def _may_be_late(self, reply: Ok, now: float) -> bool:
         """Return whether a reply after a stop may be a copy, or answer an earlier request.
 
-        For example, ``ok`` to the start, or an encoder count.
+        For example, it may be the ``ok`` to the start, or an encoder count.
         """
         late = now < self.conversation.late_until_s(reply.form)
         if reply.form is Form.INTEGER and late:
@@ -97,7 +97,7 @@ class Hearing(Measuring):
             self._named_s = self._name_from_s
 
     def _hurry(self, now: float) -> None:
-        """Wait no longer for a reply, because the server has answered a later HELLO before it."""
+        """Shorten the wait for a reply, because the server has already answered a later HELLO."""
         greeted_s = self._greeted_of_name(now)
         network = self.conversation
         pending = network.pending
@@ -113,7 +113,7 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Time in s that an exchange takes now, by the queries and the last check of the IMU."""
+        """Present duration of an exchange in s, estimated from queries and the last IMU check."""
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 
     def _greeted_of_name(self, now: float) -> float:
@@ -124,7 +124,7 @@ class Hearing(Measuring):
         return recent[0] if recent else -math.inf
 
     def _named_in_a_move(self, now: float) -> None:
-        """Stop any motion, because the server gives its name although a move should keep it busy.
+        """Stop any motion, because the server answers HELLO although a move should keep it busy.
 
         The move's reply was lost, or the server was restarted.
         """

@@ -23,10 +23,12 @@ QUIET_S: Final = 1.0
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn; the robot stands meanwhile.
 
-``RECORD_S``: for the reply, plus three average queries. ``RECORD_QUIET_S``: for each piece.
+``RECORD_S``: for the reply, plus the duration of three average queries.
+
+``RECORD_QUIET_S``: for each piece of the file.
 """
 TIMES: Final = 3
-"""Largest number of times that the driver sends the request of a job in REPEATED."""
+"""Largest number of times that the driver sends the request of a repeatable job (REPEATED)."""
 
 CHECK: Final = "check controller and network"
 EXIT_LOST: Final = "if the server has ended, start it again; if it still answers, call again"
@@ -77,7 +79,8 @@ class Jobs:
 
     ``moving``: whether the docking move was sent.
 
-    ``turn_record``: name and pieces of the last TURN_RECORD; None if cancelled.
+    ``turn_record``: name and pieces of the file of the last turn; None if the download was
+    cancelled.
     """
 
     def __init__(self) -> None:
@@ -126,7 +129,7 @@ class Jobs:
         return f"{since}, {sum(map(len, self._pieces))} of {self._size} bytes"
 
     def ask(self, job: Job, token: object, now: float, *arguments: object) -> None:
-        """Begin a job, in place of an unsent job of the driver itself.
+        """Begin a job. It replaces a job of the driver itself that was not sent yet.
 
         Raises RequestRefused during another job, or if there may be no log to download.
         """
@@ -154,7 +157,8 @@ class Jobs:
     def next(self, now: float, *, stands: bool) -> Request | None:
         """Return the job's request if it must be sent now, else None.
 
-        ``stands``: whether measurements show rest, which TURN_RECORD does not need.
+        ``stands``: whether measurements show that the robot is at rest. TURN_RECORD does not wait
+        for rest.
         """
         ready = stands or self.job is Job.TURN_RECORD
         return self._request if ready and not self._waiting else None
@@ -184,7 +188,7 @@ class Jobs:
     def missed(self, word: Word, now: float) -> None:
         """Repeat or end the job if the reply to its request did not come in time.
 
-        Another ``word`` than the job's is ignored.
+        Ignored if ``word`` is not the command of the job.
         """
         if not self._waiting or self._request is None or word is not self._request.word:
             return
@@ -232,7 +236,7 @@ class Jobs:
             )
 
     def cancel(self, why: str) -> None:
-        """End the job as failed, for the reason ``why``; one of the driver's own jobs just ends."""
+        """End the job as failed, for the reason ``why``; a driver's own job ends without result."""
         if self.job in OWN:
             self._clear()
         elif self.job is not None:

@@ -11,7 +11,7 @@ from typing import Final
 from omnibot_driver.core.mart.doubt import CLOCK_S
 
 WINDOW_S, SPREADS = 0.35, 4
-"""Averaging time of speeds: WINDOW_S (s) or SPREADS times ``spread_s``, whichever is longer."""
+"""Averaging time of speeds: WINDOW_S (s), or SPREADS times a reply's time uncertainty if longer."""
 LEAST_S: Final = 0.05
 """Shortest time in s between two counts that is used to compute a speed."""
 
@@ -37,7 +37,7 @@ class MeanSpeeds:
         self._track.append((at_s, self._way_m, self._yaw_rad))
 
     def correct(self, turn_rad: float) -> None:
-        """Add a correction of the heading, as a part of the next displacement's turn."""
+        """Add a correction of the heading to the turn of the next displacement."""
         self._yaw_rad += turn_rad
 
     def forget(self) -> None:
@@ -67,7 +67,7 @@ class MeanSpeeds:
 
     @property
     def changes(self) -> tuple[float, float]:
-        """Speed (m/s) and turn rate (rad/s) between the last two counts, minus ``means``."""
+        """Speed (m/s) and turn rate (rad/s) between the last two counts, minus the mean values."""
         if not self.are_known:
             return 0.0, 0.0
         (then_s, then_m, then_rad), (at_s, way_m, yaw_rad) = self._track[-2], self._track[-1]

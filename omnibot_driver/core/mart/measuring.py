@@ -22,7 +22,10 @@ STRAY_AGAIN_S: Final = 3.0
 ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 """Times in s for which a robot may coast after the end of a motion.
 
-``ROLLS_S``: after a stop. ``ROLLS_AFTER_MOVE_S``: after a move, whose failure may come before rest.
+``ROLLS_S``: after a stop.
+
+``ROLLS_AFTER_MOVE_S``: after a controlled move. If it fails, the robot may still coast when the
+reply comes.
 """
 
 
@@ -58,10 +61,10 @@ class Measuring(Starts):
             self.loop.volts = self.health.volts_or(self._settings.nominal_volts)
 
     def _shows_restart(self, before_rad: float | None) -> bool:
-        """Return whether the present heading shows a restart: exactly zero, as before the first RM.
+        """Return whether the present heading is exactly zero because the server was restarted.
 
-        The heading is also zero when RM begins or its sign changes: ``before_rad`` is then near
-        zero.
+        Until its first RM, a server reports zero. The heading is also zero when RM begins, or when
+        its sign changes. Then the heading before, ``before_rad``, is near zero.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False
@@ -123,7 +126,7 @@ class Measuring(Starts):
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """Stop a robot whose encoder counts change although it should be at rest.
 
-        Causes: a late duplicate of a start, another client, a push.
+        Possible causes: a late duplicate of a start, another client, or a push.
         """
         self._counted_at_rest += 1
         rolls_s = ROLLS_AFTER_MOVE_S if self._moved_last else ROLLS_S

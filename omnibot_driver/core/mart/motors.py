@@ -61,9 +61,10 @@ class Motors:
         return _units(self._lines, self._spin_speed(rate_radps))
 
     def corrected_spin_units(self, units: int, seen_radps: float, rate_radps: float) -> int:
-        """Return the motor units for a turn on the spot at ``rate_radps``, without learning.
+        """Return the motor units for a turn on the spot at ``rate_radps``, from a measured rate.
 
-        ``seen_radps``: the measured rate of the present turn, with ``units``.
+        ``seen_radps``: the measured rate of the present turn, which uses ``units``. The driver
+        does not learn from this rate here.
         """
         lines = self.lines()
         _learn_spin(lines, units, self._spin_speed(seen_radps))
@@ -75,7 +76,7 @@ class Motors:
             _learn_spin(self._lines, units, self._spin_speed(rate_radps))
 
     def lines(self) -> Lines:
-        """Return a copy of the lines of the right and the left motor."""
+        """Return a copy of what is learned about the right and the left motor, as MotorLines."""
         return copy.copy(self._right_line), copy.copy(self._left_line)
 
     def restore(self, lines: Lines) -> None:

@@ -21,7 +21,7 @@ from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
 LEAST_STOP_S: Final = 0.3
-"""Shortest time in s from SL or SS until the server answers again, if they stop a move."""
+"""Shortest time in s from SL or SS until the server answers again, if a move was stopped."""
 
 
 class Moves(Asking):
@@ -86,7 +86,8 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn by how much a move that has ended goes beyond its target.
 
-        On a good network, a turn's record is downloaded first: it is more exact.
+        On a good network, the driver first downloads the server's record of a turn, because it is
+        more exact.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
@@ -134,8 +135,8 @@ class Moves(Asking):
     def _stopped_a_copy(self, move: Request, now: float) -> bool:
         """Return whether SL and SS may have stopped a copy of ``move``.
 
-        They have not if the server has answered sooner than it can end a motion. A copy that had
-        ended by itself would have taken less than half of its usual time.
+        The result is False in one case: the server has answered sooner than it can end a motion,
+        and the time was too short for a copy to end by itself.
         """
         if self._copies_stopped_s < self._rested_s:
             return False
@@ -145,9 +146,11 @@ class Moves(Asking):
         return not (quick and done.quiet_s < done.usual_s / 2)
 
     def _doubt_a_copy(self, now: float, *, suspected: bool) -> bool:
-        """Return whether the server may have run the last controlled move twice, by its count.
+        """Return whether the server may have run the last controlled move twice.
 
-        The encoder count then covers only the second run, so the uncertainty grows.
+        After two runs, the encoder count covers only the second one, so the uncertainty grows.
+
+        ``suspected``: whether SL and SS may have stopped the second run.
         """
         move, self._last_move = self._last_move, None
         if move is None or not (suspected or self.conversation.disturbed(now)):

@@ -64,7 +64,8 @@ class MartOdometry(Reckoning):
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
         """Return the errors of the motion since the last count, and of that count's uncertain time.
 
-        ``ahead_s``: time since the last count. ``blind_since_s``: as in ``told``.
+        ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the present
+        controlled move, or None.
         """
         if blind_since_s is not None:
             blind_s = max(0.0, now - blind_since_s)

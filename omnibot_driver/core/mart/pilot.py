@@ -41,12 +41,15 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
-"""Unanswered requests delay VOLTS at most until this time in s after the previous VOLTS."""
+"""Unanswered requests delay a VOLTS query until this time in s after the previous one, at most."""
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends HELLO to a silent server.
 
-``SILENT_S``: from the last reply, plus two exchanges. ``SILENT_AFTER_MOVE_S``: the same while a
-duplicate of a move may be running. ``GREET_AGAIN_S``: between two HELLOs.
+``SILENT_S``: from the last reply, plus the duration of two exchanges.
+
+``SILENT_AFTER_MOVE_S``: from the last reply, while a duplicate of a move may be running.
+
+``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
 """Time in s after a move within which the server must answer ENC or HELLO.
@@ -61,8 +64,8 @@ class Pilot(Hearing):
     def apply(self, wanted: Wanted, now: float) -> None:
         """Replace the wanted command by ``wanted``.
 
-        A motion command or a stop cancels the present job. Exception: a repeated goal keeps
-        TURN_RECORD.
+        A motion command or a stop cancels the present job. Exception: a repeated goal does not
+        cancel the download of a turn's record.
         """
         docks, move, order = self.jobs.moving, self._move, moving_order(wanted, now)
         if not (move and isinstance(order, GoTo) and order.place == move.place):
@@ -110,7 +113,7 @@ class Pilot(Hearing):
     def fell_silent(self) -> None:
         """Begin a new connection after a long silence, because the server may have been restarted.
 
-        Not during a motion or a job.
+        Nothing changes during a motion or a job.
         """
         if self.state in (State.STILL, State.UNKNOWN):
             self.connect()
@@ -215,7 +218,7 @@ class Pilot(Hearing):
     def _copy_stop_s(self) -> float:
         """The time at which to stop a suspected duplicate of a move, or infinity.
 
-        The stop is SL and SS. After RM or B, they would hang the server.
+        SL and SS stop the duplicate. After RM or B, they would hang the server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf

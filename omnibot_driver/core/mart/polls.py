@@ -38,7 +38,8 @@ In the other states the command port is busy: no queries are sent.
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
 """The two sonars, and the least time in s between their queries.
 
-If nothing is near, both report the same: a late copy could be mistaken.
+If nothing is near, both report the same value. With less time between the queries, a late copy of
+one sonar's reply could be mistaken for the reply of the other sonar.
 """
 
 
@@ -55,7 +56,8 @@ class Polls:
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
 
-        Sorting by due time plus period gives each query its turn in slow exchanges.
+        The query with the smallest sum of due time and period is first. With this order, every
+        query is sent even if exchanges are slow.
         """
         periods = PERIODS.get(state, {})
         late = [word for word in periods if now >= self._at(word, state)]

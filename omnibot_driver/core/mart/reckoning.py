@@ -24,7 +24,7 @@ from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 BEGIN_RADPS: Final = 0.03
 """Standard deviation in rad/s of the turn rate in RM before the server reports a heading.
 
-The motors are unequal.
+Unequal motors cause this turn.
 """
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
@@ -165,7 +165,8 @@ class Reckoning:
     def guess_changed(self, part: float, late_s: float) -> None:
         """Add the heading error of a change of the wheel speed ratio at an uncertain time.
 
-        ``part``: relative change. ``late_s``: interval in s of the change.
+        ``part``: relative change of the ratio. ``late_s``: length in s of the interval in which
+        the change may happen.
         """
         turn_rad = part * abs(self.speeds.means[0]) * late_s / self._settings.track_m
         self.doubt.add(0.0, turn_rad * turn_rad)
@@ -173,7 +174,8 @@ class Reckoning:
     def counted(self, count: int, when: Moment) -> DisplacementReading | None:
         """Process a count of the right wheel; return the displacement since the last count.
 
-        None: implausible or too old. NOTHING_MEASURED: unknown displacement.
+        Return None for a count that is implausible or too old, and NOTHING_MEASURED for an unknown
+        displacement.
         """
         if when.from_s < self._began_s:
             return None
@@ -205,7 +207,8 @@ class Reckoning:
     def maybe(self) -> tuple[float, float]:
         """Distance of the right wheel in m, and turn in rad, that the pose may lack.
 
-        Zero if the counts show whether the last motion has begun.
+        While the counts do not show whether the last motion has begun, these are the values of
+        that motion. Otherwise both are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -239,7 +242,7 @@ class Reckoning:
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
         """Correct a heading computed from commands, once the server reports the turn.
 
-        Return the correction in rad; it is not a motion.
+        Return the correction in rad. The robot has not moved by this angle.
         """
         if not self._guessed:
             return 0.0
@@ -303,9 +306,9 @@ class Reckoning:
             self.doubt.add(wheel_m**2, (2 * wheel_m / self._settings.track_m) ** 2)
 
     def stale(self, now: float) -> tuple[float, float]:
-        """Return how much older than FRESH_S the last heading is, in s, and the resulting error.
+        """Return by how many s the last heading is older than FRESH_S, and the resulting error.
 
-        The error is a standard deviation in rad. Both are 0 except in RM.
+        The error is the heading's standard deviation in rad. Outside RM, both values are 0.
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

@@ -17,17 +17,17 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""If the first heading after RM differs by less than this (rad), it may be the old one.
+"""If the first heading in RM is this near (rad) to the last one before RM, it may be a late reply.
 
 The server resets the heading only when RM begins.
 """
 MOST_RAD: Final = 1e7
-"""Size in rad from which a heading is rejected, e.g. 1e15 degrees after a clock set back.
+"""Size in rad from which a heading is rejected, such as 1e15 degrees after a clock was set back.
 
 The server integrates the turn rate over unsigned milliseconds.
 """
 AHEAD_S: Final = 0.3
-"""Longest time in s by which a heading is predicted beyond its report, to an encoder count."""
+"""Longest time in s from a heading to an encoder count for which the heading is predicted."""
 ODD_TIMES: Final = 3
 """After this number of implausible headings in a row, the last of them is accepted."""
 SPREADS: Final = 4
@@ -39,11 +39,11 @@ class RelativeHeading:
 
     ``told_s``: time of the last accepted heading.
 
-    ``from_s``: earliest time of the last heading that certainly answers RMRA.
+    ``from_s``: earliest possible time of the last heading that is certainly a reply to RMRA.
 
     ``changed_s``: time of the last change of heading.
 
-    ``same``: number of equal headings since then.
+    ``same``: number of equal headings since the last change.
     """
 
     def __init__(self) -> None:

@@ -18,9 +18,10 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""A turn on the spot begins only when its ramped yaw rate is this near to the final value.
+"""Largest difference between a ramped yaw rate and its final value at which a turn begins.
 
-It is a fraction of the final value.
+It is a fraction of the final value. It applies to turns on the spot. An acceleration limit causes
+the ramp.
 """
 
 

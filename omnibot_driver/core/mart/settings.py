@@ -12,15 +12,16 @@ class MartSettings:
 
     ``metres_per_count``: distance per count of the right wheel; negative if forward counts down.
 
-    ``speed_per_unit``: speed of a wheel in m/s for one unit of RM at ``nominal_volts``.
+    ``speed_per_unit``: speed of a wheel in m/s for one motor unit at ``nominal_volts``.
 
     ``motor_balance``: speed of the left motor divided by the right's, at equal units.
 
     ``heading_sign``: 1 if the server's relative angle increases to the left, else -1.
 
-    ``network_delay_s``: longest time of a datagram on its way.
+    ``network_delay_s``: longest time for which a datagram is on its way.
 
-    ``spin_speed``: of R and L: "custom" (the commanded speed, by SSP) or "fixed" (SLOW).
+    ``spin_speed``: speed of turns on the spot: "custom" (as commanded) or "fixed" (the server's
+    speed SLOW).
 
     ``max_speed_mps``, ``max_yaw_rate_radps``: limits for moves to a goal; SLOW is used if normal
     moves exceed them.

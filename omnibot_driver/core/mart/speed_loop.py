@@ -32,13 +32,16 @@ SETTLE_S, LEARN_S = 0.45, 0.35
 """
 LARGE_UNITS: Final = 3
 MOST_MISSED: Final = 4
-"""Largest number of unanswered changes that are judged together by the measured speeds."""
+"""Largest number of unanswered changes of the units that the driver examines together.
+
+The measured speeds show which of these changes have arrived at the server.
+"""
 LEARN_TRIPS, LESS_PER_S = 4, 10.0
-"""Effect of slow exchanges with the server on learning.
+"""Effect of slow exchanges with the server on what the driver learns about the motors.
 
-``LEARN_TRIPS``: exchanges added to the averaging window.
+``LEARN_TRIPS``: the averaging window is longer by the duration of this number of exchanges.
 
-``LESS_PER_S``: factor 1 + LESS_PER_S * duration (s) of a speed's standard deviation.
+``LESS_PER_S``: relative growth of a speed's standard deviation, per second that an exchange takes.
 """
 SLOWEST_MPS: Final = 0.015
 """A wheel whose measured speed in m/s is above this is regarded as turning."""
@@ -52,13 +55,15 @@ HOLD_AFTER_S: Final = 1.0
 """The heading error is not integrated for this time in s after a new commanded turn rate."""
 NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
-"""Growth of the wheel speed ratio's variance per ``part`` squared, by an uncertain change.
+"""Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units.
 
-``COPIED``: if the change may arrive twice, as exchanges take longer than ``SLOW_TRIP_S`` (s).
+It is a factor of the squared relative change.
+
+``COPIED``: if the change may arrive twice, because exchanges take longer than ``SLOW_TRIP_S`` (s).
 
 ``MISSED``: if the change was not answered.
 
-Both are large: a wrong ratio lasts for the whole motion.
+Both factors are large, because a wrong ratio lasts for the whole motion.
 """
 
 
@@ -68,7 +73,8 @@ class _Side:
 
     ``stood_s``: time in s without motion, although the units suffice.
 
-    ``window_units_s``, ``window_m``: sum of units * seconds, and distance, in the averaging window.
+    ``window_units_s``, ``window_m``: sum of units * seconds, and distance in m, in the averaging
+    window.
     """
 
     line: MotorLine
@@ -87,7 +93,7 @@ class SpeedLoop(Motors):
 
     ``trip_s``: average duration of an exchange, in s.
 
-    ``part``: size of the last change, e.g. 0.2 + 0.3 for 2 and 3 of 10 units.
+    ``part``: sum of the relative changes of both motors' units by the last change.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -112,7 +118,7 @@ class SpeedLoop(Motors):
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
-        """Return the units with which both sides start a motion: those of the slower side."""
+        """Return the units with which both motors start: those that the slower wheel needs."""
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
         units = min(60, self._right.wanted_units(slower_mps / self.per_unit_mps))
@@ -125,7 +131,7 @@ class SpeedLoop(Motors):
     def stood(self, units: int | None = None) -> None:
         """Record that no motor turns with the present units, or with ``units`` on both sides.
 
-        A motor with MOST_DEAD units or more is blocked: nothing is learned.
+        A motor with MOST_DEAD units or more is regarded as blocked: nothing is learned.
         """
         for side in (self._right, self._left):
             each = side.units if units is None else units
@@ -166,12 +172,15 @@ class SpeedLoop(Motors):
 
     @property
     def measured_balance(self) -> float | None:
-        """The ratio ``balance`` without its limit, or None if it was not measured yet."""
+        """Measured ratio of left to right motor speed, without a limit; None before a measurement.
+
+        Both motors then have the same units.
+        """
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
     @property
     def bend(self) -> float:
-        """Relative standard deviation of ``left_over_right``."""
+        """Relative standard deviation of the expected wheel speed ratio (``left_over_right``)."""
         return math.sqrt(UNEQUAL**2 + self._unsure)
 
     def measured(
@@ -185,7 +194,8 @@ class SpeedLoop(Motors):
     ) -> None:
         """Learn from a displacement measured over ``seconds``, and update the heading error.
 
-        ``right_only``: the left wheel was not measured; its line follows the right motor's.
+        ``right_only``: whether only the right wheel was measured. What is learned about the right
+        motor then also changes the left motor's line.
         """
         if now - self._rate_changed_s > HOLD_AFTER_S:
             error_rad = self._error_rad + self._rate_radps * seconds - turned_rad
@@ -250,7 +260,8 @@ class SpeedLoop(Motors):
     def change(self, speed_mps: float, rate_radps: float, now: float) -> tuple[int, int] | None:
         """Return the changes of the right and the left motor's units, or None if both are zero.
 
-        Positive is faster. ``speed_mps`` is not negative; ``rate_radps`` is positive to the left.
+        A positive change makes the motor faster. ``speed_mps`` is not negative; ``rate_radps`` is
+        positive to the left.
         """
         if abs(rate_radps - self._rate_radps) > NEW_RADPS:
             self._rate_changed_s, self._error_rad = now, 0.0

@@ -22,26 +22,31 @@ RATIO: Final = 0.35
 OFF, OFF_AGAIN = 0.05, 0.12
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: until the motors' speed is known. ``OFF_AGAIN``: after that, as a new start disturbs more.
+``OFF``: until the motors' speed is known.
+
+``OFF_AGAIN``: afterwards. It is larger, because the new start disturbs more than a small error.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for turns that something slows down, as fractions of the commanded rate.
 
-``HELD``: a lower rate is not learned, once the motors are known.
+``HELD``: once the motors' speed is known, the driver does not learn from a lower rate.
 
-``LEAST_LESSON``: before that, this rate is learned instead.
+``LEAST_LESSON``: until then, the driver learns this rate instead of a lower one.
 """
 EVEN: Final = 0.15
 """Relative change of a turn's rate below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Two turns' rates, as fractions of the commanded rate, if something held the robot at first.
+"""Rates of two turns that show that something held the robot in the first turn.
 
-The first is below HINDERED, the next above TOO_FAST.
+They are fractions of the commanded rates. The first turn is slower than HINDERED, the next one is
+faster than TOO_FAST.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
 
-``SAME``: relative difference of commanded rates regarded as equal. ``CORRECTIONS``: most per rate.
+``SAME``: largest relative difference of two commanded rates that are regarded as equal.
+
+``CORRECTIONS``: largest number of corrections for the same rate.
 """
 STEADY: Final = 0.03
 """Relative change of the commanded rate above which it is regarded as a new rate."""
@@ -55,7 +60,7 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
 
-UNSURE_RAD + UNSURE_PART * expected turn + two exchanges' turn.
+It is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn in two exchanges.
 """
 JUST_SET_S: Final = 2.0
 """Time in s after SSP in which the server certainly still knows the speed of R and L."""
@@ -109,7 +114,8 @@ class SpotTurns:
 
         SSP must be sent before the check of the IMU.
 
-        ``delay_s``: a new SSP waits this long for copies of the old one.
+        ``delay_s``: shortest time in s between two SSPs, so that no copy of the first one can
+        arrive after the second one.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -194,7 +200,7 @@ class SpotTurns:
         return self._has_learned and abs(seen_radps) < HELD * abs(self._rate_radps)
 
     def _lesson(self, seen_radps: float) -> float:
-        """Return the measured rate, or LEAST_LESSON of the commanded rate if that is more."""
+        """Return the rate to learn: the measured one, but at least LEAST_LESSON of the command."""
         return max(abs(seen_radps), LEAST_LESSON * abs(self._rate_radps))
 
     def may_be_count(self, reply: Reply, unseen_s: float, trip_s: float) -> bool:
@@ -243,7 +249,7 @@ class SpotTurns:
     def _undo_false_lesson(self, part: float) -> None:
         """Forget what was learned from a slow turn, if the next turn shows that it was hindered.
 
-        ``part``: the next turn's rate / commanded rate.
+        ``part``: the next turn's measured rate divided by its commanded rate.
         """
         if self._before_slow is not None and part > TOO_FAST:
             # from both turns, a dead zone would be learned that the motors do not have

@@ -98,9 +98,10 @@ class Starts(FailedStarts):
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _switch_motors_off(self, now: float) -> Packets:
-        """Return the next request of SwitchOff, unless a late reply could be taken for its reply.
+        """Return the next request that switches off the motors, if it may be sent now.
 
-        RELEASE also waits until no copy of OFF can come after it.
+        It waits while a late reply could be taken for its reply. MSM also waits until no copy of
+        MCS can arrive after it.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -117,13 +118,13 @@ class Starts(FailedStarts):
     def _copies_may_come(self, now: float) -> bool:
         """Return whether a late copy of an earlier command could still harm a motion.
 
-        A move would block the command port, a stop end the motion.
+        The copy of a move would block the command port. The copy of a stop would end the motion.
         """
         moves = self.odometry.wheel.from_s < self._harmful_s + self._delay_s
         return moves or now < self._halted_s + self._delay_s
 
     def _name_may_come(self, start: Request, now: float) -> bool:
-        """Return whether HELLO may arrive after ``start``, which is then a controlled move.
+        """Return whether ``start`` is a controlled move, and an earlier HELLO may arrive after it.
 
         HELLO would wait in the server's queue, perhaps ahead of a copy of the move.
         """

@@ -105,7 +105,8 @@ MAY_SAY: Final[Mapping[State, frozenset[Word]]] = {
 }
 """The commands that are allowed in each state.
 
-The commands in NEEDS_IMU also require that RESET or CHECK has just shown that the IMU works.
+The commands in NEEDS_IMU also require that a check (RESET or CHECK) has just shown that the IMU
+works.
 """
 
 HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
@@ -148,14 +149,14 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server drives and never answers, or waits. MCR and MCL notice it, on some
-servers after a turn of 0.5 s.
+With a dead IMU, the server starts the motors and never answers, or it waits for the IMU. MCR and
+MCL detect a dead IMU, on some servers after a turn of 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})
 """Commands whose duplicate does harm if it arrives after another motion has begun.
 
-The driver waits for duplicates before the next start's IMU check.
+Before the next start, the driver waits until no duplicate can come. Then it checks the IMU.
 """
 
 WHILE: Final[Mapping[Motion, State]] = {

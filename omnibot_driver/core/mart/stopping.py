@@ -32,9 +32,9 @@ ANSWERS: Final = {
 }
 """For each motion, the forms of an ``ok`` reply that reports the end of the motion."""
 ASK_NAME_S: Final = 0.9
-"""Time in s from the first stop of a controlled move until the driver asks for the name.
+"""Time in s from the first stop of a controlled move until the driver queries the server's name.
 
-The move has then usually ended.
+By that time, the move has usually ended.
 """
 
 SLOW_STOP: Final = (
@@ -42,9 +42,9 @@ SLOW_STOP: Final = (
     " down a slope, or the server has left a motor on; the driver continues"
 )
 NO_START_S: Final = 0.75
-"""Time in s after which MCR and MCL do not fail any more because no wheel has turned.
+"""Duration in s of a controlled turn (MCR, MCL) beyond which a wheel has certainly turned.
 
-The server waits 0.6 s for a wheel to turn, and after the turn 0.75 s for the robot to rest.
+The server waits 0.6 s for a wheel to turn. After the turn, it waits 0.75 s for the robot to rest.
 """
 
 
@@ -66,11 +66,11 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of missing replies that look like a reply to the stop.
+    ``owed``: number of missing replies to earlier requests that look like a reply to the stop.
 
     ``move``: the controlled move to stop, or None. Its own reply ends the stop.
 
-    ``planned``: whether nothing was wrong with the motion.
+    ``planned``: whether the motion had no fault: only another motion or a standstill is wanted.
     """
 
     def __init__(
@@ -175,7 +175,7 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop, or None.
 
-        On a good network, there is one if more replies came than were missing: the last likely one.
+        If more such replies came than were missing, it is the last one with a plausible value.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -31,9 +31,10 @@ BLIND_S, TRIPS = 0.8, 5
 FROZEN_S, FROZEN_TIMES = 0.5, 3
 """The robot is stopped if the heading is constant, because the IMU is dead or the robot is stuck.
 
-``FROZEN_S``: for this time in s plus two exchanges. ``FROZEN_TIMES``: in this number of replies.
+``FROZEN_S``: the heading is constant for this time in s, plus the duration of two exchanges.
 
-On a slow network, fewer replies may be equal by chance, or come before the wag (see WAG_S).
+``FROZEN_TIMES``: the heading is constant in this number of replies. On a slow network, fewer
+replies may be equal by chance.
 """
 NO_START_S: Final = 1.5
 """Time in s after a start within which the robot must begin to move."""
@@ -90,7 +91,7 @@ class Stops(Ground, ABC):
     def _why_stop(self, now: float) -> str:
         """Return why the present motion must not continue, as a sentence for the user.
 
-        "wanted": another motion is wanted. Empty: the motion may continue.
+        Return "wanted" if another motion is commanded; empty if the motion may continue.
         """
         if self.state not in (State.STARTING, State.MOVING, *ROLLING):
             return ""
@@ -135,9 +136,10 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: for the user. It discards the command, unless the direction is already refused.
+        ``why``: the fault, for a notice to the user; empty without a fault. The notice discards the
+        command, unless the direction of the motion is already refused.
 
-        ``arrived``: the start has certainly arrived.
+        ``arrived``: whether the server has certainly received the start command.
         """
         if why:
             self._notice(f"{why}; robot stopped", halt=self._blocked is not self.motion)

@@ -39,15 +39,18 @@ class SwitchOff:
         self.needed = self._supported
 
     def begins(self, *, straight: bool) -> None:
-        """Record that a motion begins; ``straight``: by TF or TB. It overwrites both motors."""
+        """Record that a motion begins, which overwrites the units of both motors.
+
+        ``straight``: whether the motion is TF or TB, after which a motor may stay on.
+        """
         self.needed = straight and self._supported
 
     def refused(self) -> None:
-        """Record that the server has refused a request because of another action."""
+        """Record that the server has refused a request, perhaps because MCS is in progress."""
         self.underway = self._supported
 
     def next(self) -> Request:
-        """Return the next request: OFF, then RELEASE."""
+        """Return the next request: OFF if a motor may be on, else RELEASE."""
         return OFF if self.needed else RELEASE
 
     def sent(self) -> None:

@@ -11,7 +11,7 @@ from typing import Final
 TOLD_RAD, TOLD_PART = 0.05, 0.3
 """Largest accepted difference of a reported turn from the wheel's turn.
 
-TOLD_RAD (rad) + TOLD_PART * the wheel's turn.
+It is TOLD_RAD (rad), plus TOLD_PART times the wheel's turn.
 """
 NO_CORRECTION: Final = 0.0
 
@@ -34,26 +34,26 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def forget(self) -> None:
-        """Accept no record of the turn before, because a new odometry frame has begun."""
+        """Reject later records of the last turn, because a new odometry frame has begun."""
         self._may_be_recorded = False
 
     def add(self, turn_rad: float) -> float:
         """Add a turn measured at the wheel; return the part of it that the pose lacks.
 
-        That is nothing if the server has already reported the turn.
+        This part is zero if the server has already reported the angle of the turn.
         """
         self.spun_rad += turn_rad
         return turn_rad if self.told_rad is None else 0.0
 
     def tell(self, told_rad: float) -> float:
-        """Process the angle in the reply to the stop; return the correction."""
+        """Process the angle in the reply to the stop; return the correction of the heading."""
         self.told_rad = told_rad
         return told_rad - self.spun_rad
 
     def end(self, *, may_be_recorded: bool) -> float:
-        """End the turn after its last count; return the correction.
+        """End the turn after its last count; return the correction of the heading.
 
-        The wheel's turn replaces an implausible ``told_rad``.
+        The wheel's turn replaces an implausible angle that the server has reported.
 
         ``may_be_recorded``: whether the server may have recorded the turn.
         """
@@ -67,9 +67,10 @@ class TurnAngle:
         return wrong_rad
 
     def record(self, told_rad: float) -> float | None:
-        """Process the recorded angle of a turn that has ended; return the correction.
+        """Process the recorded angle of a turn that has ended; return the heading's correction.
 
-        None: implausible, or not the last motion in this frame.
+        Return None if the angle is implausible, or if the turn is not the last motion in the
+        present odometry frame.
         """
         wrong_rad = told_rad - self.spun_rad
         if not self._may_be_recorded or is_of_another(wrong_rad, self.spun_rad):

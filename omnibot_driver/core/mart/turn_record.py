@@ -16,7 +16,8 @@ SAME_DEG: Final = 0.5
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
 """Sums of the recorded angles, in rad.
 
-From LEAST_RAD on, the records' ratio is used; from ENOUGH_RAD on, no record is downloaded.
+From LEAST_RAD on, the driver uses the ratio of the motors' speeds that the records show. From
+ENOUGH_RAD on, it downloads no record.
 """
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
@@ -68,7 +69,8 @@ class TurnRecords:
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
         """Return the recorded angle as ``recorded_deg`` does, from the file called ``name``.
 
-        Return None if ``name`` repeats: the server could not write a new file.
+        Return None if ``name`` is the name of the previous file: the server could then not write
+        a new file.
         """
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)
@@ -76,8 +78,8 @@ class TurnRecords:
     def used(self, told_rad: float, wheel_rad: float) -> None:
         """Learn from a record that the odometry has used.
 
-        ``told_rad``: the recorded turn. ``wheel_rad``: the right wheel's part, e.g. half the turn
-        for equal motors.
+        ``told_rad``: the recorded turn. ``wheel_rad``: the part of the turn that the right wheel
+        has caused. With equal motors, this is half of the turn.
         """
         self._failures = 0
         self._told_rad += abs(told_rad)

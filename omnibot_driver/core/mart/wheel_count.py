@@ -15,7 +15,8 @@ from omnibot_driver.core.mart.moment import Moment
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
 """Largest accepted error of a count that may answer another query.
 
-DOUBT_M (m) + DOUBT_MPS * (driving time since the last count + the reply's time uncertainty).
+It is DOUBT_M (m), plus DOUBT_MPS (m/s) times the sum of two times: the driving time since the last
+count, and the time uncertainty of the reply.
 """
 MOST_M, MOST_MPS = 0.3, 2.0
 """Largest plausible distance between two counts: MOST_M (m) + MOST_MPS (m/s) * time."""
@@ -23,7 +24,7 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""If this number of counts equal the last count before a start, the start is lost."""
+"""If this number of counts equal the last count before a start, the start is regarded as lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +45,13 @@ class Step:
 class WheelCount:
     """The count of the right wheel's encoder.
 
-    ``last``: last accepted count. ``told_s``, ``from_s``: its probable and earliest time.
+    ``last``: last accepted count. ``told_s``, ``from_s``: its most probable and its earliest
+    possible time.
 
     ``certain``: whether the last reply is certainly the reply to ENC.
 
-    ``maybe``: the last count, if it equals the one before the start, else 0.
+    ``maybe``: the last count, if it equals the one before the start, so that the start may be lost;
+    else 0.
     """
 
     def __init__(self) -> None:
@@ -103,7 +106,8 @@ class WheelCount:
     ) -> Step | None:
         """Process a count; return the step since the last count, or None for an implausible count.
 
-        ``stood_s``: time of the stop, else infinite. ``rests``: the last motion is over.
+        ``stood_s``: time at which the robot was stopped; infinite while it is driven. ``rests``:
+        whether the last motion is over.
         """
         before, before_s = self.last, self.told_s
         self.certain = count == before or not when.doubtful

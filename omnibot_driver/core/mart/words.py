@@ -47,9 +47,10 @@ class Word:
 
     ``forms``: the forms of a successful reply.
 
-    ``takes_s``, ``least_s``: longest and shortest time until the reply.
+    ``takes_s``, ``least_s``: longest and shortest time until the reply, in s.
 
-    ``fails``: its texts after ``fail``; a text that no command lists is accepted too.
+    ``fails``: the texts that may follow ``fail`` in its reply. The driver also accepts a text that
+    is not listed for any command.
     """
 
     text: str

@@ -20,8 +20,9 @@ class Channel:
     """One connection between a board and the computer.
 
     name: empty if the board has only one channel.
-    parameter: the driver's port parameter; empty for the UDP port after the channel before.
-    datagrams: whether UDP, not serial.
+    parameter: name of the driver's parameter for this port; empty if the channel uses the UDP port
+        after that of the previous channel.
+    datagrams: whether the channel carries UDP datagrams; else it is serial.
     """
 
     name: str = ""

@@ -30,7 +30,9 @@ _GOOD = LineFaults()
 
 
 class FaultyLine:
-    """A serial line with random faults, the same for the same bytes and seed, however split.
+    """A serial line with random faults, which depend only on the bytes and the seed.
+
+    They do not depend on how the bytes are split into chunks.
 
     lost, flipped: numbers of bytes lost and changed so far.
     """

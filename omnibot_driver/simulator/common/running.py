@@ -33,7 +33,7 @@ class RunningBoard(ABC, Generic[B]):
 
     ``dropped``: number of bytes that the driver did not read in time.
 
-    ``board``: other threads must hold ``lock``.
+    ``board``: other threads must hold ``lock`` while they use the board.
 
     Raises RuntimeError from ``stop``, ``check`` and ``wait_for`` if the thread has died.
     """
@@ -130,7 +130,7 @@ class RunningBoard(ABC, Generic[B]):
     def _due(self, due_s: float) -> tuple[int, float]:
         """Return the number of overdue ticks, and the time in s of the next tick.
 
-        Overdue output is sent at once, like a real line's.
+        The output of overdue ticks is sent at once, as on a real line.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

@@ -21,7 +21,7 @@ class Terminal:
     Beyond ``UNREAD_LIMIT`` unread bytes, bytes are lost.
 
     ``link``: path of a symbolic link. It replaces a dead link, or a link to a pseudo-terminal.
-    Raises FileExistsError for anything else.
+    Raises FileExistsError if anything else is at this path.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

@@ -149,7 +149,8 @@ def _end(server: "MartServer", motion: Motion) -> None:
 def _timed_distance_in(motion: Motion) -> float:
     """Return the distance in inches, computed from time and calibration alone.
 
-    Like the server, it wrongly adds the ramps' feet to inches.
+    Like the server, it adds the distance of acceleration and deceleration in feet to a distance in
+    inches, which is wrong.
     """
     if motion.kind not in _TIMED:
         return 0.0
@@ -186,8 +187,8 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels.
 
-    ``right``, ``left``: changes in register units, forward positive. Excess over full speed slows
-    the other wheel.
+    ``right``, ``left``: changes in register units, forward positive. If one wheel would be faster
+    than full speed, the other wheel becomes slower instead.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

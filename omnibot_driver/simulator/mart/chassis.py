@@ -181,9 +181,10 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """Return the distance in m from the front (or ``backward``: rear) sonar to its wall, or inf.
+    """Return the distance in m from a sonar to the wall in its direction, or infinity.
 
-    The walls lie across the x axis, at ``front_m`` and ``-rear_m``.
+    ``backward``: whether it is the rear sonar; else it is the front sonar. The walls lie across
+    the x axis, at ``front_m`` and ``-rear_m``.
     """
     along = cos(chassis.yaw_rad + (pi if backward else 0.0))
     if along > 0.3:

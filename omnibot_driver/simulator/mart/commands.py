@@ -2,8 +2,8 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The first row that fits the beginning of a request wins. This module knows command words and
-numbers; it does not know how a motion proceeds.
+In the table of commands, the first row that fits the beginning of a request is used. This module
+knows command words and numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -83,7 +83,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _joined(server: "MartServer") -> bool:
-    """Return whether a motion, a recording or MCS in progress makes the server refuse L."""
+    """Return whether the server refuses L, because a motion, a recording or MCS is in progress."""
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
     others = [each for each in server.motions if each.kind is not Kind.REFERENCE]
@@ -93,7 +93,7 @@ def _joined(server: "MartServer") -> bool:
 def _timed(server: "MartServer", text: str) -> str | None:
     """Start TF or TB: an optional speed word, then a distance in inches.
 
-    Without the quirk ``speed_word_first``, the word may also follow.
+    Without the quirk ``speed_word_first``, the speed word may also follow the distance.
     """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]

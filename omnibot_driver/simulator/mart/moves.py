@@ -81,9 +81,11 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """Take a sample of the gyro bias; ``left`` are still to take, ``missed`` have failed in a row.
+    """Take a sample of the gyro bias, before a motion or for SB.
 
-    After the last, start the motion ``kind``, or answer SB (None).
+    ``left``: number of samples still to take. ``missed``: number of failed samples in a row.
+
+    After the last sample, start the motion ``kind``; if ``kind`` is None, answer SB.
     """
     if server.imu.living(server.now_s):
         left, missed = left - 1, 0

@@ -20,7 +20,7 @@ QUICK_S = 0.0005
 BOOT_S, START_UP_S = 0.3, 0.8
 """``BOOT_S``: time in s from a restart of the program until it opens its ports.
 
-``START_UP_S``: time in s from then until it has started up completely.
+``START_UP_S``: time in s from the opening of the ports until it has started up completely.
 """
 UNCONTROLLED = (Kind.LINEAR, Kind.REFERENCE, Kind.SPIN)
 
@@ -119,7 +119,8 @@ class MartServer(ServerState):
     def restart(self, boot_s: float = BOOT_S) -> None:
         """Restart the server program. The motors keep the last command that they received.
 
-        Datagrams of the next ``boot_s`` seconds are lost; complete after START_UP_S more.
+        Datagrams of the next ``boot_s`` seconds are lost. The server has started up completely
+        START_UP_S (s) after that.
         """
         self.begin()
         self.imu.restart()

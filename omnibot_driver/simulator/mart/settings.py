@@ -22,18 +22,18 @@ class Quirks:
     early_stop_is_ignored: the stop port has no effect before the reply to F, B, R, L or RM.
     left_spin_in_reference_move: L is accepted during RM, and hangs the command port.
     moves_wait_for_imu: F, B, TF, TB and SB wait for a working IMU.
-    drives_trust_imu: RM, R, L start, and uncontrolled motions continue, without an IMU. Then the
-        server detects no obstacle, start or stop.
-    reference_speed_wraps: in RM, speeds below 1 or above 127 wrap around; RMCS limits them.
-    reference_start_counts_on: RM's start continues the sample count of the previous RM's stop. RM's
-        failure text is that of the last F or B.
+    drives_trust_imu: without an IMU, RM, R and L start, and uncontrolled motions continue. The
+        server then detects no obstacle, start or stop.
+    reference_speed_wraps: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
+    reference_start_counts_on: the start of RM continues the sample count of the previous stop of
+        RM. If RM fails, it reports the failure text of the last F or B.
     speed_word_first: a speed word after the number is ignored.
-    zero_distance_is_unlimited: in TF, TB, MCF and MCB; so is a word as number.
+    zero_distance_is_unlimited: TF, TB, MCF and MCB do not end at a distance if it is 0 or a word.
     echoes_distance: TF and TB report the distance computed from time, not the driven one.
-    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR end the server.
+    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR end the server if a number is missing.
     crashes_early: VOLTS and all motions except F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
-    exit_is_silent: EXIT is answered only after LOG.
+    exit_is_silent: EXIT is answered only if LOG was sent before.
     log_deletes_files: LOG deletes the files of LAST MOVE and LAST TURN.
     unknown_reset_repeats: RST with an unknown word repeats the previous reply.
     clock_moves_heading: TIME in a motion adds turn rate * clock jump to the heading.
@@ -109,7 +109,7 @@ class MartSettings:
     motor_board_silent: whether the serial line to the motor board is cut.
     motor_status: bits of MCSTAT, except the voltage's; a trip or short circuit stops the motor.
     front_m, rear_m: distances from the start to walls across the x axis.
-    dock_m: distance from the start forward.
+    dock_m: distance from the start to the dock, forward.
     reference_start_fails: whether RM is answered ``fail`` although the robot moves.
     clock_s: initial wall clock in Unix time.
     """

@@ -44,7 +44,8 @@ class ServerState:
     starting: the kind of motion whose command is not answered yet.
     custom: parameters that SLMP and SSP have set.
     sampling_since_s: time since which a motion uses a sonar, or -1.
-    front_m, rear_m, dock_m: from the start; may be changed, like chassis and IMU.
+    front_m, rear_m, dock_m: distances from the start to the walls and to the dock. They may be
+        changed, and so may the chassis and the IMU.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -104,7 +105,7 @@ class ServerState:
 
     @property
     def date(self) -> str:
-        """Date and time of the server's clock as text, in the format of its files."""
+        """Date and time of the server's clock as text, in the format of the server's files."""
         return time.strftime("%m/%d/%Y  %H:%M:%S", time.gmtime(self.clock_s))
 
     @property
@@ -163,8 +164,8 @@ class ServerState:
     def sample_reference(self, *, first: bool) -> None:
         """Record the time of a sample of RM.
 
-        With ``heading_starts_off``, the first sample changes the heading: hugely if the clock was
-        set back.
+        With the quirk ``heading_starts_off``, the first sample changes the heading. If the clock
+        was set back, this change is huge.
         """
         clock_s, before_s = self.clock_s, self._reference_clock_s
         self._reference_clock_s = clock_s

@@ -2,7 +2,7 @@
 
 """The stop port. Its commands work while the command port is busy, and are never answered.
 
-This module knows its three commands; it does not know the command port's.
+This module knows the three commands of the stop port; it does not know those of the command port.
 """
 
 from typing import TYPE_CHECKING

@@ -40,7 +40,7 @@ class PlanarPose(NamedTuple):
 def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) -> Wheels:
     """Return the rim speeds (or distances) of wheels A, B, C for a body twist (or displacement).
 
-    In m/s and rad/s (or m and rad).
+    Units: m/s and rad/s, or m and rad.
     """
     turning = base_radius_m * yaw_rate
     return (
@@ -53,7 +53,7 @@ def rims_from_body(vx: float, vy: float, yaw_rate: float, base_radius_m: float) 
 def body_from_rims(rims: Wheels, base_radius_m: float) -> tuple[float, float, float]:
     """Return the body twist (or displacement) for rim speeds (or distances) of wheels A, B, C.
 
-    Source: the manual's odometry matrix. In m/s and rad/s (or m and rad).
+    Units: m/s and rad/s, or m and rad. Source: the manual's odometry matrix.
     """
     a, b, c = rims
     return (

@@ -128,20 +128,21 @@ class SimulatedBoard:
         return self._odometry.reported
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Hold the robot by hand: tilt in rad, left turn in rad/s.
+        """Hold the robot by hand: tilt it by angles in rad, or turn it to the left, in rad/s.
 
-        Only the IMU senses both; the true pose does not change.
+        Only the IMU measures the tilt and the turn. The robot's true pose does not change.
         """
         self._world.held = Held(roll_rad, pitch_rad, yaw_rate)
 
     def push(self, x_pwm: float = 0.0, y_pwm: float = 0.0, turning_pwm: float = 0.0) -> None:
-        """Push the robot along its own axes, from now on. ``world.Force`` explains the
-        arguments."""
+        """Push the robot along its own axes, and turn it to the left, from now on.
+
+        The arguments are in PWM steps. They are added to the efforts of the motors.
+        """
         self._world.force = Force(x_pwm, y_pwm, turning_pwm)
 
     def grip(self, vx_mps: float = 0.0, vy_mps: float = 0.0, yaw_rate: float = 0.0) -> None:
-        """Force this twist on the robot against its motors. A zero twist holds the robot in
-        place."""
+        """Force this twist on the robot against its motors. A zero twist holds it in place."""
         self._world.gripped = Twist(vx_mps, vy_mps, yaw_rate)
 
     def let_go(self) -> None:

@@ -25,9 +25,9 @@ STICKING_SPEED = 0.3
 class MotorConstants:
     """Properties of one motor.
 
-    * ``pwm_per_count``: PWM steps per count per tick; at 46, the feed-forward supplies seven
-      eighths.
-    * ``time_constant_ticks``: of the speed.
+    * ``pwm_per_count``: PWM steps for a speed of one count per tick. With 46, the feed-forward
+      supplies seven eighths of the effort.
+    * ``time_constant_ticks``: time constant of the speed.
     * ``delay_ticks``: delay from an effort to its effect.
     """
 
@@ -98,11 +98,11 @@ class Motor:
 
 
 class WheelController:
-    """The manual's PI controller (Wheel control). The feed-forward is not part of the accumulator.
+    """The manual's PI controller (Wheel control). The feed-forward Kff v(k) is not accumulated.
 
     u(k) = Kff v(k) + w(k),  w(k) = w(k-1) + KVP (e(k) - e(k-1)) + KVI e(k)
 
-    The integral never increases a saturation.
+    While the PWM is at its limit, the integral only changes away from the limit.
     """
 
     def __init__(self, gains: WheelGains = MANUAL) -> None:

@@ -2,8 +2,8 @@
 
 """The firmware's receiver: takes bytes, and returns the commands that they complete.
 
-The manual does not say how the firmware finds commands. A driver must be safe with each receiver
-here.
+The manual does not specify how the firmware finds commands. So this module has several receivers. A
+driver must be safe with each of them.
 
 This module knows control frames, letters and the time of a byte. It must not know modes or motion.
 """
@@ -52,9 +52,9 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``; but if another byte than FE follows FF, discard both.
+    """Find frames like ``counting``; but if another byte than FE follows FF, discard both bytes.
 
-    So the header in FF FF FE is missed.
+    As a result, the header in FF FF FE is missed.
     """
     if held == COMMAND_HEADER[:1] and byte != _SECOND:
         return b"", None, True
@@ -107,7 +107,7 @@ COUNTING: Final = ReceiverKind()
 class CommandReceiver:
     """The receiver from one power-up to the next.
 
-    * ``held``: the bytes that the framing keeps.
+    * ``held``: received bytes that may be the beginning of a frame.
     * ``last_at_s``: arrival time of the last byte.
     * ``to_swallow``: number of wake-up bytes still expected.
     """
@@ -121,8 +121,7 @@ class CommandReceiver:
         self.last_at_s = 0.0
 
     def boot(self) -> None:
-        """Process a byte that arrives during the boot: it is lost, or is one of the wake-up
-        bytes."""
+        """Process a byte that arrives during the boot: it is lost, or it is a wake-up byte."""
         if self._wakes_while_booting and self.to_swallow:
             self.to_swallow -= 1
 

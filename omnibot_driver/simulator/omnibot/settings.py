@@ -30,24 +30,25 @@ class BoardSettings:
     * ``frame``: meaning of the 25 Hz frame. "earth": difference of positions in the board's earth
       frame. "body": sum of the ticks' displacements. "wheel_counts": manual, Deprecated.
     * ``delta_period_s``: a multiple of 10 ms. The manual also has 10 Hz.
-    * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: per rad/s.
+    * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: LSB per rad/s.
     * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
     * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad, unwrapped.
     * ``estop_latches``: whether motion is refused until a reset; else until the next motion
       command.
-    * ``axis_signs``: of the board's x, y and yaw relative to REP-103.
-    * ``motor_wiring``: each controller's motor, 1 to 3; negative: poles swapped, but not the
-      encoder.
-    * ``wheel_radius_m``, ``base_radius_m``, ``counts_per_revolution``: as the firmware assumes.
+    * ``axis_signs``: signs of the board's x, y and yaw relative to REP-103.
+    * ``motor_wiring``: number of the motor, 1 to 3, that is connected to each controller. A
+      negative number: the motor's poles are swapped, but its encoder is not.
+    * ``wheel_radius_m``, ``base_radius_m``, ``counts_per_revolution``: values that the firmware
+      assumes.
     * ``wheel_radius_scale``, ``base_radius_scale``: true value divided by the assumed one.
-    * ``slip``: mean fraction of the rim motion that is lost; varies for each wheel.
+    * ``slip``: mean fraction of the rim motion that is lost. The slip of each wheel varies.
     * ``slope_pwm``: pull of a slope along the initial x axis, in PWM steps.
-    * ``imu_rpy_rad``: turns the body's axes into the sensor's, as in a URDF.
+    * ``imu_rpy_rad``: orientation of the sensor in the body, as roll, pitch and yaw in a URDF.
     * ``gyro_noise_dps``, ``accel_noise_g``: rms per reading, in the sensor's axes.
     * ``gyro_walk_dps``: rms change of the bias in 1 s; grows with the square root of time.
     * ``gyro_stuck``: raw counts that a broken gyro always reads.
-    * ``boot_time_s``: until then, the board sends and obeys nothing.
-    * ``running``: awake and in its running mode at construction.
+    * ``boot_time_s``: duration of the boot, in which the board sends and obeys nothing.
+    * ``running``: whether the board is awake and in its running mode at construction.
     """
 
     seed: int = 0

@@ -51,7 +51,7 @@ class Held(NamedTuple):
 class Force(NamedTuple):
     """A force along the robot's x and y axes, and a torque that turns it left, in PWM steps.
 
-    Added to the motor efforts at the rims, distributed like a velocity.
+    It is added to the efforts of the motors, distributed over the wheels like a velocity.
     """
 
     x_pwm: float = 0.0
@@ -163,9 +163,9 @@ class World:
         return a, b, c
 
     def _wander(self, slip: float, rim_m: float) -> float:
-        """Return the wheel's slip after ``rim_m`` of rim motion, within 0 and 1.
+        """Return the wheel's slip after ``rim_m`` of rim motion, from 0 to 1.
 
-        Standard deviation: half the mean slip.
+        The slip varies at random. Its standard deviation is half the mean slip.
         """
         kept = exp(-abs(rim_m) / SLIP_CORRELATION_M)
         change = self._random.gauss(0.0, self._mean_slip / 2) * sqrt(1 - kept * kept)

@@ -2,7 +2,7 @@
 
 """Measure whether the odometry's covariance covers its error, on networks of all kinds.
 
-The measure is the normalised squared error (NEES). An honest covariance has a mean of 3.
+The measure is the normalised squared error (NEES). Its mean is 3 if the covariance is consistent.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/honesty.py 50``: 50 drives for each network.
 Results: docs/boards/mart.md.
@@ -21,7 +21,7 @@ from mart_campaign import FIRMWARES, TWISTS
 from omnibot_driver.simulator.common.network import NetworkFaults
 
 RARE = 16.3
-"""With an honest covariance, 0.1 % of the normalised squared errors exceed this value."""
+"""With a consistent covariance, 0.1 % of the normalised squared errors exceed this value."""
 NETWORKS = {
     "good": NetworkFaults(),
     "late by up to 0.3 s": NetworkFaults(delay_s=0.3),

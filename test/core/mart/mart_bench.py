@@ -55,7 +55,7 @@ class NetworkRobot(MartRobot):
 
 
 def sleeps(board: SimulatedMart) -> bool:
-    """Return whether nothing is due in the next five ticks. If so, skip these ticks."""
+    """Skip the next five ticks if nothing is due in them. Return whether they were skipped."""
     if board.server.wake_at <= (board.ticks + 5) * TICK_S:
         return False
     board.ticks += 5

@@ -67,7 +67,10 @@ def yaw_error(bench: MartBench) -> float:
 
 
 def drops(path: NetworkPath, lost: Callable[[bytes], bool]) -> list[bytes]:
-    """Let ``path`` lose each datagram for which ``lost`` is true. Return the list of the lost."""
+    """Let ``path`` lose each datagram for which ``lost`` is true. Return the lost datagrams.
+
+    The returned list grows with each lost datagram.
+    """
     gone, real = list[bytes](), path.send
 
     def send(data: bytes, at_s: float) -> None:

@@ -201,9 +201,9 @@ def sweeps_first(driver: Driver) -> bool:
 
 
 def _asked(world: World) -> Step:
-    """Return the step in which the driver asks what still moves, after a stop on the stop port.
+    """Return the step in which the driver finds out which motion is in progress.
 
-    A lost reply changes nothing.
+    The driver does this after a stop on the stop port. A lost reply changes nothing.
     """
     # The driver first asks for the server's name. The answer shows that all earlier datagrams have
     # arrived or are lost. Then it asks for a motion in progress, and reads the encoder.
@@ -268,7 +268,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    Replies to CHECK and to MOVES take longer than late replies.
+    ``late``: whether the reply is late. The driver does not accept a late reply to a check or a
+    controlled move, because these take longer than a reply can be late.
     """
     driver = world.driver
     state = driver.state

@@ -28,7 +28,7 @@ class Server(NamedTuple):
     ``port``: the command port: "free", "busy" with a controlled move, "waits" for a dead IMU, or
     "hung".
 
-    ``released``: the stop port has stopped a motion that the server believes in progress.
+    ``released``: the stop port has stopped a motion that the server regards as still in progress.
 
     ``manual``: MCS is in progress, so motions are refused.
     """

@@ -38,14 +38,15 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""At most this many datagrams of a wish are disturbed in each direction, one in each trial.
+"""Largest number of a wish's datagrams that are disturbed in each direction, one in each trial.
 
 Regular queries are not counted.
 """
 PROOF_S: Final = 0.25
-"""Time in s after the death of the IMU.
+"""Longest time in s from the failure of the IMU to the start of a motion.
 
-A motion that begins later was not checked while the IMU still worked.
+In this time, the check before the motion may have been made while the IMU still worked. A later
+motion is a fault of the driver.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands that start the motors without checking the IMU."""
@@ -54,7 +55,10 @@ MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
 """Times in s for which the network is interrupted at first, one in each trial."""
 BACK_S: Final = (0.2, 0.7, 30.0)
-"""Times in s for which the network then works. After that, it is interrupted for 1 s."""
+"""Times in s for which the network works after the first interruption.
+
+After this time, the network is interrupted again, for 1 s.
+"""
 ENDS_S, SETTLED_S = 16.0, 1.5
 
 
@@ -166,10 +170,10 @@ def eights() -> Iterator[Trial]:
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield trials of these wishes. In each trial, one datagram has one of FATES.
+    """Yield trials of these wishes. In each trial, one datagram has one of the faults in FATES.
 
-    The trials cover all FATES of all datagrams, but at most MOST_DATAGRAMS for each wish and
-    direction. An undisturbed run counts the datagrams.
+    The trials cover all faults of all datagrams, but of at most MOST_DATAGRAMS for each wish and
+    direction. A run without faults counts the datagrams.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

@@ -114,9 +114,9 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The reply to RST IMU comes soon, so a late ok of another command could be taken for it.
+    """The ok to another command may still be on its way. It could be taken for that to RST IMU.
 
-    RST IMU waits until its reply can only come after any late ok.
+    So the driver delays RST IMU until the late ok must come before the reply to RST IMU.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -131,9 +131,9 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 
 
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
-    """A sonar query was given up. Another sonar query waits for the lost reply.
+    """The reply to a sonar query has not come in time, but may still come.
 
-    ENC does not wait, but its answer is doubtful.
+    The driver delays another sonar query. It sends ENC at once, but regards the reply as doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -200,9 +200,9 @@ def test_a_stop_that_may_have_overtaken_its_start_is_not_believed_alone() -> Non
 
 
 def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
-    """After a start and a stop, two ok arrive, perhaps two copies of the start's reply.
+    """After a start and a stop, two ``ok`` arrive. They may be two copies of the start's reply.
 
-    A "no motion" proves the stop.
+    So they do not prove the stop. A later "no motion" proves it.
     """
     stop = stopping(Motion.REFERENCE, owed=1)
     stop.due(10.0)
@@ -260,7 +260,7 @@ def test_a_count_that_no_wheel_can_make_moves_nothing() -> None:
 
 
 def test_a_count_from_before_the_motion_moves_nothing() -> None:
-    """A second motion begins, and an encoder count of the motion before arrives.
+    """A second motion begins, and then a late encoder count of the first motion arrives.
 
     The pose does not change.
     """
@@ -308,7 +308,10 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """RM sets the heading to zero. A first heading that still has the old value is a late reply."""
+    """RM sets the heading to zero. The first heading in RM still has the old value.
+
+    This heading is a late reply, so it is not used.
+    """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))
     odometry.begin(Motion.REFERENCE, 1.0)
@@ -321,9 +324,9 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """A check of the IMU usually takes a while.
+    """An ``ok`` to the check of the IMU takes some time, but a failure may come at once.
 
-    The driver accepts an early failure: the IMU is missing, or the command unknown.
+    The driver accepts an early failure, because the IMU is missing or the command is unknown.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -29,10 +29,10 @@ def seconds_to_move(bench: MartBench, vx: float, limit_s: float = 9.0) -> float:
 def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_second(
     vx: float, firmware: Firmware
 ) -> None:
-    """An exchange takes up to 0.6 s, and the driver makes up to four between two counts.
+    """Each datagram is late by up to 0.3 s. The delays begin just before the drive.
 
-    The delays begin just before the drive. No drive is stopped without need; in one of eight, the
-    speed may still be wrong after 5 s.
+    The driver stops none of the eight drives. In at most one of them, the speed is still wrong
+    after 5 s.
     """
     slow = 0
     for seed in range(8):
@@ -57,9 +57,9 @@ def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
 
 
 def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> None:
-    """All replies to RMRA in the first 0.9 s of a drive are lost.
+    """All replies to RMRA in the first 0.9 s of a drive are lost. Then a heading arrives.
 
-    The heading that comes then is the first one, so it cannot be constant.
+    It is the first one, so it does not show that the heading is constant. The drive continues.
     """
     bench, started_s = on(NetworkFaults(), "firmware"), math.inf
 
@@ -76,7 +76,10 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) -> None:
-    """On a network with late replies, two headings are often equal by chance."""
+    """On a network with late replies, two headings are often equal by chance.
+
+    The driver does not report that the IMU is dead.
+    """
     for seed in (5, 12, 14):
         bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
         for _ in range(3):
@@ -86,9 +89,10 @@ def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) 
 
 
 def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
-    """The server answers one request after the other, so a count would have come before.
+    """In a drive, the reply to ENC is lost. Then the server answers a later HELLO.
 
-    The driver queries the count again within 0.25 s, and not after 0.36 s.
+    The server answers in order, so the reply to ENC cannot come any more. The driver repeats ENC
+    within 0.25 s of the loss.
     """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 3.0)
@@ -106,7 +110,10 @@ def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
 @pytest.mark.parametrize(("vx", "start"), [(0.3, b"RM"), (-0.2, b"B SLOW")])
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: bytes) -> None:
-    """The first start command is lost. An answer to HELLO shows that, so the server was present."""
+    """The first start command is lost, but the server answers HELLO: it has not been restarted.
+
+    The driver soon sends the start again, so the robot moves within 1.5 s.
+    """
     bench = on(NetworkFaults(), firmware)
     path = bench.robot.network[0].to_board
     lost = drops(path, once(lambda data: data.startswith(start)))
@@ -115,7 +122,10 @@ def test_a_lost_start_is_sent_again_soon(firmware: Firmware, vx: float, start: b
 
 
 def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
-    """The server is absent for 0.5 s from the start on. The next motion waits for 1.5 s."""
+    """The server does not receive the start command, nor any other datagram for 0.5 s.
+
+    It may have been restarted, so the driver waits for 1.5 s before it sends a start again.
+    """
     bench = on(NetworkFaults(), "firmware")
     network, away_s = bench.robot.network[0], math.inf
 
@@ -133,7 +143,10 @@ def test_a_server_that_restarts_at_a_start_is_left_alone() -> None:
 
 
 def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
-    """The driver waits for a lost piece for 1 s. After that, the next drive begins at once."""
+    """A piece of a downloaded file is lost, and the driver waits for it for 1 s.
+
+    This silence is not taken for a restart of the server: the next drive begins at once.
+    """
     bench = on(NetworkFaults(), "firmware")
     bench.command(0.3, 0.0, 2.0)
     bench.run(2.0)
@@ -152,9 +165,9 @@ def test_an_incomplete_download_is_not_an_absence_of_the_server() -> None:
 def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
     firmware: Firmware, lost_way: str
 ) -> None:
-    """The request for a large change is lost, or its reply.
+    """The request for a large change of the motors' units is lost, or the reply to it.
 
-    The measured speeds show whether the motors have obeyed. So the next changes are right.
+    The measured speeds show which of both was lost. So the turn rate is soon as commanded.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.2, 0.4, 4.0)

@@ -36,7 +36,7 @@ def test_a_square_of_two_metres_ends_where_it_began(left: bool, firmware: Firmwa
 def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) -> None:
     """The gyro has no noise, so the heading hardly changes on a straight drive.
 
-    The driver's small steering corrections show a working IMU.
+    The driver steers a little, and the resulting heading changes show that the IMU works.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0, gyro_bias_dps=0.0).ready()
     bench.command(0.3, 0.0, 6.0)
@@ -190,9 +190,9 @@ def test_the_covariance_of_a_controlled_move_says_that_nothing_is_known() -> Non
 
 
 def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() -> None:
-    """Odometry comes 20 times a second. The sonars are asked only at rest.
+    """The driver reports odometry 20 times a second. It queries the sonars only at rest.
 
-    A sonar query takes 55 ms. Infinity: nothing is near.
+    A sonar without an obstacle in range reports an infinite distance.
     """
     bench = MartBench(front_m=3.0).ready()
     seen = len(bench.odometry)
@@ -212,9 +212,9 @@ def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() ->
 
 
 def test_inverted_encoder_and_gyro_are_parameters() -> None:
-    """The encoder counts down in forward motion.
+    """The encoder of the robot counts down in forward motion.
 
-    With a negative ``metres_per_count`` the pose is right.
+    With a negative ``metres_per_count``, the pose is right.
     """
     settings = MartSettings(metres_per_count=-0.0004)
     bench = MartBench("source", settings=settings, encoder_sign=-1).ready()

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 def test_a_dead_imu_refuses_motion_until_it_is_back(
     firmware: Firmware, wish: tuple[float, float] | str
 ) -> None:
-    """With a dead IMU, the driver starts no motor and says why.
+    """With a dead IMU, the driver starts no motor and reports the reason.
 
     On a server with RST IMU, motion is allowed when the IMU is back.
     """
@@ -70,9 +70,9 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The server rejects an RM, so that RM has arrived. The next RM follows soon.
+    """The server answers the first RM with a failure, so the driver sends RM again soon.
 
-    After two seconds the speed is right.
+    Two seconds after the command, the speed is right.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 3.0)
@@ -102,7 +102,10 @@ def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> 
 
 
 def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None:
-    """A slow drive is blocked. The next slow drive is soon as fast as commanded, and not faster."""
+    """Something holds both wheels in a slow drive. The driver learns nothing about the motors.
+
+    The next slow drive is soon as fast as commanded, and not faster.
+    """
     bench = MartBench("source").ready()
     bench.command(0.06, 0.0, 3.0)
     bench.server.chassis.change(stuck="both")
@@ -165,7 +168,7 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 
 
 def test_an_obstacle_ends_the_way_forward_and_leaves_the_others() -> None:
-    """The controller stops at an obstacle without a report.
+    """The controller stops the robot at an obstacle, but does not report this.
 
     The driver reports the obstacle, and still allows driving backward.
     """
@@ -224,7 +227,8 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
     """The server rejects RM although the robot moves, and SRM finds no motion.
 
-    A controlled turn takes over the motors and ends.
+    The driver starts a controlled turn, at the end of which the motors are off. It then refuses
+    motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)
@@ -236,9 +240,9 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """The server rejects an RM. Five seconds later the robot moves without a command.
+    """The server rejects an RM. Five seconds later, the robot moves without a command.
 
-    A rejected RM would have started the robot at once.
+    RM would have moved the robot at once, so the server is not defective. Motion stays allowed.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -254,9 +258,9 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
-    """Another program stops the robot, so the server rejects RMCS: no motion is known.
+    """Another program stops the robot, so the server knows of no motion and rejects RMCS.
 
-    The driver names the other program, and the robot drives on.
+    The driver reports that another program may be the cause, and the robot drives on.
     """
     bench = MartBench("source").ready()
     bench.command(0.3, 0.0, 2.0)
@@ -271,9 +275,9 @@ def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> 
 def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_command(
     firmware: Firmware,
 ) -> None:
-    """The server reports a failed move at once, while the wheels still roll out.
+    """The server reports a failed move at once, while the wheels still coast.
 
-    The roll-out is not reported as a motion.
+    The driver does not report the coasting as a motion without a command.
     """
     bench = MartBench(firmware, motor_lag_s=0.12).ready()
     bench.go_to(1.5, 0.0, 0.0)

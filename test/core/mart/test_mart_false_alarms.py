@@ -16,11 +16,17 @@ from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
 HEAVY_S = 0.2
-"""Time constant in s of motors that still turn when the server no longer waits for a stop."""
+"""Time constant in s of the motors of a heavy robot.
+
+Its wheels still turn when the server no longer waits for the end of a stop.
+"""
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
-    """The first heading of a drive comes late. Only a second one can be equal to it."""
+    """The first heading of a drive comes late. It does not show that the heading was constant.
+
+    The time without a change is counted from this heading on.
+    """
     heading = RelativeHeading()
     heading.begin(10.0, anew=True)
     heading.tell(-0.02, Moment(10.7, 10.7, 10.7), math.inf)
@@ -74,7 +80,10 @@ def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: Firmware) -> None:
-    """New goals arrive during a straight move and during a turn of a heavy robot."""
+    """New goals arrive during a straight move and during a turn of a heavy robot.
+
+    The robot reaches the last goal.
+    """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
     for goal, seconds in (((2.0, 0.0, 0.0), 3.0), ((0.5, -1.0, 0.0), 2.0), ((0.0, 0.0, 0.0), 60.0)):
         bench.go_to(*goal)
@@ -86,7 +95,10 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 @pytest.mark.slow
 @pytest.mark.parametrize("stuck", ["right", "both"])
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
-    """A turn that does not begin is not mistaken for one after which the wheels turned for long."""
+    """A motor is stuck, so the turn of a goal does not begin. The driver discards the goal.
+
+    For a turn of a heavy robot, the server gives the same failure text, but the goal continues.
+    """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
     bench.go_to(0.0, 1.0, 0.0)
@@ -96,9 +108,9 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 
 @pytest.mark.slow
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
-    """The server reports the long stop instead of the obstacle.
+    """An obstacle stops a move of a heavy robot. The server reports only that the stop was long.
 
-    The driver learns nothing from this move, and then finds the obstacle.
+    The driver learns nothing from this short move. The next move then finds the obstacle.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)

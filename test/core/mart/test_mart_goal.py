@@ -85,7 +85,7 @@ def end(bench: MartBench) -> None:
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 @pytest.mark.parametrize("step", [Pose(0.0, 0.0, math.pi / 2), Pose(0.5, 0.0, 0.0)], ids=str)
 def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) -> None:
-    """The driver repeats the same move ten times, often with an equal encoder count.
+    """The driver makes equal moves in a row, and many of them end with the same encoder count.
 
     The odometry adds every move.
     """
@@ -159,7 +159,7 @@ def test_a_repeated_goal_ends_the_move_of_a_docking(firmware: Firmware) -> None:
 def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
     """Change the network: it loses commands that begin with ``lost``, and doubles the next RST IMU.
 
-    Copy and reply are 0.29 s late each.
+    The copy is 0.29 s late, and the reply to the copy is late by another 0.29 s.
     """
     receive, advance, board = bench.robot.receive, bench.robot.advance, bench.robot.board
     copies: list[float] = []
@@ -195,7 +195,7 @@ def lose_and_copy_a_check(bench: MartBench, lost: tuple[bytes, ...]) -> None:
 def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
     firmware: Firmware, before: tuple[float, float], stops_s: float | None
 ) -> None:
-    """The turn of a goal is lost. A late ok of the IMU check seems to confirm the turn.
+    """The command for a goal's turn is lost. A late ok of the IMU check seems to confirm the turn.
 
     The odometry does not add the encoder's old count again.
     """
@@ -214,9 +214,10 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_move_that_was_lost(
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware: Firmware) -> None:
-    """The same with a backward drive, during which no encoder count arrives.
+    """The command for a backward drive is lost. A late ok of the IMU check seems to confirm it.
 
-    The network has just duplicated replies, so the driver does not trust the late ok.
+    The network has just duplicated replies, so the driver does not trust this ok. The odometry
+    adds no motion.
     """
     bench = MartBench(firmware).ready()
     bench.robot._good = False

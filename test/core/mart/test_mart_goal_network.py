@@ -22,7 +22,10 @@ pytestmark = pytest.mark.slow
 def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
     seed: int, firmware: Firmware
 ) -> None:
-    """Replies come late and in another order. The driver takes none of it for a duplicated move."""
+    """Replies come up to 0.1 s late and in another order. The robot reaches each goal.
+
+    The driver does not mistake the delays for a duplicated move.
+    """
     bench, random = on(NetworkFaults(delay_s=0.1), firmware, seed), Random(seed)
     for _ in range(3):
         goal = random_goal(random)
@@ -34,8 +37,8 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
     """Each tenth datagram is lost in both directions: moves, replies, counts and headings.
 
-    The network duplicates nothing. The driver discards at most one goal in ten, because it cannot
-    exclude a duplicated move. Where the odometry is wrong, its covariance says so.
+    The driver cannot exclude a duplicated move, so it discards goals, but at most one in ten. The
+    covariance covers the error of the odometry.
     """
     discarded = 0
     for seed in range(15):
@@ -54,10 +57,10 @@ def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
-    """The replies to all turns are lost. The server knows of no motion when the driver stops it.
+    """The reply to each turn is lost. The driver sends a stop, and the server answers "no motion".
 
-    This does not show that the turn has not begun. So its count begins at zero, and not at the
-    count of the drive before.
+    The turn has ended by itself, so the odometry counts it from zero. It does not count from the
+    last count of the drive before the turn.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))
@@ -74,10 +77,10 @@ def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware
 
 
 def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() -> None:
-    """A documented server reports the heading at any time. It is not read between two moves.
+    """After a turn, the driver reads only the encoder, and begins the next straight move.
 
-    The reply to the turn makes the driver suspect a copy, so the driver reads the encoder first and
-    drives on. The first heading after the drive has changed by the turn, which is known already.
+    The first heading after the straight move still contains the turn. The odometry has already
+    counted the turn by the encoder, and does not add it again.
     """
     bench = on(NetworkFaults(), "documented")
     reach(bench, Pose(0.0, 0.6, math.pi / 2))
@@ -91,7 +94,7 @@ def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() 
 def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> None:
     """The first reply to ENC after each move is lost, but the server answers HELLO.
 
-    So the driver repeats ENC.
+    The driver then repeats ENC, and the robot reaches the goal.
     """
     bench, counted = on(NetworkFaults(), firmware), set[int]()
 
@@ -110,9 +113,10 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
-    """Nothing is heard for 0.3 s after a turn, so the driver stops a suspected copy of the turn.
+    """No reply arrives for 0.3 s after a turn, so the driver stops a suspected copy of the turn.
 
-    The count then is that of the whole turn. A copy that ran so briefly would have counted less.
+    The encoder then shows the whole turn. In this short time, a copy would have turned less. So
+    there was no copy, and the robot reaches the goal.
     """
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot
@@ -129,10 +133,10 @@ def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware
 
 
 def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
-    """The reply to the check of the IMU is late, so that the driver sends HELLO meanwhile.
+    """A HELLO is sent before a move. It arrives during the move, ahead of a copy of the move.
 
-    The network delays HELLO until the move has begun, and then delivers a copy of the move. The
-    server answers HELLO first, so this answer does not show that no copy runs.
+    The server answers HELLO before it runs the copy. The driver does not conclude from this answer
+    that no copy runs, and stops the copy.
     """
     bench = MartBench("source").ready()
     network, late = bench.robot.network[0], list[bytes]()
@@ -160,7 +164,10 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 
 
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
-    """An answer to an earlier HELLO is late and comes during the move, of which a copy follows."""
+    """During a move, a late answer to an earlier HELLO arrives. A copy of the move follows.
+
+    The driver does not conclude from this answer that no copy runs, and stops the copy.
+    """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]
 

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 
 def texts(bench: MartBench, since: int = 0) -> list[str]:
-    """Return the driver's messages since the event with this number."""
+    """Return the texts of the driver's notices, from the event with the number ``since`` on."""
     return [each.text for each in bench.events[since:] if isinstance(each, Notice)]
 
 
@@ -42,7 +42,10 @@ def once(chosen: Callable[[bytes], bool]) -> Callable[[bytes], bool]:
 
 
 def twice(path: Any, copied: Any, later_s: float) -> None:
-    """Let ``path`` deliver a copy of each datagram for which ``copied`` is true."""
+    """Let ``path`` deliver a copy of each datagram for which ``copied`` is true.
+
+    The copy arrives ``later_s`` after the datagram, in s.
+    """
     real = path.send
 
     def send(data: bytes, at_s: float) -> None:
@@ -54,10 +57,10 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 
 
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
-    """SM overtakes ENC. So the count comes after the angle.
+    """At the end of a turn, SM overtakes ENC. So the encoder count comes after the angle.
 
-    The count is far from the expected angle. The driver must not learn from it how fast the motors
-    turn.
+    The count is far from the expected angle. The driver does not use it as the angle, nor learn
+    the motors' speed from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -85,7 +88,10 @@ def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
 
 
 def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
-    """Two numbers came although one reply was missing. The likely one is the angle."""
+    """After the stop of a turn, two numbers arrive: the angle, and a late reply.
+
+    The number with a plausible value is regarded as the angle.
+    """
     stopping = Stopping(Motion.SPIN, 10.0, delay_s=0.3, started_s=0.0, owed=1)
     stopping.doubt(Ok(Form.INTEGER, "137"))
     assert stopping.doubtful_result is None
@@ -94,7 +100,10 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """A documented server has neither SSP nor RST IMU. Each of its refusals comes twice."""
+    """A documented server supports neither SSP nor RST IMU. Each of its refusals arrives twice.
+
+    The driver does not take a copy for the reply to the next check of the IMU. The robot drives.
+    """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
     bench.command(0.3, 0.0, 3.0)  # from now on, the driver checks the IMU by MCR SLOW 0
@@ -105,7 +114,10 @@ def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
 
 
 def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
-    """The reply to a stopped move comes twice, the second time before the count."""
+    """The reply to a stopped move arrives twice. The copy arrives before the encoder count.
+
+    The odometry does not use the number in the copy as a count.
+    """
     bench = on(NetworkFaults(), "firmware")
     network, pilot = bench.robot.network[0].from_board, bench.board._pilot
     real = network.send
@@ -130,8 +142,8 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """All replies are late by 0.28 s, so the driver stops a possible copy of each move.
 
-    Each HELLO in a move is lost. Its answer would come soon after the move. Without a copy, the
-    replies come sooner than a server that stops a copy can send them.
+    Without a copy, the replies come sooner than after a real stop, and the robot reaches the goal.
+    With a copy, the driver discards the goal.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]
@@ -150,9 +162,9 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """A copy of the check's ``ok`` is taken for the reply to B. The stop of B is lost once.
+    """A copy of the IMU check's ``ok`` is taken for the reply to B. The first stop of B is lost.
 
-    The true reply to B comes after the stop. The driver must not take it for that of the stop.
+    The true reply to B comes after the stop. The driver does not take it for the stop's reply.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]

@@ -20,7 +20,7 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packet
 
 WRONG_NEES = 28.0
-"""With an honest covariance, 1 in 270,000 normalised squared errors exceeds this value."""
+"""With a consistent covariance, 1 in 270,000 normalised squared errors exceeds this value."""
 
 
 def at(at_s: float, *, doubtful: bool = False) -> Moment:

@@ -41,9 +41,9 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during RM. Its first command that arrives is SL.
+    """A driver starts during RM, and its first command that arrives is SL.
 
-    SRM after SL would hang the server.
+    The driver sends no SRM after it, which would hang the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
@@ -55,7 +55,7 @@ Patch = Callable[[Any, str, Any], None]
 def sweeps_again(patch: Patch) -> None:
     """Patch the driver to send SRM and SM after it has used the stop port.
 
-    The patched driver does not ask what still moves.
+    The patched driver does not first find out which motion is in progress.
     """
     patch(Pilot, "_ask_what_moves", Pilot._sweep)
 
@@ -71,7 +71,7 @@ def says_sl_before_sm(patch: Patch) -> None:
 
 
 def turns_within_rm(patch: Patch) -> None:
-    """Patch the driver to send L during RM, without SRM in between."""
+    """Patch the driver to send L during RM, without a stop by SRM."""
     agrees, act = Pilot._agrees, Pilot._act
 
     def spins(pilot: Pilot, now: float) -> bool:
@@ -109,7 +109,7 @@ TRAPS = {
 def test_a_trap_that_is_planted_in_the_pilot_is_found(
     trap: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A trial ends well. With a defect planted in the driver, the same trial ends badly."""
+    """The real driver passes a trial. With a deliberate defect in the driver, the trial fails."""
     plant, trial, found = TRAPS[trap]
     assert trouble(trial) == ""
     plant(monkeypatch.setattr)

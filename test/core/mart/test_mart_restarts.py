@@ -19,9 +19,9 @@ pytestmark = pytest.mark.slow
 def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     motion: tuple[float, float], firmware: Firmware, boot_s: float
 ) -> None:
-    """The IMU dies in a motion and comes back, but the stop port stays hung.
+    """The IMU dies in a motion and works again later, but the server's stop port stays hung.
 
-    Motion waits for a zero heading or a long silence.
+    The driver refuses motion until a heading of zero or a long silence shows a restart.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -49,7 +49,8 @@ def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
 ) -> None:
     """The server restarts during a motion, and the motors still run.
 
-    Voltage queries and motions would crash the server until it is up.
+    Until the server has started up, the driver sends no voltage queries and no motions. They would
+    crash the server.
     """
     for offset_s in (0.0, 0.23, 0.46, 0.71):
         bench = MartBench().ready()

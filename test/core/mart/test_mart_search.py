@@ -82,7 +82,7 @@ def test_a_planted_trap_is_found(trap: str) -> None:
 def test_a_driver_that_does_not_wait_for_late_copies_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With an empty HARMFUL_LATE, the driver does not wait for late copies.
+    """A modelled driver does not wait for late copies of commands.
 
     The search finds a copy that does harm.
     """
@@ -93,7 +93,7 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A driver does not ask what moves, and sends SRM after SL.
+    """A modelled driver sends SRM after SL, without first finding out whether a motion continues.
 
     The search finds that the server hangs.
     """

@@ -128,7 +128,7 @@ def test_unanswered_changes_are_judged_by_the_measured_speeds(
 ) -> None:
     """Some changes of the motors' units are not answered, and each may have arrived or not.
 
-    The wheels' speeds show it. So the driver knows both motors' units again.
+    From the wheels' speeds, the driver concludes which changes have arrived.
     """
     settings = MartSettings()
     loop, now = SpeedLoop(settings), 0.0

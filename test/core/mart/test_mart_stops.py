@@ -90,7 +90,7 @@ def test_a_bad_network_neither_hangs_the_server_nor_leaves_the_robot_driving(
 
 
 def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
-    """A late copy of a start moves the robot at rest.
+    """The robot is at rest. A late copy of a start command then moves it.
 
     The driver's regular queries show the motion, and the driver stops it.
     """

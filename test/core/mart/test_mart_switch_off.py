@@ -47,9 +47,9 @@ def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
 
 
 def test_a_motor_that_the_server_has_left_on_is_switched_off() -> None:
-    """The driver writes "stop" to both motors once, and then releases the server.
+    """After a straight move, the server has left a motor on. The driver sends MCS, then MSM.
 
-    MSM waits for a late copy of MCS.
+    MCS switches both motors off. MSM follows when no late copy of MCS can arrive any more.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -67,7 +67,7 @@ def test_a_motor_that_the_server_has_left_on_is_switched_off() -> None:
 
 @pytest.mark.parametrize("word", [b"MCS", b"MSM"])
 def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
-    """The network loses the first MCS or MSM. The driver misses its reply, and repeats it."""
+    """The network loses the first MCS or MSM. The driver repeats the command without a reply."""
     bench = creeping()
     since = len(bench.written)
     lost = drops(bench.robot.network[0].to_board, nth(bench, word, 1))
@@ -79,7 +79,10 @@ def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
 
 
 def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
-    """The server refuses a second MCS as conflicting action. The driver knows this conflict."""
+    """The reply to MCS is lost. The driver repeats MCS, and the server refuses it as a conflict.
+
+    The refusal shows that the first MCS has arrived. So the driver sends MSM.
+    """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
     drops(
@@ -111,9 +114,9 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 
 
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
-    """The reply to MCS is lost, so MCS is sent again and refused. A copy of the second one is late.
+    """The reply to MCS is lost, so the driver repeats MCS. A copy of the second MCS is late.
 
-    It begins MCS anew if it arrives after MSM. So MSM waits for this copy.
+    After MSM, this copy would begin MCS anew. So the driver delays MSM until no copy can arrive.
     """
     bench = creeping()
     since = len(bench.written)
@@ -130,7 +133,10 @@ def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
 
 
 def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
-    """A controlled turn writes both motors, and leaves them off."""
+    """A controlled turn follows a straight move at once. The driver sends no MCS.
+
+    The turn writes both motors, and leaves them off.
+    """
     bench = MartBench("source").ready()
     since = len(bench.written)
     reach(bench, Pose(0.5, 0.0, 1.5))
@@ -142,7 +148,10 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
 
 
 def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
-    """The e-stop is latched before MCS was sent. MCS and MSM follow, and the stops continue."""
+    """The e-stop is latched after a straight move, before MCS is sent.
+
+    The driver still sends MCS and MSM, and continues to send stops.
+    """
     bench = creeping()
     since = len(bench.written)
     bench.estop(True)
@@ -156,7 +165,7 @@ def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
 
 
 def test_a_motor_is_switched_off_with_a_dead_imu() -> None:
-    """MCS and MSM need no IMU."""
+    """The IMU fails after a straight move. The driver still sends MCS and MSM: they need no IMU."""
     bench = creeping()
     bench.robot.board.server.imu.alive = False
     since = len(bench.written)
@@ -167,7 +176,7 @@ def test_a_motor_is_switched_off_with_a_dead_imu() -> None:
 
 
 def test_a_docking_move_is_followed_by_a_switch_off() -> None:
-    """A docking drives straight too."""
+    """A docking move is straight and may also leave a motor on. The driver sends MCS and MSM."""
     bench = MartBench("source", dock_m=0.4).ready()
     bench.job(Job.DOCK, "DOCK", 12)
     bench.run(2.0)
@@ -175,7 +184,7 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 
 
 def test_a_server_without_these_commands_is_asked_once() -> None:
-    """A server by the manual does not know MCS. The driver does not send it again."""
+    """A documented server does not support MCS. The driver sends MCS only once."""
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):
         reach(bench, Pose(way_m, 0.0, 0.0))
@@ -184,7 +193,7 @@ def test_a_server_without_these_commands_is_asked_once() -> None:
 
 
 def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None:
-    """The words that the guard would send include MSM as long as MCS may be in progress."""
+    """The stop commands for the guard include MSM while MCS may be in progress."""
     bench = creeping()
     bench.run_until(lambda: bench.server.manual, 0.3)
     assert (0, b"MSM") in bench.board.stop()
@@ -196,10 +205,9 @@ def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None
 def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
     away_s: float,
 ) -> None:
-    """The first motion is refused, so the driver sends MSM; the next motion begins.
+    """An earlier driver has left MCS in progress. The new driver sends MSM, and the robot drives.
 
-    If the server is away at first, the driver uses the stop port, and must then find out whether a
-    motion is in progress.
+    This also works if the network is interrupted at first, so that the driver uses the stop port.
     """
     bench = MartBench("source")
     bench.robot._good = False
@@ -222,7 +230,10 @@ def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
 
 
 def test_a_driver_that_begins_switches_the_motors_off() -> None:
-    """The driver before it was killed directly after a straight move, so a motor may be on."""
+    """An earlier driver was killed directly after a straight move, so a motor may be on.
+
+    The new driver sends MCS and MSM.
+    """
     bench = MartBench("source")
     bench.server.drive(128, 127)
     bench.ready()
@@ -232,10 +243,10 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 
 
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
-    """The stop port has stopped RM, of which the server still knows: SRM would hang it.
+    """After a stop of RM by the stop port, SRM would hang the server. The driver sends MSM instead.
 
-    The driver asks whether a motion is in progress. It sends MSM, whose ``ok`` comes twice. The
-    next RST IMU is lost.
+    The ``ok`` to MSM arrives twice, and the next RST IMU is lost. The driver does not take the
+    second ``ok`` for the reply to RST IMU, and reports that RM is still in progress.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.robot._good = False

@@ -41,7 +41,7 @@ def go(bench: MartBench, goal: Pose) -> None:
 
 
 def lose_once(bench: MartBench, begins: bytes) -> None:
-    """Lose the next datagram that begins so, in either direction."""
+    """Let the network lose the next datagram that begins with ``begins``, in either direction."""
     lost: list[bytes] = []
     for way in (bench.robot.network[0].to_board, bench.robot.network[0].from_board):
 
@@ -56,9 +56,10 @@ def lose_once(bench: MartBench, begins: bytes) -> None:
 
 
 def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
-    """Duplicate the next ``request``; the copy comes ``after_s`` later, its replies ``late_s``.
+    """Let the network duplicate the next ``request``.
 
-    Return a list to which the arrival time of the copy is added.
+    The copy arrives ``after_s`` later than the request. The files sent in reply to the copy are
+    delayed by ``late_s``, in s. Return a list to which the arrival time of the copy is added.
     """
     copied_s: list[float] = []
     there, back = bench.robot.network[0].to_board, bench.robot.network[0].from_board
@@ -84,7 +85,7 @@ def downloads(bench: MartBench) -> int:
 
 
 def test_the_angle_is_that_of_the_gyro_with_the_servers_sign() -> None:
-    """The driver uses the angle at "stop detected".
+    """The driver uses the angle that the record gives for "stop detected".
 
     This angle includes the coasting of the robot.
     """
@@ -134,7 +135,7 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The manual does not specify the file, so a server may give no angle.
+    """The server's records contain no usable angle, because the manual does not specify their form.
 
     The driver requests only three records.
     """
@@ -152,7 +153,7 @@ def test_a_server_without_records_is_asked_three_times(
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
     """One motor turns 10 % faster. A few records show the ratio.
 
-    The driver then stops asking: the public server never closes a sent file.
+    The driver then requests no more records, because the public server never closes a sent file.
     """
     bench = MartBench("source", motor_inequality=0.1).ready()
     for _ in range(2):
@@ -207,7 +208,7 @@ def test_a_lost_answer_of_the_record_hardly_delays_the_next_command(lost: bytes)
 def test_a_late_copy_of_the_driver_s_download_does_not_disturb_that_of_the_user(
     late_s: float,
 ) -> None:
-    """The network doubles the driver's LAST TURN.
+    """The network duplicates the driver's own request for a record (LAST TURN).
 
     The user's ~/download_last_move waits until late replies to the copy can no longer arrive.
     """
@@ -236,7 +237,10 @@ def test_a_new_command_does_not_wait_for_the_record() -> None:
 
 
 def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
-    """The user cancels the goal during each download. This says nothing about the server."""
+    """The user cancels the goal during each download of a record.
+
+    This does not show that the server has no records, so the driver continues to request them.
+    """
     bench = MartBench("source").ready()
     for count in range(1, UNRECORDED + 3):
         bench.go_to(0.0, (-1.0) ** count, 0.0)
@@ -247,9 +251,9 @@ def test_goals_that_are_replaced_early_do_not_end_the_use_of_records() -> None:
 
 
 def test_a_reset_of_the_odometry_discards_the_record_of_the_turn_before() -> None:
-    """The odometry is reset, and the record of an earlier turn arrives.
+    """The odometry is reset, and then the record of an earlier turn arrives.
 
-    The driver discards the record: the new frame begins at the present heading.
+    The driver discards the record, because the new frame begins at the present heading.
     """
     bench = MartBench("source").ready()
     bench.go_to(0.0, 1.0, math.pi / 2)
