@@ -53,9 +53,11 @@ STEADY: Final = 0.03
 SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 """Conditions for learning from a turn how fast the motors turn.
 
-``SPINS_UP_S``: least time in s, plus the averaging time. ``SEEN_RAD``: least angle.
+``SPINS_UP_S``: the turn must last at least this time in s, plus the averaging time of the rate.
 
-``TOLD_RAD``: above this angle, the server's angle is used.
+``SEEN_RAD``: least angle of the turn, in rad.
+
+``TOLD_RAD``: above this angle in rad, the server's angle is used instead of the wheel's.
 """
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
@@ -247,7 +249,7 @@ class SpotTurns:
         self._before_slow = None
 
     def _undo_false_lesson(self, part: float) -> None:
-        """Forget what was learned from a slow turn, if the next turn shows that it was hindered.
+        """Forget what was learned from a slow turn, if the next turn shows that something held it.
 
         ``part``: the next turn's measured rate divided by its commanded rate.
         """

@@ -2,9 +2,10 @@
 
 """The commands that switch off a motor that is on although the server knows of no motion.
 
-The public server may leave one on after TF or TB, and a restarted one any. No stop ends this. MCS
-writes both motors; then the server refuses all motions until MSM. This module knows commands and
-replies; it does not know when the robot is at rest.
+The public server may leave a motor on after TF or TB. A server that was restarted in a motion may
+have left both on. No stop switches them off. MCS writes both motors; then the server refuses all
+motions until MSM. This module knows commands and replies; it does not know when the robot is at
+rest.
 """
 
 from typing import Final
@@ -30,7 +31,7 @@ class SwitchOff:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection, in which the server may know MCS."""
+        """Begin a new connection. Its server may support MCS, even if an earlier server did not."""
         self.needed = self.underway = False
         self._supported = True
 

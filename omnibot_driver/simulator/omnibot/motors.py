@@ -69,7 +69,7 @@ class Motor:
     def advance(self, pwm: float, load_pwm: float = 0.0) -> float:
         """Turn for one tick under a constant effort; return the counts turned, not rounded.
 
-        ``load_pwm``: outside force, without the motor's delay.
+        ``load_pwm``: an outside force in PWM steps, which acts without the motor's delay.
         """
         constants, start = self._constants, self.speed
         self._on_the_way.append(pwm)

@@ -227,8 +227,7 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
     """The server rejects RM although the robot moves, and SRM finds no motion.
 
-    The driver starts a controlled turn, at the end of which the motors are off. It then refuses
-    motion.
+    The driver switches the motors off, and then refuses motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)

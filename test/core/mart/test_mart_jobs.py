@@ -353,7 +353,7 @@ def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
 def test_another_server_is_refused_by_its_name() -> None:
     """A different server answers HELLO with its own name.
 
-    The driver refuses it, and a notice has the name.
+    The driver refuses motion, and a notice contains this name.
     """
     bench = MartBench()
     bench.open()

@@ -124,7 +124,10 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
 
 
 def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
-    """Return a bench whose server was restarted in a move, and has had time to be stopped."""
+    """Return a bench whose server was restarted during a move, 8 s ago.
+
+    ``alive``: whether the IMU works after the restart.
+    """
     bench = MartBench(firmware).ready()
     bench.go_to(3.0, 0.0, 0.0)
     bench.run_until(lambda: not bench.robot.stands, 5.0)
@@ -137,7 +140,10 @@ def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Firmware) -> None:
-    """The robot moves, and no motion can begin. MCS needs no IMU, so it stops the robot."""
+    """A server is restarted during a move. The robot still moves, and the IMU is dead.
+
+    The driver stops the robot with MCS, which needs no IMU. It starts no turn.
+    """
     bench = rescued(firmware, alive=False)
     assert bench.robot.stands
     assert b"MCS 128 128" in bench.said()
@@ -145,7 +151,10 @@ def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Fi
 
 
 def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree() -> None:
-    """A documented server refuses MCS. The driver then sends a controlled turn."""
+    """A documented server is restarted during a move, and the robot still moves.
+
+    The server does not support MCS, so the driver stops the robot by a controlled turn.
+    """
     bench = rescued("documented", alive=True)
     assert bench.robot.stands
     assert b"MCR SLOW 1" in bench.said()
