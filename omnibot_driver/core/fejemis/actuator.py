@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Repeats the motion lines (``rc``) to both boards.
+"""Sends the motion lines (``rc``) to both boards, and repeats them.
 
-While the speed is limited, or without checksums, each new front angle repeats them too.
+While the speed is limited, or lines have no checksum, each new angle of the front wheel causes an
+extra repetition.
 
 The module knows when a line is due; it does not know what the line contains.
 """
@@ -28,7 +29,7 @@ class Listener(Protocol):
 
 
 class PairStream(SetpointStream):
-    """Sends the set-point to both boards, and repeats it.
+    """Stream that sends the set-point to both boards, and repeats it.
 
     ``driving``: whether the set-point is a motion, not a stop.
     """

@@ -20,8 +20,8 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Largest angle to the left, in degrees, that undetected damage to a line may produce. Texts with
-worse damage are avoided."""
+"""Undetected damage may turn an angle to the right into one to the left. This is the limit for the
+wrong angle, in degrees: texts that could exceed it are avoided."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
@@ -32,7 +32,7 @@ class AngleRelay:
         self._owed_deg = 0.0
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
-        """Return the ``fwl`` line for the angle; ``sums``: whether the caller adds a checksum."""
+        """Return the ``fwl`` line with the angle; ``sums``: whether the caller adds a checksum."""
         angle_deg = math.degrees(angle_rad)
         wanted_deg = angle_deg + self._owed_deg
         # Without a checksum, the board detects no loss. A whole number never grows if a digit is
@@ -45,7 +45,7 @@ class AngleRelay:
 def heard_instead(text: str) -> Iterator[float]:
     """Yield each number that a board may read after an undetected loss of two characters.
 
-    0 stands for a remaining text that is not a number.
+    If the remaining text is not a number, yield 0.
     """
     for i, j in combinations(range(len(text)), 2):
         if (ord(text[i]) + ord(text[j])) % MODULUS == 0:
@@ -74,7 +74,7 @@ def _with_sum(tenths: int) -> bytes:
 
 
 def _written(tenths: int) -> list[str]:
-    """Return all ways to write the angle, with and without redundant zeros."""
+    """Return all texts for an angle in tenths of a degree, with and without redundant zeros."""
     whole, tenth = divmod(abs(tenths), 10)
     heads = [str(whole), f"0{whole}"] if whole else ["0", ""]
     tails = [f".{tenth}", f".{tenth}0"] if tenth else ["", ".", ".0", ".00"]

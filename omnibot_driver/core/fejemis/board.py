@@ -31,7 +31,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class FejemisBoard(Board):
-    """A Fejemis robot as a ``Board``.
+    """A Fejemis robot as a ``Board``, the driver's interface to every robot.
 
     ``services``: the user's requests that only a Fejemis has, such as brush and lift.
 
@@ -155,7 +155,10 @@ class FejemisBoard(Board):
         return self._taken(now)
 
     def silence(self) -> None:
-        """Handle the silence of both boards: switch brush and lift off, and subscribe again."""
+        """Handle the silence of both boards.
+
+        Switch brush and lift off, and subscribe to all data streams again.
+        """
         self._inbound.mode = Mode.UNKNOWN
         for half in self._ports.halves:
             half.subscribe_again()
@@ -164,7 +167,8 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The guard process may have done so. The stall is not regarded as silence of the boards.
+        The guard process may already have switched them off. The stall is not regarded as silence
+        of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:

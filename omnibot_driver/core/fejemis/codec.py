@@ -46,7 +46,7 @@ TURN: Final[Range] = (-180.0, 180.0)
 SPEED: Final[Range] = (-10.0, 10.0)
 """Accepted range of the speed of a wheel's rim, in m/s."""
 RATE: Final[Range] = (-4000.0, 4000.0)
-"""Accepted range of a turn rate, in degrees per second. No gyro of such boards measures more."""
+"""Accepted range of a turn rate, in degrees per second. The usual gyros do not measure more."""
 FORCE: Final[Range] = (-320.0, 320.0)
 """Accepted range of the specific force, in m/s²; 320 m/s² are about 32 g."""
 FIELD: Final[Range] = (-5000.0, 5000.0)

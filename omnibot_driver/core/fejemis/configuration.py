@@ -27,7 +27,8 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
     "drive": (b"confi", b"gyrooi", b"accoi", b"magoi", b"cpdrivei"),
     "front": (b"fwoi", b"cpsteeri", b"iri"),
 }
-"""Lines that request the configuration of each board. ``confs`` is a subscribed stream instead."""
+"""Lines that request the configuration of each board. The line ``confs`` (steering geometry) is not
+requested, because the board sends it regularly."""
 ON: Final[Mapping[Role, tuple[Written, ...]]] = {
     "drive": (Written.WHEELS, Written.STEERING, Written.MAGNETOMETER, Written.ACCELEROMETER),
     "front": (Written.STEERING, Written.FRONT_WHEEL, Written.INFRARED, Written.STEERING_GAINS),
@@ -35,7 +36,8 @@ ON: Final[Mapping[Role, tuple[Written, ...]]] = {
 EVERY_S: Final = 0.25
 TRIES: Final = 12
 NEAR: Final = 2e-3
-"""Largest relative difference between a written number and its reading. Boards print few digits."""
+"""Largest accepted relative difference between a written number and the number that the board
+reports. Boards print few digits."""
 DIGIT: Final = 6e-4
 
 
@@ -49,9 +51,10 @@ class Configuration:
         self.role: Role = role
         self.told: dict[str, tuple[float, ...]] = {}
         self._once: dict[str, tuple[float, ...]] = {}
-        """Numbers of the last reading, by keyword. Some may still lack a second, equal reading."""
+        """Numbers of the last reading, by the keyword of the line. A second, equal reading may not
+        have confirmed them yet."""
         self.turned = False
-        """Whether the board's ``confs`` line begins with the track.
+        """Whether the board's ``confs`` line (steering geometry) begins with the track.
 
         According to the board's help text, the track comes last.
         """
@@ -144,7 +147,8 @@ class Configuration:
     def geometry(self) -> Geometry | None:
         """Track B and wheelbase F in m, as the board uses them; None while unknown.
 
-        The user's values replace equal but rounded values of the board, or unknown ones.
+        The user's values are returned instead if the board's values are unknown, or equal to them
+        except for rounding.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

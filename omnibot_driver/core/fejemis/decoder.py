@@ -2,8 +2,8 @@
 
 """Splits the bytes from one board into lines, checks the lines, and counts the damaged ones.
 
-The decoder does not read a clock and never raises on input. Between calls, it holds less than
-``LONGEST_LINE`` bytes.
+The decoder does not read a clock and never raises on input. Between calls, it holds less than 200
+bytes (``LONGEST_LINE``).
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class FejemisDecoder:
     ``doubtful``: whether the last line contradicts ``sums``. Lines to the board then carry no
     checksum.
 
-    ``contradicted``: whether the last line contradicts ``line_sums``.
+    ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.
     """
 
     def __init__(self, line_sums: LineSums = "auto") -> None:

@@ -2,7 +2,7 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-Sent packets must be passed to ``meaning``.
+After sending the packets, the caller passes them to ``Encoder.meaning``.
 
 The module knows geometry and lines; it does not know when lines are sent.
 """
@@ -109,7 +109,8 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the body twist that ``packets`` command at the present front angle.
 
-        Called for sent packets. All but the last result of ``encode`` are regarded as a stop.
+        The caller passes packets that were sent. Packets other than the last result of ``encode``
+        are regarded as a stop.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

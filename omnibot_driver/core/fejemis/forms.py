@@ -2,7 +2,7 @@
 
 """Learns the form of each kind of line: its count of fields, and the decimals of each field.
 
-A line in another form is damaged, unless three in a row have the same new form.
+A line in another form is regarded as damaged, unless three in a row have the same new form.
 
 The module knows forms; it does not know the meaning of a line.
 """
@@ -12,8 +12,10 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""How many of ``OF`` lines in another form end the check of their kind: with and without a correct
-checksum."""
+"""If this many of 24 lines of one kind have another form, this kind is no longer checked.
+
+``VARIES``: for lines with a correct checksum. ``VARIES_WITHOUT_SUM``: for other lines.
+"""
 OF: Final = 24
 
 Form = tuple[int, ...]

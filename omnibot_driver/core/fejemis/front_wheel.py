@@ -11,7 +11,7 @@ from typing import Final
 from omnibot_driver.core.fejemis.messages import FrontAngle
 
 OLDEST_S: Final = 0.06
-"""Age of the last angle, in s, above which the robot is stopped: four periods of ``fwl`` lines."""
+"""Age of the last angle, in s, above which the robot is stopped. An angle comes every 15 ms."""
 HEALTHY: Final = 0x3C2
 LOOKED_AT: Final = 0x7FF
 """Mask of the diagnosis bits that are checked: all bits except the frame counter."""
@@ -19,7 +19,8 @@ SICK_LINES: Final = 3
 """How many lines in a row must report a fault before the sensor is regarded as faulty."""
 FASTEST_DEGPS: Final = 900.0
 LEAP_DEG: Final = 4.0
-"""Jump of the angle, in degrees, that is accepted in addition to a motion at ``FASTEST_DEGPS``."""
+"""Jump of the angle, in degrees, that is accepted in addition to a motion of the wheel at its
+highest speed (``FASTEST_DEGPS``)."""
 BITS: Final = (
     (10, False, "broken Hall element"),
     (9, True, "gain control not settled"),
@@ -102,7 +103,10 @@ class FrontWheel:
         return True
 
     def _reachable(self, angle_deg: float, now: float) -> bool:
-        """Return whether the wheel can have reached the angle, or two angles confirm a jump."""
+        """Return whether the wheel can have reached the angle.
+
+        A larger jump is accepted if the next angle confirms it.
+        """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)
         if math.isnan(self.angle_rad) or (

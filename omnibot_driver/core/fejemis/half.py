@@ -35,7 +35,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-``confs`` must not be requested: ``confsi`` without its last letter sets the geometry to zero.
+``confs`` (steering geometry) is not requested by ``confsi``: if the last letter of this request is
+lost, the board sets its geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
@@ -55,7 +56,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 class Half:
     """State of one half. A *half* is each of the two Teensys (drive or front).
 
-    ``identity``: the identity in its heartbeats, or None before.
+    ``identity``: the identity in its heartbeats; None before the first heartbeat.
 
     ``restarted``: whether the board has restarted. The caller resets this flag.
 
@@ -71,7 +72,7 @@ class Half:
         """How many lines from the driver the board has rejected as damaged."""
         self.identity: int | None = None
         self.role: Role | None = None
-        """Role of the board; None while the identity is unknown or not one of ``ROLES``."""
+        """Role of the board; None while the identity is unknown, or is neither 90 nor 91."""
         self.begin(line_sums)
 
     def begin(self, line_sums: LineSums) -> None:
@@ -83,7 +84,8 @@ class Half:
         self.heard_at = -math.inf
         self.restarted = False
         self.ready = False
-        """Whether the ``NEEDED`` stream arrives. A restart of the board resets this flag."""
+        """Whether the board sends the data stream that driving requires. A restart of the board
+        resets this flag."""
         self._told: int | None = None
         self._counted_at, self._counted = -math.inf, 0
         self._left = False
@@ -96,8 +98,8 @@ class Half:
     def unsure(self) -> bool:
         """Whether the board may have restarted, and so may lack the user's settings.
 
-        True after a pause of the ``NEEDED`` stream, until a heartbeat shows that the board's time
-        continues.
+        True after a pause of the stream that driving requires, until a heartbeat shows that the
+        board's time continues.
         """
         return self._unsure_at is not None
 

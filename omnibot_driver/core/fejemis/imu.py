@@ -2,7 +2,7 @@
 
 """Computes when the board took each sample of its IMU, and converts the sample to SI units.
 
-The lines carry no time: time = phase + a whole number of ``PERIOD_S``.
+The lines carry no time. The sampling time is a phase plus a whole number of sampling periods.
 
 The module knows pairs of lines and times; ``imu_pairs.py`` finds the pairs.
 """
@@ -20,7 +20,7 @@ LATE: Final = 0.98
 REGULAR: Final = 0.6
 """Interval between the arrivals of two late samples, in periods, above which a sample was lost.
 
-Samples that waited for a stalled host arrive together.
+Without a loss, late samples have waited for a stalled host, and arrive together.
 """
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s in which the board sends all lines of one control cycle."""
@@ -29,7 +29,7 @@ BLOCK: Final = 100
 
 
 class ImuSamples:
-    """Converts samples of the IMU.
+    """Converter of IMU samples to readings, and of their arrival times to sampling times.
 
     ``unit``: unit of the acceleration lines.
 
@@ -43,7 +43,7 @@ class ImuSamples:
         self.begin()
 
     def begin(self) -> None:
-        """Forget the phase and the count of periods, because the board's streams start again."""
+        """Forget the phase of the sampling times, because the board's streams start again."""
         self._count = 0
         self._arrived_s = -math.inf
         self._phase_s: float | None = None
@@ -62,9 +62,11 @@ class ImuSamples:
     def sampled_s(self, arrived_s: float, not_before_s: float, skipped: int) -> float:
         """Return when the board took the next sample, in s of the board's clock.
 
-        ``arrived_s``: arrival by that clock. ``not_before_s``: last pose before.
+        ``arrived_s``: when the sample arrived, by that clock.
 
-        ``skipped``: incomplete samples left out before.
+        ``not_before_s``: time of the last pose before the sample.
+
+        ``skipped``: how many incomplete samples were left out before it.
         """
         if self._phase_s is None or arrived_s - self._phase_s < -1.0:
             self.begin()
@@ -88,9 +90,12 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Set the phase as late as possible, but so that no sample arrives before its own time.
+        """Set the phase of the sampling times as late as possible.
 
-        Only samples of the last ``PHASE_BLOCKS`` blocks of arrivals count.
+        No sample may arrive before its sampling time.
+
+        Only recent samples are considered: the last three blocks of 100 samples, and the samples
+        since then.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

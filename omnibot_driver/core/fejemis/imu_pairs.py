@@ -2,7 +2,8 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-A pair is false if its lines are of different samples: both lines between them were lost.
+A pair is false if its two lines belong to different samples. This happens if both lines between
+them were lost.
 """
 
 import itertools
@@ -23,21 +24,23 @@ PERIOD_S: Final = 0.01
 # One kind remains undetected: both lines are late, but close together, and no later pose is in the
 # read.
 PAIR_WITHIN_S: Final = 0.005
-"""Longest time in s between the two lines of a pair that needs no further evidence."""
+"""Longest time in s between the two lines of a pair for which no further evidence is needed."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``, ``SUREST_S``: smallest evidence in s that proves the order of the two lines, and
-largest that is stored."""
+"""``KNOWN_S``, ``SUREST_S``: smallest evidence that proves which line of a sample comes first, and
+largest evidence that is stored. Evidence is a sum of pauses before lines, in s."""
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that is added to a pause in which another kind of line comes. The control cycle
-ended there."""
+"""Evidence in s that counts in addition to the pause itself, if a line of another kind arrives in
+the pause. Such a pause is probably between two samples."""
 PATIENCE: Final = 60
-"""How many pauses are measured before weak evidence decides, e.g. of lines half a period apart."""
+"""How many pauses are measured before weak evidence decides which line comes first. Evidence stays
+weak if the two lines are half a period apart."""
 MOST: Final = 10
-"""Largest magnitude of the numbers in ``_outside``."""
+"""Largest magnitude of the counter by which the driver learns, for each other kind of line, whether
+it comes outside of or within pairs."""
 UNPOSED: Final = 20
-"""How many gyro or acceleration lines may come while a pair waits for a pose. Then the pair is
-rejected."""
+"""How many gyro or acceleration lines may come while a pair waits for a pose. If more come, the
+pair is rejected."""
 
 
 @dataclass(slots=True)
@@ -48,7 +51,7 @@ class Pair:
 
     ``pose_s``: the board's time of the last pose before the pair.
 
-    ``skipped``: how many incomplete samples were left out before.
+    ``skipped``: how many incomplete samples were left out since the pair before.
 
     ``doubtful``: whether the pair must wait for a pose.
     """
@@ -88,7 +91,8 @@ class ImuPairs:
         self._between: set[str] = set()
         """The kinds of lines that arrived since the last gyro or acceleration line."""
         self._outside: dict[str, int] = {}
-        """For each other kind of line: how many came outside of pairs, minus how many within."""
+        """For each kind of line except gyro and acceleration: how many came outside of pairs, minus
+        how many came within pairs."""
         self._skipped = 0
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
@@ -106,7 +110,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
 
-        If it usually comes outside of pairs, the present pair has lost its second line.
+        If this kind of line usually comes outside of pairs, the present pair has lost its second
+        line.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -136,7 +141,7 @@ class ImuPairs:
     def take(self) -> list[Pair | Oriented]:
         """Return the pairs that are no longer doubtful, and the orientations, in order of arrival.
 
-        Called after a pose and at the end of a read.
+        The caller calls this after a pose and at the end of a read.
         """
         taken: list[Pair | Oriented] = []
         while self._queue:
@@ -204,7 +209,7 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Record that lines of these ``kinds`` came in or between pairs.
+        """Record that lines of these ``kinds`` came within a pair or between pairs.
 
         ``step``: 1 between pairs, -1 within a pair.
         """

@@ -28,7 +28,7 @@ class Inbound:
 
     ``mode``: nominal while both boards send data and the drive board obeys.
 
-    ``relay_rad``: angle that must still be relayed to the drive board, or None.
+    ``relay_rad``: angle of the front wheel that must still be relayed to the drive board, or None.
     """
 
     def __init__(
@@ -53,7 +53,10 @@ class Inbound:
         self.watch.begin()
 
     def take_relay(self) -> float | None:
-        """Return the angle to relay to the drive board, in rad; None without a new angle."""
+        """Return the front wheel's new angle in rad, to relay to the drive board; None if not new.
+
+        The next call returns None until another angle arrives.
+        """
         angle_rad, self.relay_rad = self.relay_rad, None
         return angle_rad
 

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Runs the user's requests other than motion, one at a time, and checks whether they succeed.
+"""Runs the user's jobs one at a time, and checks whether they succeed.
 
-The boards acknowledge none of them. The module does not read a clock.
+A job is a calibration, saving or loading of the configuration, or a power-off. The boards
+acknowledge none of them. The module does not read a clock.
 """
 
 import math
@@ -34,11 +35,15 @@ OFFSETS: Final[Mapping[Job, tuple[bytes, bytes, str]]] = {
     Job.CALIBRATE_GYRO: (b"gyroc", b"gyrooi", "gyroo"),
     Job.CALIBRATE_ACCELEROMETER: (b"acccal2", b"accoi", "acco"),
 }
-"""For each calibration: the command, the request for the offsets, and the keyword of their line."""
+"""For each calibration: the command, the request for the offsets, and the keyword of the line that
+reports the offsets."""
 
 
 def whole_seconds(delay_s: float) -> int:
-    """Return the delay in whole seconds, at least 1; its digits contain no ``UNSEEN`` pair."""
+    """Return the delay in whole seconds, at least 1.
+
+    The delay is increased until the checksum detects the loss of any two of its digits.
+    """
     seconds = max(1, round(delay_s))
     while any(pair <= {*str(seconds)} for pair in UNSEEN):
         seconds += 1
@@ -91,11 +96,11 @@ class Jobs:
     def ask(
         self, job: Job, token: object, now: float, *, delay_s: float = 0.0, wait_s: float = 0.0
     ) -> None:
-        """Begin a job after ``wait_s``. Raises RequestRefused while another job runs.
+        """Begin a job after ``wait_s`` seconds. Raises RequestRefused while another job runs.
 
         ``token``: identifies the job in its result.
 
-        ``delay_s``: time until a power-off.
+        ``delay_s``: time in s until the board cuts the power; only for a power-off.
         """
         if self.job is not None:
             raise RequestRefused(
@@ -144,7 +149,7 @@ class Jobs:
     def begin(self) -> None:
         """End the running job as failed, because the connection is new.
 
-        A power-off stays in force, because the board may already have received it.
+        A requested power-off stays in force, because the board may already have received it.
         """
         self.cancel("the port was lost meanwhile; call again once it is back")
 

@@ -2,7 +2,8 @@
 
 """Brush, lift and lights of the front board: their state, and the lines that control them.
 
-Each lift line limits its run time. Other lines are repeated, because the board acknowledges none.
+Each line for the lift limits the lift's run time. The other lines are repeated, because the board
+does not acknowledge them.
 """
 
 import math
@@ -24,8 +25,8 @@ sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.5
-"""Smallest ratio of the sent to the wanted voltage. A lower voltage is sent if a checksum would not
-detect damage."""
+"""Smallest ratio of the sent to the wanted voltage of the lift. A lower voltage is sent if the
+checksum could not detect damage to the line with the wanted voltage."""
 LEAST_TIME_S: Final = 0.04
 
 
@@ -44,8 +45,12 @@ class Machine:
         self._lift_line = b""
         """The line for the lift that is still to be sent; empty if there is none."""
         self._lift_at = self._lift_again_at = self._lift_until = -math.inf
-        """Times in s: to send ``_lift_line``, earliest for the next lift line, and end of the
-        lift's motion."""
+        """``_lift_at``: time in s at which to send the line for the lift.
+
+        ``_lift_again_at``: earliest time of the next such line.
+
+        ``_lift_until``: time at which the lift's motion ends.
+        """
         self._led_at, self._led_again_at = math.inf, -math.inf
         self._off_left = self._led_left = self._brush_left = 0
         self._next_at = math.inf
@@ -106,7 +111,7 @@ class Machine:
         self._next_at = -math.inf
 
     def switch_off(self) -> list[bytes]:
-        """Switch brush and lift off, and return the lines for it.
+        """Switch brush and lift off, and return the lines that do this.
 
         The lines also let the board show its own lights again.
         """
@@ -152,7 +157,10 @@ class Machine:
 
 
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
-    """Return a ``motv`` line in which a checksum detects damage, and the line's run time in s."""
+    """Return the line that moves the lift (``motv``), and its run time in s.
+
+    The numbers are chosen so that the checksum detects damage to the line.
+    """
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)

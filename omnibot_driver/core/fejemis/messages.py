@@ -14,7 +14,8 @@ from omnibot_driver.core.values import value
 class Heartbeat:
     """``hbt``: the heartbeat of a board.
 
-    ``state``: rcSource on the drive board, -1 while it ignores motion commands.
+    ``state``: on the drive board, the source of the motion commands that it obeys (rcSource); -1
+    while it ignores motion commands.
     """
 
     time_s: float
@@ -106,7 +107,7 @@ class Battery:
 
 @value(frozen=True, slots=True)
 class Distance:
-    """``tofd`` or ``sr04``: distance in m."""
+    """``tofd`` or ``sr04``: distance in m, measured by time of flight or by sonar."""
 
     keyword: str
     distance_m: float
@@ -147,7 +148,7 @@ class WheelConfiguration:
 class SteeringConfiguration:
     """``confs``: the track, and the distance from the axle to the steered wheel, both in m.
 
-    By the help text, the distance comes first. Some boards send the track first.
+    According to the boards' help text, the distance comes first. Some boards send the track first.
     """
 
     first_m: float

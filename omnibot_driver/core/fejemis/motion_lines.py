@@ -2,9 +2,9 @@
 
 """Writes ``rc`` lines so that the checksum detects the loss of any two characters.
 
-A line has a speed and a turn rate. The front board uses only their ratio, the drive board only the
-root of the sum of their squares. So several lines give the same motion. Of those with which the
-loss is detected, the nearest to the command is taken.
+A line has a speed and a turn rate. The front board uses only their ratio. The drive board uses only
+the root of the sum of their squares. So several lines give the same motion. The module selects a
+line in which such a loss is detected, as near to the command as possible.
 """
 
 import math
@@ -18,16 +18,17 @@ STOP: Final = b"rc 2 0 0"
 LEAST_MPS: Final = 0.001
 """Speed of the outer wheel in m/s below which the robot is commanded to stop."""
 SLOWEST_MPS: Final = 2e-4
-"""Speed in m/s below which the front board's line has speed 0. Few such small numbers can be
-written."""
+"""Speed in m/s below which 0 is written as the speed for the front board, because few smaller
+numbers can be sent safely."""
 LEAST_RAD: Final = 1e-5
 SPEED_WITHIN: Final = 0.004
 """Tolerated relative error of the outer wheel's speed."""
 ANGLE_COST: Final = 1e4
-"""Cost of an angle error of 1 rad. For comparison: a number e times as large as commanded costs
-1."""
+"""Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle. For
+comparison: a speed that is wrong by a factor of 2.7 (e) costs 1."""
 SLOWEST: Final = 30.0
-"""The speed in the drive board's line is 0, or at least the outer wheel's speed divided by this."""
+"""The speed in the drive board's line is 0, or at least the outer wheel's speed divided by this
+number."""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """
@@ -66,7 +67,7 @@ def front_line(speed_mps: float, turn_radps: float, wheelbase_m: float) -> bytes
 
 @lru_cache(maxsize=512)
 def drive_line(speed_mps: float, turn_radps: float) -> bytes:
-    """Return the drive board's line, which sets the outer wheel to sqrt(speed² + turn²) in m/s.
+    """Return the drive board's line. The outer wheel's speed is sqrt(speed² + turn²) in m/s.
 
     The wheel's direction is the sign of ``speed_mps``.
     """
@@ -91,7 +92,12 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the ``robust`` line with the least cost; if no line is robust, the cheapest line."""
+    """Return the cheapest line in which the checksum detects damage.
+
+    If there is none, return the cheapest line.
+
+    ``signs``: the signs of speed and turn rate, as text.
+    """
     found.sort()
     lines = (_line(signs, speed, turn) for _, speed, turn in found)
     return next(filter(robust, lines), _line(signs, *found[0][1:]))

@@ -2,8 +2,9 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-Unsafe pairs of characters: ``12``, ``03``, ``.5``, ``-6``. So some values cannot be sent, e.g. from
-.0999 to .200.
+A number must not contain two characters whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``,
+``.`` and ``5``, ``-`` and ``6``. So some values cannot be sent, such as those between .0999 and
+.200.
 """
 
 from bisect import bisect_left, bisect_right
@@ -13,7 +14,8 @@ from typing import Final
 SIGNIFICANT: Final = 3
 SMALLEST: Final = -4
 LARGEST: Final = 4
-"""``SMALLEST``, ``LARGEST``: range of the first digit's power of ten, without ``LARGEST``."""
+"""The power of ten of a number's first digit is at least ``SMALLEST``, and less than ``LARGEST``.
+"""
 
 
 @cache
@@ -38,7 +40,9 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
 
 
 def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float, str]:
-    """Return the number of ``numerals`` that is nearest to a positive ``number``, with its text.
+    """Return the safe number that is nearest to a positive ``number``, with its text.
+
+    A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
 
     ``down``: whether the result must not exceed ``number``, unless all numbers do.
     """
@@ -50,7 +54,10 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 
 
 def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the numbers of ``numerals`` just below and just above ``number``, with their texts."""
+    """Return the safe numbers just below and just above ``number``, with their texts.
+
+    A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
+    """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)
     part = slice(max(0, at - 1), at + 1)
@@ -58,7 +65,10 @@ def beside(number: float, *, negative: bool) -> list[tuple[float, str]]:
 
 
 def between(least: float, most: float, *, negative: bool) -> list[tuple[float, str]]:
-    """Return the numbers of ``numerals`` from ``least`` to ``most``, with their texts."""
+    """Return the safe numbers from ``least`` to ``most``, with their texts.
+
+    A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
+    """
     numbers, texts = numerals(negative=negative)
     part = slice(bisect_left(numbers, least), bisect_right(numbers, most))
     return list(zip(numbers[part], texts[part], strict=True))

@@ -2,8 +2,8 @@
 
 """Finds out from heartbeats whether the drive board obeys motion commands.
 
-A pause and the driver's e-stop both send ``stop``. Only after an e-stop, the driver itself sends
-``start``.
+A pause and the driver's e-stop both send ``stop``. After an e-stop, the driver sends ``start`` by
+itself; after a pause, only if the user requests it.
 
 The module knows times and rcSource, the source of the commands that the board obeys; it does not
 know lines.
@@ -22,7 +22,8 @@ START_AGAIN_S: Final = 0.2
 class Obedience:
     """Whether the drive board obeys, and why not.
 
-    ``source``: the last rcSource; None before the first.
+    ``source``: the last rcSource, the source of the commands that the board obeys; None before the
+    first heartbeat.
 
     ``pause_said``: whether the user has requested a pause since the last start.
     """
@@ -41,7 +42,10 @@ class Obedience:
         """Time in s at which to send ``start``; infinity if there is no reason to send it."""
 
     def hear(self, source: float) -> None:
-        """Receive rcSource from a heartbeat of the drive board."""
+        """Receive rcSource, the source of the commands that the drive board obeys.
+
+        Each heartbeat of the board contains it.
+        """
         self.source = source
         if source != STOPPED:
             self.start_at = math.inf
@@ -64,7 +68,7 @@ class Obedience:
     def release(self, now: float) -> None:
         """Release the driver's e-stop; ``start`` becomes due if the board obeyed before the e-stop.
 
-        Not after a requested pause.
+        After a requested pause, ``start`` does not become due.
         """
         if self.estopped and self._resume and not self.pause_said:
             self._released_at, self.start_at = now, -math.inf

@@ -2,8 +2,9 @@
 
 """Computes the robot's displacements from the poses and wheel speeds that the drive board sends.
 
-Poses are coarse: a step of 1 mm in 20 ms is 0.05 m/s. Wheel speeds do not add up exactly. So the
-wheels' motion is corrected towards the newer pose.
+Poses are coarse: their smallest step, 1 mm in 20 ms, corresponds to 0.05 m/s. Wheel speeds are
+finer, but their sum drifts away from the pose. Therefore, the motion that the wheel speeds give is
+corrected towards the newest pose.
 """
 
 import math
@@ -14,15 +15,15 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between pose and wheel speeds that one displacement corrects, if
-rounding explains the difference."""
+"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects,
+if rounding of the pose explains the difference."""
 ROUNDINGS: Final = 1.5
-"""Largest difference that rounding explains, in units of the last digit. Each pose is wrong by half
-a unit, and the rotation mixes both axes."""
+"""Largest difference that rounding of the poses explains, in units of their last digit. Each of two
+poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
 """``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose from the wheels' motion, in m
-and rad. ``SPEED_UP_MPS2`` adds to it."""
+and rad. An acceleration of up to ``SPEED_UP_MPS2`` adds to it."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -33,7 +34,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""How many rejected poses in a row show a new frame, if each agrees with the pose before it."""
+"""How many rejected poses in a row show that the board has begun a new coordinate frame, if each
+agrees with the pose before it."""
 
 
 class PoseOdometry:
@@ -53,7 +55,7 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection. Keep the last pose, because its frame may still be in use."""
+        """Begin a new connection. Keep the last pose, because the board may have kept its frame."""
         self._doubted: BoardPose | None = None
         self._agreed = 0
         """How many rejected poses in a row agreed with the rejected pose before them."""
@@ -81,7 +83,8 @@ class PoseOdometry:
     def readings(self, pose: BoardPose, now: float) -> list[DisplacementReading | PoseReading]:
         """Return the displacement up to ``pose``; every 0.2 s, return also a PoseReading.
 
-        The PoseReading sums all displacements, even those that the driver rejects later.
+        The PoseReading contains the sum of all displacements, even of those that the driver rejects
+        later.
         """
         displacement = self.pose(pose, now)
         if displacement is None:

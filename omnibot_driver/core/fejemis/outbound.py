@@ -31,7 +31,7 @@ def line(text: bytes, *, sums: bool) -> bytes:
 
 
 def lines(*texts: bytes, sums: bool) -> bytes:
-    """Return the bytes of several lines in order; ``line`` makes each of them."""
+    """Return the bytes of several lines, with line ends; ``sums``: whether to add checksums."""
     return b"".join([line(text, sums=sums) for text in texts])
 
 
@@ -45,9 +45,9 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum detects a lost character even after a second loss.
+    """Return whether the checksum detects the loss of two characters.
 
-    The second loss is a line end or a digit of the checksum.
+    One of them is a line end or a digit of the checksum. The other is ``;`` or part of a number.
     """
     # A lost line end joins two lines. The joined line is accepted if the character whose code is
     # the sum of the second line with its prefix is lost too. So this sum must not be the code of

@@ -2,7 +2,7 @@
 
 """Writes ``rc`` lines without a checksum, so that undetected damage has little effect.
 
-A lost decimal point, or digit after it, stays undetected until the next line.
+If a decimal point or a digit after it is lost, the board obeys a wrong number until the next line.
 """
 
 import math

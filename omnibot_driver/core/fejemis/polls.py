@@ -24,7 +24,7 @@ ASKED: Final[Mapping[Role, tuple[bytes, ...]]] = {
 }  # fmt: skip
 """Requests for each board. They are sent in this order, again and again."""
 WITH_SUMS: Final = (b"svpi", b"svjti")
-"""Requests that are sent only with a checksum. Without their last letter, they command the
+"""Requests that are sent only with a checksum. If their last letter is lost, they command the
 servo."""
 EVERY_S: Final = 0.5
 SONAR_EVERY_S: Final = 0.1

@@ -114,7 +114,10 @@ class Ports:
         return sum((self.at(channel, *texts) for channel in unknown or (0, 1)), NO_PACKETS)
 
     def both(self, text: bytes) -> Packets:
-        """Return a line for each board. A line end before it ends any incomplete line."""
+        """Return the packets that send ``text`` as a line to both boards.
+
+        A line end comes first, so that it ends any incomplete line.
+        """
         return tuple(
             (channel, b"\n" + data.lstrip(b"\n"))
             for channel, data in self.at(0, text) + self.at(1, text)

@@ -2,7 +2,7 @@
 
 """Readings and results that only a Fejemis has, in SI units.
 
-Each of them is the content of an ``ExtraReading``.
+An ``ExtraReading`` carries each of them to the node.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """A request of the user other than motion. The value is its name in texts for the user."""
+    """A request of the user other than motion. The value is its name in service answers."""
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
@@ -37,7 +37,9 @@ class SteeringReading:
 class OrientedImuReading:
     """The board's orientation, with the turn rates and the specific force of the last IMU sample.
 
-    ``orientation``: quaternion x, y, z, w. Other units: rad/s, m/s².
+    ``orientation``: quaternion x, y, z, w. ``angular_velocity``: in rad/s.
+
+    ``specific_force``: in m/s².
     """
 
     orientation: Quaternion
@@ -60,7 +62,7 @@ class BatteryReading:
 
     ``cells``: 0 if unknown.
 
-    ``low``: whether a cell is below the limit of the settings.
+    ``low``: whether the mean voltage of a cell is below the limit in the settings.
     """
 
     volts: float

@@ -14,7 +14,7 @@ AccelerationUnit = Literal["m/s^2", "g"]
 class Written(Enum):
     """Settings that the driver can write to a board.
 
-    Each has the board's command and the count of numbers that follow it.
+    The value of each setting: the board's command, and how many numbers follow the command.
     """
 
     WHEELS = "confw", 5

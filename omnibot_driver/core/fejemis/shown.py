@@ -12,7 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Largest number of lines unknown to the firmware that are shown. The latest ones are shown."""
+"""Diagnostics show lines from the driver that the firmware does not know: at most this many, the
+latest ones."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 
@@ -21,7 +22,9 @@ def figures(
 ) -> BoardFigures:
     """Return counters and other values for diagnostics; the counters continue over all connections.
 
-    ``source``: rcSource. ``trouble``: why the robot must not be driven.
+    ``source``: the source of the motion commands that the drive board obeys (rcSource).
+
+    ``trouble``: why the robot must not be driven; empty if driving is allowed.
     """
     return BoardFigures(
         rates_hz={"IMU": 100.0, "Odometry": 50.0},

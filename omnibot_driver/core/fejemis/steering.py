@@ -2,8 +2,8 @@
 
 """Converts a body twist into commands for both boards.
 
-While the front wheel moves to its angle, the drive board is slower, or stops for a turn on the
-spot.
+Until the front wheel has reached its angle, the drive board is commanded to drive more slowly.
+Before a turn on the spot, it is commanded to stop.
 
 The module knows geometry and angles; it does not know lines.
 """
@@ -20,21 +20,27 @@ ACROSS_RAD: Final = math.radians(85.0)
 """Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: deviations of the front wheel up to which a turn on the
-spot may begin, or continue. Other motion has full speed up to the first."""
+"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: largest deviation of the front wheel from its target
+angle, in rad, at which a turn on the spot may begin, or may continue. Other motion has full speed
+up to a deviation of ``ALIGNED_RAD``."""
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel, in rad, whose effect on the body's motion is tolerated."""
+"""Deviation of the front wheel from its target angle, in rad, whose effect on the body's motion is
+tolerated."""
 
 
 @value(frozen=True, slots=True)
 class Steered:
     """A command for both boards, and the resulting motion of the body.
 
-    ``speed_mps``, ``turn_radps``: for the front board. ``part``: their factor for the drive board.
+    ``speed_mps``, ``turn_radps``: speed and turn rate for the front board.
+
+    ``part``: factor, 0..1, by which speed and turn rate are multiplied for the drive board.
 
     ``angle_rad``: the angle that the front wheel must reach.
 
     ``twist``: the body's motion at the present front angle.
+
+    ``whole``: whether ``part`` is 1.
     """
 
     speed_mps: float
@@ -62,7 +68,10 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def scale(twist: BodyTwist, track_m: float) -> float:
-    """Return the factor by which both numbers of an ``rc`` command are multiplied; 1 for a stop."""
+    """Return the factor for speed and turn rate in a motion line (``rc``); 1 for a stop.
+
+    With this factor, the drive board gives its outer wheel the speed that the twist requires.
+    """
     # The drive board drives its outer wheel at sqrt(v² + w²), and turns about a centre that follows
     # from the measured front angle. The factor makes the root equal to the speed that the outer
     # wheel needs.
@@ -107,7 +116,7 @@ def steer(
 def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTwist:
     """Return the body's twist at a speed of the outer wheel and an angle of the front wheel.
 
-    Manual's equations. A negative ``outer_mps`` means backward.
+    The equations are the manual's. A negative ``outer_mps`` means backward.
     """
     across = math.sin(angle_rad) / geometry.wheelbase_m
     rolled = outer_mps / (math.cos(angle_rad) + abs(across) * geometry.track_m / 2)
@@ -125,7 +134,12 @@ def told_twist(
 def _allowed(
     wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
 ) -> float:
-    """Return the largest speed of the outer rim at the present front angle, in m/s, or infinity."""
+    """Return the largest allowed rim speed of the outer wheel, in m/s; infinity without a limit.
+
+    ``angle_rad``: present angle of the front wheel. ``target_rad``: the angle that it must reach.
+
+    ``turning``: whether the body already turns on the spot.
+    """
     off_rad = abs(angle_rad - target_rad)
     if abs(target_rad) >= ACROSS_RAD:
         near = off_rad <= (STILL_ALIGNED_RAD if turning else ALIGNED_RAD)

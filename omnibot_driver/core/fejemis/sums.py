@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The checksum in front of a line, ``;NN``, by which a board detects most damaged lines.
+"""The checksum ``;NN`` in front of a line. With it, a board detects most damaged lines.
 
-Undetected: 1 in 99, a lost ``c`` (code 99), two lost characters whose codes add up to 99.
+It does not detect 1 in 99 random changes. It also does not detect the loss of a ``c`` (code 99), or
+the loss of two characters whose codes add up to 99 or 198.
 
 The module knows characters; it does not know the meaning of a line.
 """

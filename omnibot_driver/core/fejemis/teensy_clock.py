@@ -21,11 +21,11 @@ LATE_S: Final = 1.0
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""A new clock begins after ``AGAIN`` implausible times in a row, over ``AGAIN_AFTER_S``, that agree
-with their arrivals within ``AGREE_S``."""
+"""When a new clock begins: after ``AGAIN`` implausible board times in a row. They must arrive over
+at least ``AGAIN_AFTER_S``, and agree with their arrival times within ``AGREE_S``, both in s."""
 EARLIES_WITHIN_S: Final = 1.0
-"""Time in s within which ``AGAIN`` lines that seem early show that the clock began with a late
-line. Other lines may come between them: those were late themselves."""
+"""If ``AGAIN`` (three) lines within this time in s seem early, the clock began with a late line.
+Other lines may come between them, because those can be late too."""
 SMALLEST_STEP_S: Final = 1e-6
 
 
@@ -110,8 +110,8 @@ class TeensyClock:
     def _began_late(self, board_s: float, now: float) -> bool:
         """Return whether enough early times agree; if they do, begin the clock again.
 
-        No line arrives early. So if a clock began with a line that had waited for the host, only
-        lines that have waited as long seem plausible. If reads are rare, that can last for ever.
+        No line can arrive early. If the clock began with a line that had waited for the host, lines
+        that have not waited seem early. Without a new beginning, they might be rejected for ever.
         """
         agree = all(
             before_s < board_s
@@ -134,8 +134,8 @@ class TeensyClock:
 class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
-    It is a ``ReadingClock``. Timestamps of one kind of reading increase, and are never later than
-    the call.
+    The class is a ``ReadingClock``, the interface that gives readings their timestamps. Timestamps
+    of one kind of reading increase, and are never later than the call.
     """
 
     skew_ppm = 0.0
@@ -153,7 +153,8 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``.
 
-        It is at most ``now``, and after the last timestamp of the same kind of reading.
+        A timestamp later than ``now`` is lowered to ``now``. One that is not after the last
+        timestamp of the same kind of reading is raised.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         stamp_s = min(stamp_s, now)
@@ -172,7 +173,7 @@ class StampedReadings:
     ) -> list[float]:
         """Return the timestamps of the added readings.
 
-        If ``readings`` has another length, return ``now`` for each reading.
+        If ``readings`` are not as many as were added, return ``now`` for each of them.
         """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 

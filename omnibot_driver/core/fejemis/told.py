@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Notices for the user of a Fejemis. Each text is shown at most once in ``TELL_EVERY_S``.
+"""Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-A notice that stops the robot is always passed on, if necessary with an empty text.
+A notice that stops the robot is always passed on. If its text was just shown, the text is empty.
 """
 
 import math

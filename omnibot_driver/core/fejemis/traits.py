@@ -11,7 +11,7 @@ from omnibot_driver.core.traits import Traits
 
 DRIVE: Final = 0
 FRONT: Final = 1
-"""``DRIVE``, ``FRONT``: channels of the two boards, if the ports are not swapped."""
+"""``DRIVE``, ``FRONT``: channel numbers of the two boards, if the ports are not swapped."""
 
 TRAITS: Final = Traits(
     channels=("drive", "front"),

@@ -22,7 +22,7 @@ GEOMETRIES_DIFFER_M: Final = 0.002
 
 
 class Upkeep:
-    """Upkeep of both boards.
+    """The regular work for both boards, such as subscriptions and configuration.
 
     ``machine``: brush, lift and lights of the front board.
 

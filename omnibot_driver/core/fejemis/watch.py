@@ -52,7 +52,7 @@ class Watch:
     def look(self, now: float, *, driving: bool) -> bool:
         """Check all timeouts, and add notices of the new ones.
 
-        Return whether a board no longer sends its ``NEEDED`` stream.
+        Return whether a board no longer sends the data stream that driving requires.
         """
         if self._stalled:
             self._stalled, self._patient_until = False, now + SILENT_S

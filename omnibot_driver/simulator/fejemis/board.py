@@ -2,8 +2,9 @@
 
 """The two simulated Teensys and their robot, which advance in steps of a millisecond.
 
-The simulation is deterministic. Assumptions beyond the manual: ``rc`` stays in effect, the front
-wheel waits for ``rc``, and a restart ends motion and subscriptions.
+The simulation is deterministic. Three assumptions are not in the manual. A motion command (``rc``)
+stays in effect until the next one. The front wheel does not move before the first one. A restart
+ends motion and subscriptions.
 
 The module knows which Teensy is at which port, and when a fault occurs. It must not know commands.
 """
@@ -65,8 +66,8 @@ class SimulatedFejemis:
     def befall(self, half: str, what: str) -> None:
         """Apply the fault ``what`` to one Teensy now.
 
-        ``what``: a name in ``FAULTS``, or in ``SENSOR_FAULTS`` for the front. Raises KeyError
-        otherwise.
+        ``what``: the name of a fault in ``faults.py``, such as ``silent``. Raises KeyError if this
+        Teensy cannot have the fault.
         """
         allowed(half)[what](self.half(half))
 

@@ -11,8 +11,8 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
 """Factory parameters of the steering controller: the manual's P-Lead controller.
 
-In the order of the help text: use, Kp; useI, taui, ilimit; a 1; useLeadf, tz, tp = alpha * tau_d;
-useLeadb, tz, tp; usePre, tz, tp; useULim, Ulim.
+They are in the order of the help text: use, Kp; useI, taui, ilimit; a 1; useLeadf, tz,
+tp = alpha * tau_d; useLeadb, tz, tp; usePre, tz, tp; useULim, Ulim.
 """
 
 WHEELS = (1, 7.0, 1, 0.05, 20.0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 24.0)
@@ -24,7 +24,8 @@ class DriveConfig:
 
     ``wheel_base_m``: distance between the driving wheels, as the odometry uses it.
 
-    ``confs_m``: B and F of the turning control. F: from the axle to the steered wheel.
+    ``confs_m``: the manual's B and F, by which the Teensy controls turns. B is the distance between
+    the driving wheels, F the distance from the axle to the steered wheel.
     """
 
     number: int
@@ -45,7 +46,8 @@ class DriveConfig:
 class FrontConfig:
     """Configuration of the front Teensy.
 
-    ``confs_m``: B and F, as on the drive Teensy. The steering uses only F.
+    ``confs_m``: the manual's B and F. B is the distance between the driving wheels, F the distance
+    from the axle to the steered wheel. The steering uses only F.
 
     ``ir``: raw readings of sensor 1 at 13 cm and 50 cm, then those of sensor 2.
 

@@ -25,13 +25,14 @@ STOPPED, FREE = -1, 10
 class DriveTeensy(Teensy[DriveConfig]):
     """The simulated drive Teensy.
 
-    ``source``: the rcSource of the heartbeat, -1 while the Teensy is stopped.
+    ``source``: the source of the motion commands, which heartbeats report as rcSource; -1 while the
+    Teensy is stopped.
 
-    ``reference``: m/s and rad/s of the last ``rc`` command.
+    ``reference``: speed in m/s and turn rate in rad/s of the last motion command (``rc``).
 
-    ``told_angle_deg``: front angle in the last ``fwl`` command.
+    ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command, in degrees.
 
-    ``off_at_s``: when the Teensy cuts the power, or None.
+    ``off_at_s``: time in s at which the Teensy cuts the power; None without a requested power-off.
     """
 
     version = 110
@@ -289,5 +290,5 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     @property
     def turn_dps(self) -> float:
-        """Turn rate of the last ``rc`` command, in degrees per second."""
+        """Turn rate of the last motion command (``rc``), in degrees per second."""
         return degrees(self.reference[1])

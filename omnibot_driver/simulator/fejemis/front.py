@@ -30,9 +30,12 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``wanted_deg``: angle that the steered wheel must reach; None before the first ``rc`` command.
 
-    Sensor faults, set by the caller: ``diagnosis`` (bits without the frame counter),
-    ``error_flags``, ``frozen`` (repeats its angle), ``absent`` (angle 0, magneto core loops
-    unfinished).
+    The caller simulates faults of the angle sensor with these attributes:
+
+    ``diagnosis``, ``error_flags``: status bits in the ``fwl`` line, without the frame counter.
+
+    ``frozen``: the sensor repeats its last angle. ``absent``: the Teensy reports the angle 0 and
+    unfinished magneto core loops.
     """
 
     version = 100
@@ -197,7 +200,10 @@ class FrontTeensy(Teensy[FrontConfig]):
         }
 
     def _remote_control(self, rest: str) -> None:
-        """Set the angle that the wheel must reach, ``theta = atan2(F w, v)``, limited to ±90°."""
+        """Set the angle that the wheel must reach, ``atan2(F w, v)``, limited to ±90°.
+
+        ``v``, ``w``: commanded speed and turn rate. ``F``: distance from the axle to the wheel.
+        """
         _, v, turn_dps = wire.padded(rest, 3)
         sideways = self.config.confs_m[1] * radians(turn_dps)
         if v < 0.0 and self.firmware.reverse == "mirrored":

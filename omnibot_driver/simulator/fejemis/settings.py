@@ -20,8 +20,8 @@ class Firmware:
 
     ``sums``: lines carry the checksum ``;NN`` and are checked. If False, lines have none (manual).
 
-    ``reverse``: front angle for driving backward. ``mirrored``: as forward on the same curve.
-    ``clamped``: ±90°.
+    ``reverse``: angle of the front wheel for driving backward. ``mirrored``: the same as forward on
+    the same curve. ``clamped``: an angle beyond ±90° stays at ±90°.
 
     ``tilt``: ``pose`` has a fifth number.
 
@@ -32,7 +32,7 @@ class Firmware:
 
     ``shows_source``: the drive's heartbeat shows the source of the last ``rc``, not only 10 or -1.
 
-    ``single_precision``: times are float32: steps of 0.2 ms after an hour.
+    ``single_precision``: times are float32, so after an hour they advance in steps of 0.2 ms.
 
     ``says_start``: a boot ends with the line ``# Starting main loop``.
 
@@ -79,14 +79,16 @@ class FejemisSettings:
 
     ``steer_base_m``: distance from the axle to the steered wheel; the manual's S, F or f.
 
-    ``servo_degps``: speed at the full command, 1000. The manual's controller then crosses over at
-    12 rad/s.
+    ``servo_degps``: speed of the servo at the full command, 1000. With the default, the crossover
+    frequency of the manual's controller is 12 rad/s.
 
     ``sensor_zero_deg``: zero offset of the angle sensor. The factory configuration corrects it.
 
-    ``clock_ppm``, ``ids``: crystal errors and heartbeat numbers, first those of the drive Teensy.
+    ``clock_ppm``: rate errors of the two clocks. ``ids``: the Teensys' numbers in heartbeats. The
+    drive Teensy comes first.
 
-    ``uptime_s``: running time at construction. Beyond ``boot_s``, the Teensys have booted.
+    ``uptime_s``: how long the Teensys have run at construction. If longer than ``boot_s``, they
+    have booted.
 
     ``swapped``: whether the drive Teensy is at the second port.
 

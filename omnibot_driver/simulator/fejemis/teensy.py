@@ -50,9 +50,11 @@ class Teensy(Generic[C]):
 
     ``sums``: whether lines carry checksums.
 
-    ``silent``: obeys, but sends nothing. ``hung``: neither; the motors keep the last outputs.
+    ``silent``: whether the Teensy obeys commands, but sends nothing.
 
-    ``unplugged``: runs without its cable. ``powered``: whether the Teensy has power.
+    ``hung``: whether it neither obeys nor sends, and the motors keep their last speeds.
+
+    ``unplugged``: whether its cable is unplugged. ``powered``: whether it has power.
     """
 
     version = 0

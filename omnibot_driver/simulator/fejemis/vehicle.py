@@ -157,10 +157,11 @@ class Vehicle:
 def wheel_speeds(
     speed: float, turn_radps: float, angle_deg: float, base_m: float, steer_m: float
 ) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel in m/s, by the manual's turning control.
+    """Return the speeds of the left and the right wheel in m/s, by the manual's equations.
 
-    Outer wheel: ``v2 = sqrt(v² + w²)`` with the sign of ``v``. Inner wheel: ``v1 = v2 - v2 B / d``
-    with ``d = f / tan(theta) + B / 2``.
+    ``v``, ``w``, ``theta``, ``B`` and ``f`` are the arguments in their order. Outer wheel:
+    ``v2 = sqrt(v² + w²)`` with the sign of ``v``. Inner wheel: ``v1 = v2 - v2 B / d`` with
+    ``d = f / tan(theta) + B / 2``.
     """
     if speed == 0.0 and turn_radps == 0.0:
         return 0.0, 0.0

@@ -33,7 +33,10 @@ def sum_of(text: str) -> int:
 
 
 def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
-    """Return the bytes of one line; ``sums``, ``carriage_return``: whether to add these."""
+    """Return the bytes of one line with its line end.
+
+    ``sums``, ``carriage_return``: whether to add a checksum and a carriage return.
+    """
     prefix = f";{sum_of(text):02d}" if sums else ""
     end = "\r\n" if carriage_return else "\n"
     return f"{prefix}{text}{end}".encode("latin-1")

@@ -31,11 +31,11 @@ WHEELS = SteeredKinematics(1.0, 0.4, 0.5)
 class Bench:
     """A session with both simulated boards.
 
-    ``hears``: channels on which the robot receives bytes.
+    ``hears``: channels on which the robot receives bytes from the driver.
 
-    ``speaks``: channels on which the driver receives bytes.
+    ``speaks``: channels on which the driver receives bytes from the robot.
 
-    ``read_s``: time between two reads, in s.
+    ``read_s``: time between two reads of the driver, in s.
     """
 
     def __init__(

@@ -9,9 +9,9 @@ from omnibot_driver.core.errors import CommandRefused
 
 
 def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
-    """The front board sends its angle 66 times a second.
+    """The front board sends the angle of its wheel 66 times a second.
 
-    The driver relays each one without delay.
+    The driver relays each angle to the drive board without delay.
     """
     bench = nominal()
     mark = bench.now
@@ -24,7 +24,10 @@ def test_the_angle_is_relayed_in_the_pass_in_which_it_comes() -> None:
 
 
 def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
-    """The angles stop while the robot drives. The driver does not wait for the next command."""
+    """While the robot drives, no more angles of the front wheel arrive.
+
+    After 60 ms, the driver stops the robot without waiting for the next command.
+    """
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -45,7 +48,10 @@ SENSOR = [
 
 
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
-    """The sensor sets an error bit. Motion is refused while the bit is set."""
+    """The angle sensor of the front wheel reports a fault while the robot drives.
+
+    The robot stops, and motion is refused until the fault ends.
+    """
     bench = nominal()
     for fault in SENSOR:
         bench.drive_on(seconds=0.3)
@@ -70,7 +76,10 @@ def test_a_broken_angle_sensor_is_reported_while_the_robot_stands() -> None:
 
 
 def test_a_sensor_that_repeats_its_last_angle_is_noticed_when_the_wheel_should_turn() -> None:
-    """The angle sensor repeats its last angle without an error bit."""
+    """The angle sensor repeats its last angle, without an error bit, during a commanded turn.
+
+    The driver stops the robot and reports that the wheel does not follow.
+    """
     bench = nominal()
     bench.robot.befall("front", "sensor-frozen")
     with pytest.raises(CommandRefused, match="front wheel did not go where"):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The front wheel's angle is relayed to the drive board on a line that loses characters."""
+"""Tests of the front wheel's angle, relayed to the drive board on a line that loses characters."""
 
 import itertools
 import math
@@ -30,7 +30,10 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 
 
 def test_every_angle_is_told_within_half_a_degree() -> None:
-    """The steps are 0.1°, and larger where damage to an angle's text would not be noticed."""
+    """Every relayed angle is right within 0.5°.
+
+    Usually the steps are 0.1°. They are larger where the checksum would not detect damage.
+    """
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51
     assert sum(each < 0.01 for each in off) > 0.6 * len(off)
@@ -38,7 +41,10 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 
 
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
-    """Only an angle to the right with a digit 6 can change, into 0° to 10° to the left."""
+    """Two characters of an angle's text are lost. Usually the checksum detects this.
+
+    Only an angle to the right with a digit 6 can change, into one of 0° to 10° to the left.
+    """
     across = 0
     for angle_deg in EVERY:
         text = relayed(angle_deg)
@@ -54,7 +60,10 @@ def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_wh
 def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
     angle_deg: float,
 ) -> None:
-    """Characters of the checksum may be lost too. The board reads as leniently as possible."""
+    """One or two characters are lost from a line with an angle and its checksum.
+
+    Even a board that accepts as much as possible reads no other angle.
+    """
     text = relayed(angle_deg)
     data = line(text, sums=True)
     for count in (1, 2):
@@ -74,7 +83,10 @@ def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_bet
 
 @pytest.mark.parametrize("seed", range(3))
 def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
-    """In less than 1 %, the board reads another angle. docs/boards/fejemis.md has the numbers."""
+    """Three characters are lost from a line with an angle.
+
+    In less than 1 % of these cases, the board reads another angle.
+    """
     chance = random.Random(seed)
     passed = total = 0
     for _ in range(3):
@@ -88,7 +100,10 @@ def test_what_three_lost_characters_leave_of_an_angle(seed: int) -> None:
 
 
 def test_without_sums_no_loss_makes_the_inner_wheel_faster_than_the_outer_one() -> None:
-    """The inner wheel would be faster only at angles beyond 90°. No loss makes such an angle."""
+    """Lines have no checksum, and up to three characters of an angle are lost.
+
+    The board never reads an angle beyond 90°, where the inner wheel would be the faster one.
+    """
     for angle_deg in range(-90, 91):
         text = AngleRelay().text(math.radians(angle_deg), sums=False)
         assert text == b"fwl %d" % angle_deg

@@ -43,7 +43,10 @@ def test_only_what_the_user_set_is_written() -> None:
 def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restart(
     *, sums: bool
 ) -> None:
-    """The driver writes each setting to the board that uses it."""
+    """The user has set values. The driver writes each to the board that uses it, and reads it back.
+
+    After a restart of the boards, the driver writes all values again.
+    """
     from omnibot_driver.simulator.fejemis import Firmware
 
     bench = nominal(Simulated(firmware=Firmware(sums=sums)), FejemisSettings(written=WRITTEN))
@@ -91,7 +94,10 @@ def test_the_order_of_the_steering_geometry_is_found_out() -> None:
 
 
 def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_not_take() -> None:
-    """The driver uses the user's geometry only until the board has reported its own."""
+    """The board does not accept the geometry that the user has set.
+
+    The driver uses the user's geometry only until the board has reported its own.
+    """
     configuration = Configuration("drive", {Written.STEERING: (0.35, 0.45)})
     wanted, reported = Geometry(0.35, 0.45), Geometry(0.4, 0.42)
     assert configuration.geometry == wanted
@@ -102,7 +108,10 @@ def test_a_board_is_driven_by_the_geometry_that_it_reports_not_by_what_it_did_no
 
 
 def test_a_reading_is_believed_once_it_was_read_twice_alike() -> None:
-    """A single reading is not enough: 1 in 99 damaged answers passes its checksum."""
+    """The driver uses a geometry only after the board has reported it twice in a row.
+
+    One report is not enough, because 1 in 99 damaged lines passes its checksum.
+    """
     configuration = Configuration("drive", {})
     for text in ("confs 0.4200 0.4000", "confs 4.2 0.4000", "confs 0.4200 0.4000"):
         configuration.hear(parse(text))
@@ -215,7 +224,10 @@ def test_boards_with_different_geometries_are_told_of() -> None:
 
 
 def test_a_robot_is_not_driven_before_it_has_what_the_user_set() -> None:
-    """The setting's line may be lost. The driver does not repeat this line to a driven robot."""
+    """The line that writes a setting is lost. Motion is refused until the board has the setting.
+
+    The driver would not repeat this line while the robot is driven.
+    """
     settings = FejemisSettings(written={Written.STEERING: (0.35, 0.44)})
     bench = Bench(settings=settings)
     bench.open()

@@ -56,7 +56,10 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 
 
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
-    """Alternating commands of 0.9 and 1.5 rad do not extend the wheel's time."""
+    """A wheel is blocked, and its commanded angle alternates between 0.9 and 1.5 rad.
+
+    The wheel is reported as soon as with a constant command.
+    """
     follower = Follower()
     seen = 0
     for n in range(200):
@@ -156,9 +159,9 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """After a reconnect the driver starts the board itself.
+    """Motion is refused until the user calls ~/start, and then the driver reconnects.
 
-    Motion is still refused until ~/start.
+    After a reconnect, the driver itself starts the board. Motion is still refused.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

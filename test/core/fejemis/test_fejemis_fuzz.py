@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random input from the boards. The driver does not raise an error, loop or move the robot."""
+"""Tests of random input from the boards.
+
+The driver does not raise an error, loop for ever or move the robot.
+"""
 
 import contextlib
 import random
@@ -36,7 +39,7 @@ def any_line(chance: random.Random) -> bytes:
 def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
     """Bytes, lost ports, commands and requests come in random order. The session raises no error.
 
-    Its next wake-up is always in the future.
+    The time at which the session must run next is always in the future.
     """
     chance = random.Random(seed)
     bench = Bench()
@@ -102,7 +105,10 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
 
 
 def test_a_stream_that_the_firmware_does_not_know_is_told_and_not_asked_for_again() -> None:
-    """The stream is, for example, that of the time-of-flight sensor."""
+    """The firmware does not know one stream, here that of the time-of-flight sensor.
+
+    A notice says so, and the driver no longer subscribes to this stream.
+    """
     bench = nominal()
     del bench.robot.drive._items["tofd"]
     bench.robot.drive.reboot()

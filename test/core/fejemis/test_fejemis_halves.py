@@ -104,7 +104,10 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
 
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
-    """The port of one board disappears. Motion is refused until both ports are open."""
+    """The port of one board disappears while the robot drives. The other board receives a stop.
+
+    Motion is refused until both ports are open.
+    """
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -156,9 +159,9 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
 
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
-    """One port leads to another robot.
+    """One port leads to a board of another robot.
 
-    ``start`` could release a robot that its user has stopped.
+    This board receives only lines that stop something, and requests for its heartbeat.
     """
     bench = Bench(Simulated(ids=ids))
     bench.open()
@@ -253,7 +256,10 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
 
 
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
-    """Which requests a board does not know is remembered for the board, not for the port."""
+    """The cables of the two boards are exchanged while the ports are closed.
+
+    After each reconnect, the driver finds out which board is at which port, and drives the robot.
+    """
     bench = nominal()
     for swapped in (True, False, True):
         bench.close()
@@ -285,9 +291,9 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The front board's clock is ``ahead_s`` ahead.
+    """The front board's clock is ``ahead_s`` seconds ahead, and the boards change their ports.
 
-    The driver must not use this clock for the stamps of the drive board.
+    The driver does not use the front board's clock for the stamps of the drive board.
     """
     bench = Bench()
     bench.robot.front._clock_s += ahead_s

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pairs of a gyro line and an acceleration line. Both lines of a pair must be of one IMU sample."""
+"""Tests of pairs of a gyro line and an acceleration line.
+
+Both lines of a pair must belong to one IMU sample.
+"""
 
 import itertools
 import math
@@ -24,7 +27,7 @@ KNOWN_S = 0.5
 class Line:
     """A line that the board sends at ``sent_s``.
 
-    ``number``: number of the line's sample.
+    ``number``: number of the IMU sample with which the line is sent.
     """
 
     sent_s: float
@@ -40,7 +43,7 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: whether the other lines come with odd samples.
+    ``odd``: whether lines other than gyro and acceleration come with odd sample numbers, not even.
     """
 
     order: str
@@ -79,7 +82,7 @@ Read = tuple[float, list[Line]]
 def damaged(lines: list[Line], chance: random.Random, lost: float, twice: float) -> list[Line]:
     """Return the lines that arrive.
 
-    Each is lost with probability ``lost``, and comes twice with probability ``twice``.
+    Each line is lost with probability ``lost``, and arrives twice with probability ``twice``.
     """
     kept = [line for line in lines if chance.random() >= lost]
     return [line for line in kept for _ in range(1 + (chance.random() < twice))]
@@ -134,9 +137,9 @@ def reads_with_stalls(lines: list[Line], chance: random.Random, stalls: float) -
 
 @dataclass(frozen=True)
 class Outcome:
-    """The pairs that were found, each as the sample numbers of its two lines.
+    """The pairs that were found. Each pair is given as the sample numbers of its two lines.
 
-    ``false``: pairs with lines of two samples.
+    ``given``: all pairs. ``false``: pairs whose two lines belong to different samples.
     """
 
     given: list[tuple[int, int]]
@@ -146,7 +149,7 @@ class Outcome:
 
 
 def outcome(reads: list[Read]) -> Outcome:
-    """Give the lines of the reads to ``ImuPairs``, and return the pairs that it finds."""
+    """Pass the lines of the reads to the driver's ``ImuPairs``, and return the pairs it finds."""
     pairs, given = ImuPairs(), []
     for now, lines in reads:
         for line in lines:
@@ -187,7 +190,7 @@ def decidable(pair: tuple[int, int], reads: list[Read]) -> bool:
 
 
 def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Read]) -> None:
-    """Check that each sample after ``KNOWN_S`` was found once.
+    """Check that no pair is false, and that each sample after the first 0.5 s was found once.
 
     The last samples may still be missing.
     """
@@ -220,7 +223,10 @@ pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
 def test_every_sample_is_given_in_pieces(
     layout: Layout, chance: random.Random, pauses_s: list[float]
 ) -> None:
-    """The pieces are small, and may come more slowly than the board sends them."""
+    """No line is lost, but the bytes arrive in small pieces, perhaps slower than they are sent.
+
+    Every sample is found.
+    """
     lines = layout.lines(3.0)
     reads = reads_of_pieces(lines, chance, pauses_s)
     assert_nothing_is_missing(outcome(reads), lines, reads)
@@ -257,7 +263,10 @@ def test_no_pair_has_lines_of_two_samples(
     period_s: float | None,
     stalls: float,
 ) -> None:
-    """A pair may be false only if its lines are late and no pose follows in the same read."""
+    """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
+
+    The only exception: the lines are late, and no pose follows in the same read.
+    """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)
     if period_s is not None:

@@ -44,7 +44,7 @@ GOLDEN_SUMS = [
     b";31leave",
     b";06hbt 44.97199 90 110 24.95 10 0",
 ]
-"""Lines with their checksums, as the public hosts write them."""
+"""Example lines with their checksums, as public host programs write them."""
 GOLDEN: dict[str, Message] = {
     "hbt 44.97199 90 110 24.95 10 0": Heartbeat(44.97199, 90, 110, 24.95, 10.0),
     "hbt 45.1 90 110 24.95 -1 0": Heartbeat(45.1, 90, 110, 24.95, -1.0),
@@ -132,9 +132,9 @@ def test_sums_are_those_of_the_public_hosts(line: bytes) -> None:
 
 @pytest.mark.parametrize("text", GOLDEN)
 def test_every_message_is_understood(text: str) -> None:
-    """The decoder reads the example lines of the manual.
+    """The parser reads each example line of the manual.
 
-    It also reads a line for each list of fields in the manual.
+    It also reads a line for each kind of message of which the manual only lists the fields.
     """
     assert parse(text) == GOLDEN[text]
 
@@ -191,7 +191,10 @@ def test_a_wrong_sum_is_counted_and_costs_no_other_line() -> None:
 
 
 def test_a_line_may_have_200_characters_and_no_more() -> None:
-    """A line of over 200 characters is discarded up to its end, in whatever pieces it arrives."""
+    """A line of 200 characters is accepted.
+
+    A longer line is discarded up to its end, even if it arrives in many pieces.
+    """
     decoder = FejemisDecoder()
     text = b"# " + b"x" * (LONGEST_LINE - 2)
     assert len(feed(decoder, text + b"\n")) == 1
@@ -216,9 +219,9 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 
 @pytest.mark.parametrize("sums", [False, True])
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
-    """The first heartbeat shows whether lines have checksums.
+    """The first heartbeat shows whether the board's lines have checksums.
 
-    Lines of the other kind are discarded.
+    Afterwards, lines that differ from the heartbeat in this are discarded.
     """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None
@@ -269,9 +272,9 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """Two lines with a new number of decimals are discarded.
+    """A board's lines change to another number of decimals. Only the first two are discarded.
 
-    Decimals that vary are accepted at once.
+    If the decimals of a kind of line vary often, each number of decimals is accepted.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion lines that lose characters on their way to a board."""
+"""Tests of motion lines that lose characters on their way to a board."""
 
 import itertools
 import math
@@ -25,9 +25,10 @@ NUMBER = re.compile(rb"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
 def motions(data: bytes, keyword: bytes = b"rc", count: int = 3) -> list[tuple[float, ...]]:
-    """Return the motions that the most lenient board with checksums reads from these bytes.
+    """Return the numbers of each command that a board with checksums reads from the bytes.
 
-    Numbers are read as in C. Missing numbers are 0. A checksum may have one digit.
+    The board is as lenient as possible: numbers are read as in C, missing numbers are 0, and a
+    checksum may have one digit.
     """
     found = []
     for text in re.split(rb"[\r\n]", data):
@@ -54,9 +55,9 @@ def without(data: bytes, places: tuple[int, ...]) -> bytes:
 
 
 def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters() -> None:
-    """In the manual's example, the checksum does not show the loss of certain two characters.
+    """The manual's example of a motion line loses two characters whose loss no checksum shows.
 
-    The driver therefore chooses other digits.
+    The board would read another motion. The driver therefore chooses other digits.
     """
     text = b";%02drc 2 0.250 11.459\n" % sum_of(b"rc 2 0.250 11.459")
     damaged = text.replace(b"rc 2 0.250 11", b"rc  0.250 1")
@@ -82,7 +83,10 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 
 
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
-    """The driver avoids digit pairs and checksums that would hide the loss of two characters."""
+    """Random motions are commanded. In each line, the checksum detects the loss of two characters.
+
+    The driver avoids pairs of digits and checksums that would hide the loss.
+    """
     chance = random.Random(7)
     for _ in range(150):
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
@@ -101,11 +105,13 @@ def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
 
 @pytest.mark.parametrize("text", [b"motv -4.49 .499", b"rc 2 -.000424 -.422", b"rc 2 -.0700 -4.04"])
 def test_no_lost_line_end_lets_a_sum_continue_the_number_before_it(text: bytes) -> None:
-    """A motion line follows the stop line ``rc 2 0 0``. The characters between them are lost.
+    """A stop line, ``rc 2 0 0``, is followed by a second line.
 
-    These are a line end and the semicolon before the second line's checksum, e.g. 92. The board
-    then reads ``rc 2 0 092``, a motion. The stop line's checksum fits the joined line if the second
-    line's is 02 or 92. So the driver sends an empty line before such a line.
+    The line end and the semicolon between the two lines are lost.
+
+    If the checksum of the second line is 92, the board would read the motion ``rc 2 0 092``. The
+    stop line's checksum would not show the damage. Therefore, the driver sends an empty line before
+    such a second line, and the board reads no wrong motion.
     """
     assert sum_of(text) in (2, 92)
     data = line(STOP, sums=True) + line(text, sums=True)
@@ -132,9 +138,9 @@ def test_what_three_lost_characters_leave() -> None:
 
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
-    """The front line's angle is right within 0.02°, and if small within 1 %.
+    """In the front board's line, the angle is right within 0.02°, and small angles within 1 %.
 
-    The drive line's speed of the outer wheel is right within 0.6 %.
+    In the drive board's line, the speed of the outer wheel is right within 0.6 %.
     """
     if v == w == 0.0:
         return
@@ -149,9 +155,9 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
 
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
-    """The numbers avoid certain digits, but reach every speed within 1.8 %.
+    """The lines avoid certain digits, but the outer wheel reaches every speed within 1.8 %.
 
-    Negative numbers are the least exact: they have fewer digits.
+    Negative speeds are the least exact, because they avoid one digit more.
     """
     for rim in (0.0218, 0.00218, 0.0344, *(0.0011 * 1.03**n for n in range(240))):
         _, drive_v, drive_w = motions(drive_line(v * rim, w * rim) + b"\n")[0]
@@ -160,7 +166,10 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 
 @pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """The line has 60 to 100 % of the requested voltage. After a loss, it is at most 12 V."""
+    """A lift line has 60 to 100 % of the requested voltage.
+
+    If the line loses characters, the lift gets at most 12 V, and no longer time.
+    """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
     said_volts, said_s = motions(data, b"motv", 2)[0]
@@ -190,7 +199,10 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 
 
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """One character is lost. If it is a space or the source number, the board reads a stop."""
+    """A motion line without a checksum loses one character.
+
+    The outer wheel becomes faster only if this is a decimal point or a digit of the speed.
+    """
     for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         text = plain_drive_line(speed, turn)
         rim = math.hypot(speed, turn)

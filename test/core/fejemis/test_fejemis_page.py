@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that two tables contain every command and every subscription in the boards' help."""
+"""Tests of the two tables that list all commands and all subscriptions in the boards' help."""
 
 import math
 import re
@@ -25,13 +25,13 @@ from omnibot_driver.simulator.fejemis.help_text import DRIVE_HELP, FRONT_HELP
 
 @dataclass(frozen=True)
 class Row:
-    """One command of the boards.
+    """One command that the boards accept.
 
-    ``golden``: an example line.
+    ``golden``: an example line with the command.
 
-    ``use``: the topic, service, parameter or diagnostic key that sends or shows it.
+    ``use``: the topic, service, parameter or diagnostic key that needs the command.
 
-    ``by``: what the driver does instead.
+    ``by``: what the driver does instead of sending the command; empty if it sends the command.
     """
 
     golden: str
@@ -140,7 +140,10 @@ def listed(text: str) -> tuple[set[str], set[str]]:
 
 @pytest.mark.parametrize("text", [DRIVE_HELP, FRONT_HELP], ids=["drive", "front"])
 def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
-    """Each command in the help is in the table SAID, and each subscription in the table HEARD."""
+    """Each command in the boards' help is in the table of commands, ``SAID``.
+
+    Each subscription in the help is in the table of messages, ``HEARD``.
+    """
     said, heard = listed(text)
     assert said <= SAID.keys()
     assert heard <= HEARD.keys()
@@ -149,7 +152,7 @@ def test_every_line_of_the_help_lists_has_a_row(text: str) -> None:
 
 
 def test_no_row_is_of_something_else() -> None:
-    """The tables contain no command or subscription that is not in the help.
+    """The tables contain no command or subscription that is not in the boards' help.
 
     The only exception is ``sub``, the command that subscribes.
     """
@@ -160,7 +163,10 @@ def test_no_row_is_of_something_else() -> None:
 
 @pytest.mark.parametrize("keyword", HEARD)
 def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
-    """Each message has a golden line. The driver subscribes to it, polls it or reads it once."""
+    """Each message has an example line in the table of golden lines.
+
+    The driver subscribes to the message, polls it regularly, or requests it with the configuration.
+    """
     golden = [text for text in GOLDEN if text.split()[0] == keyword]
     assert golden
     assert parse(golden[0]) is not None
@@ -172,7 +178,10 @@ def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
 
 
 def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
-    """Diagnostics show each message that is not a stream, for example the front board's ``bat``."""
+    """Diagnostics show each message that the driver does not subscribe to as a stream.
+
+    An example is the front board's battery message, ``bat``.
+    """
     bench = nominal()
     bench.run(6.5)
     shown = bench.board.figures.own
@@ -216,7 +225,11 @@ def said_by_the_driver() -> set[str]:
 
 @pytest.mark.slow
 def test_every_command_is_said_as_its_golden_line_or_never() -> None:
-    """Some commands must never be sent: ``setid`` can erase the board."""
+    """Everything is requested from the driver once. It sends each command as in the table.
+
+    It never sends the commands that the table marks as unused, such as ``setid``, which can erase
+    the board.
+    """
     said = said_by_the_driver()
     assert STOP.decode() == SAID["rc"].golden
     words = {text.split()[0] for text in said}

@@ -13,7 +13,7 @@ from omnibot_driver.core.requests import Request
 
 @pytest.fixture
 def bench() -> Bench:
-    """Return a bench whose drive board has been asked to cut the power in 99 s."""
+    """Return a bench whose drive board has been commanded to cut the power in 99 s."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -48,9 +48,9 @@ def test_a_start_during_an_estop_cancels_the_power_off(bench: Bench) -> None:
 
 
 def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> None:
-    """The board does not confirm ``on``, and a line may be lost.
+    """The line ``on`` cancels a power off. The board does not confirm this line, which may be lost.
 
-    So the driver sends ``on`` three times.
+    So the driver sends it three times.
     """
     mark = bench.now
     bench.hears = {FRONT}
@@ -64,7 +64,10 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 
 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
-    """``on`` would cancel the power off, so the driver stops repeating ``on``."""
+    """The user calls ~/start, and then requests a power off again.
+
+    The driver stops repeating ``on``, which would cancel the power off.
+    """
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()
@@ -73,9 +76,9 @@ def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
 
 
 def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """After a silence, the driver starts the board again.
+    """The boards are silent for a while after a requested power off.
 
-    Only the user's ~/start ends the power off.
+    The driver then sends ``start``, but this does not cancel the power off.
     """
     mark = bench.now
     bench.speaks = set()
@@ -89,7 +92,10 @@ def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
 
 
 def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
-    """After a reconnect, the drive board still counts down, and motion is still refused."""
+    """The driver reconnects after a requested power off.
+
+    The drive board still counts down, and motion is still refused.
+    """
     bench.close()
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
@@ -100,7 +106,10 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
-    """The driver notices the restart by the board's clock, and accepts motion."""
+    """The drive board restarts between two connections, so it has forgotten the power off.
+
+    The driver notices the restart by the board's clock, and accepts motion.
+    """
     bench.run(5.0)
     bench.close()
     bench.speaks = set()
@@ -132,7 +141,10 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
 
 
 def test_a_power_off_without_an_answer_may_still_come() -> None:
-    """The request fails, but the board may have obeyed. Motion is refused until ~/start."""
+    """The board does not answer a request to power off. The request fails.
+
+    Motion is refused until ~/start, because the board may have obeyed.
+    """
     bench = nominal(settings=FejemisSettings(power_off_delay_s=99.0))
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
     bench.settle()

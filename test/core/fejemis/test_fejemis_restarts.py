@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of boards that restart, with short and long boots and with lost start lines.
+"""Tests of boards that restart: short and long boots, with or without the start line.
 
-The host reads at several intervals.
+A start line is the line that a board sends at the end of its boot. The host reads at several
+intervals.
 """
 
 import contextlib
@@ -29,7 +30,10 @@ def assert_odometry_is_right(bench: Bench, within_m: float) -> None:
 
 
 def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the_restart() -> None:
-    """The driver handles the pose first, and then resets the board's clock."""
+    """One read contains a pose from before a restart, and then the line that reports the restart.
+
+    The driver handles the pose first, and then resets the board's clock.
+    """
     bench = nominal()
     drive = bench.robot.drive
     pose = with_sum(drive._pose().encode("ascii")) + b"\n"
@@ -47,7 +51,10 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
 
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
-    """A read every 20 ms may contain poses from before and after the restart. Odom has no jump."""
+    """The drive board restarts at different times between two reads, which are 20 ms apart.
+
+    A read may contain poses from before and after the restart. The odometry has no jump.
+    """
     bench = nominal(Simulated(boot_s=boot_s))
     bench.read_s = 0.02
     for phase in range(10):
@@ -72,7 +79,10 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """Without a start line, the times in the board's lines show the restart."""
+    """A board restarts, with or without a line that reports it. The robot stops.
+
+    Without this line, the times in the board's other lines show the restart.
+    """
     bench = nominal(Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)))
     bench.run(2.0)
     bench.read_s = read_s
@@ -91,7 +101,7 @@ FRONT_OFFSET = {Written.FRONT_WHEEL: (3.0, 0.0)}
 
 
 def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
-    """Restart a board under commands, and return why commands were refused.
+    """Restart a board while motion is commanded, and return why commands were refused.
 
     Check that the robot is driven only after the front board has its configuration.
     """
@@ -119,7 +129,10 @@ def drive_through_a_restart(bench: Bench, half: str) -> list[str]:
 def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
     boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A restart loses the settings. Without a start line, heartbeats show the restart."""
+    """The front board restarts and loses the user's settings.
+
+    Motion is refused until the driver has written them again.
+    """
     bench = nominal(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         FejemisSettings(written=FRONT_OFFSET),
@@ -132,7 +145,10 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
 
 
 def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None:
-    """Only a heartbeat from after the silence proves that the board has not restarted."""
+    """A board was silent. A heartbeat that it sent before the silence arrives late.
+
+    Only a heartbeat from after the silence proves that the board has not restarted.
+    """
     bench = nominal()
     bench.run(2.0)
     half, front = bench.board._ports.halves[FRONT], bench.robot.front
@@ -151,7 +167,10 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
     half: str, pause_s: float
 ) -> None:
-    """After a silence, a board may have restarted. The next heartbeat shows whether it has."""
+    """A board was silent, so it may have restarted.
+
+    The state becomes ``nominal`` only after a heartbeat has shown whether it has.
+    """
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}
     bench.run(pause_s)
@@ -165,7 +184,10 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 
 
 def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
-    """A requested heartbeat shows a restart at once. Periodic ones come every 0.4 s."""
+    """A board was silent, so the driver requests its heartbeat ten times a second.
+
+    The periodic heartbeats come only every 0.4 s. The requested one shows a restart earlier.
+    """
     bench = nominal()
     bench.speaks = {DRIVE}
     bench.run_until(lambda: bench.board._ports.halves[FRONT].unsure)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the services of the boards besides motion, and of the sensor readings."""
+"""Tests of requests other than motion, such as calibrations, and of the sensor readings."""
 
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
@@ -87,7 +87,10 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
 )
 def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
-    """A real calibration always changes the offsets a little, because of sensor noise."""
+    """Every command to calibrate is lost, so the offsets stay unchanged. The request fails.
+
+    A real calibration always changes the offsets a little, because of sensor noise.
+    """
     bench = nominal()
     lose(bench, word.encode(), 99)
     done = ask(bench, job)
@@ -174,7 +177,7 @@ def test_a_robot_that_rolls_is_not_calibrated() -> None:
 
 
 def test_a_configuration_is_saved_and_loaded() -> None:
-    """The user saves the configuration and loads it again. Both boards do so."""
+    """The user saves the configuration, and then loads it. Both boards execute the requests."""
     bench = nominal(settings=FejemisSettings(written={Written.STEERING: (0.41, 0.43)}))
     assert bench.robot.drive.saved.confs_m == (0.4, 0.42)
     assert ask(bench, Job.SAVE).success
@@ -305,7 +308,10 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
 
 
 def test_loading_stops_the_robot_before_it_loads() -> None:
-    """The driver sends a stop, and ``eer`` only after the robot had time to stop."""
+    """The user requests a loading while the robot drives. The driver first sends a stop.
+
+    It sends ``eer``, the command to load, only after the robot had time to stop.
+    """
     bench = nominal()
     bench.drive_on()
     mark = bench.now
@@ -339,8 +345,8 @@ def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
 def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
     wanted_s: float, seconds: int
 ) -> None:
-    """If ``off 300`` loses its 3 and a 0, its checksum still fits.
+    """If the command ``off 300`` loses its 3 and a 0, its checksum still fits.
 
-    So the driver sends a longer delay, without two such digits.
+    So the driver sends a longer delay that has no such pair of digits.
     """
     assert whole_seconds(wanted_s) == seconds

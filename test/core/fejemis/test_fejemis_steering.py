@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The set-points of each board, and the motion that results by the manual's equations."""
+"""Tests of the set-points of each board, and of the motion that the manual's equations give."""
 
 import math
 
@@ -54,9 +54,9 @@ def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
 def test_what_rc_alone_would_do(
     v: float, w: float, theta_deg: float, body_v: float, body_w: float
 ) -> None:
-    """In a curve, the robot's motion differs from the numbers of ``rc``.
+    """In a curve, the robot's motion differs from speed and turn rate in the ``rc`` line.
 
-    The expected values come from the manual's equations.
+    The expected values are computed by hand with the manual's equations.
     """
     body = told_twist(v, w, ROBOT, math.radians(theta_deg))
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
@@ -85,7 +85,10 @@ def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
 def test_a_body_whose_wheel_is_on_its_way_is_never_faster_than_commanded(
     v: float, w: float, angle_rad: float
 ) -> None:
-    """A small excess is allowed, as from an error of 5° in the wheel's angle."""
+    """The front wheel has not reached its angle. The body is not faster than commanded.
+
+    A small excess is allowed: the effect of an error of 5° in the wheel's angle.
+    """
     wanted = BodyTwist(v, 0.0, w)
     assume(outer_mps(wanted, 0.4) > 1e-3)
     told = steer(wanted, ROBOT, angle_rad, turning=False).twist
@@ -111,9 +114,9 @@ def test_a_turn_on_the_spot_waits_for_the_wheel(w: float, angle_rad: float) -> N
 
 
 def test_without_an_angle_the_drive_board_is_told_to_stand() -> None:
-    """The front wheel's angle is not known, so the drive board would compute with an old angle.
+    """The front wheel's angle is not known, so the drive board would use an old angle.
 
-    The driver stops the drive board.
+    The driver therefore commands the drive board to stop.
     """
     told = steer(BodyTwist(0.3, 0.0, 0.1), ROBOT, None, turning=False)
     assert told.part == 0.0
@@ -139,9 +142,9 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The speed is right within 1.2 % of the outer wheel's speed.
+    """The robot is commanded for 2.5 s. Its speed is then right within 1.2 %.
 
-    The turn rate is right within 3 % of that speed per track width.
+    Its turn rate is right within 3 %. Both refer to the speed of the outer wheel.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)
@@ -166,7 +169,10 @@ def test_the_digits_cost_less_than_one_per_cent() -> None:
 
 
 def test_a_turn_on_the_spot_begins_without_rolling() -> None:
-    """If both boards got ``rc 2 0 w`` at once, the robot would roll 0.17 m."""
+    """A turn on the spot begins while the front wheel points ahead. The robot does not roll away.
+
+    Without waiting for the front wheel, it would roll 0.17 m.
+    """
     bench = nominal()
     for _ in range(12):
         bench.drive(0.0, 1.0)
@@ -176,7 +182,10 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
 
 
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
-    """The front wheel turns by 180°, for over 1 s. No fault is reported."""
+    """A turn on the spot to the left is followed by one to the right.
+
+    The robot stands while the front wheel turns by 180°, which takes over 1 s.
+    """
     bench = nominal()
     bench.drive_on(0.0, 1.0, 2.0)
     before_m = bench.robot.truth.x_m
@@ -188,9 +197,9 @@ def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int) -> None:
-    """The front wheel overshoots to 95°, where the drive board would turn its inner wheel faster.
+    """The front wheel overshoots to 95°. The driver relays at most 90° to the drive board.
 
-    So the driver relays at most 90°.
+    At 95°, the board would turn its inner wheel faster than the outer one.
     """
     bench = nominal()
     angles_deg = [60.0]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of e-stop and pause, of brush, lift and lights, and of the driver's last lines."""
+"""Tests of e-stop and pause, of brush, lift and lights, and of the lines sent at the exit."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,10 @@ def without_relays(lines: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """Before ``start``, the command is set to zero: some firmware resumes the old command."""
+    """An e-stop is latched on both boards. At its release, only the drive board gets ``start``.
+
+    A Stop precedes ``start``, because some firmware then resumes the old motion command.
+    """
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
     mark = bench.now
@@ -59,9 +62,9 @@ def test_the_stop_of_an_estop_is_a_word_alone() -> None:
 
 
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
-    """``start`` is lost after an e-stop.
+    """The line ``start``, which the driver sends after the release of an e-stop, is lost.
 
-    The driver repeats it until a heartbeat shows its effect.
+    The driver repeats this line until a heartbeat shows its effect.
     """
     bench = nominal()
     bench.estop(True)
@@ -78,7 +81,10 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
 
 
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
-    """The source -1 proves a pause. Latching and releasing the e-stop does not end the pause."""
+    """The user requests a pause. The command source -1 in a heartbeat (rcSource) proves it.
+
+    Latching and releasing the e-stop does not end the pause.
+    """
     bench = nominal()
     bench.drive_on()
     answer = bench.ask(Request.PAUSE)
@@ -117,9 +123,9 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The driver sends the lift voltage with a time limit and then nothing.
+    """The driver sends a lift voltage with a time limit, and then nothing more.
 
-    The lift stops by itself.
+    The lift stops by itself when this time is over.
     """
     bench = nominal()
     lift_it(bench)
@@ -143,7 +149,10 @@ def test_the_time_of_the_lift_follows_the_timeout() -> None:
 
 
 def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None:
-    """Of a thousand lines in a second, twenty are sent. A voltage of 0 is sent at once."""
+    """A thousand lift voltages and colours are commanded within 1 s. Twenty of each are sent.
+
+    A voltage of 0 is sent at once.
+    """
     machine = Machine()
     machine.set_brush(True)
     said: list[tuple[float, bytes]] = []
@@ -163,7 +172,10 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 
 
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
-    """The time limit begins when the voltage is sent. A stop before that discards the voltage."""
+    """A lift voltage waits, because another was just sent. Its time limit begins when it is sent.
+
+    If the lift is switched off before, the waiting voltage is discarded.
+    """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)
     machine.due(0.0)
@@ -195,7 +207,10 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
-    """An event stops brush and lift. They stay off when the robot works again."""
+    """An event such as an e-stop or a restart stops brush and lift.
+
+    They stay off when the robot works again.
+    """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     lift_it(bench)
@@ -255,9 +270,9 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard's lines stop all motors, whether the e-stop is latched or not.
+    """The guard's lines stop wheels, brush and lift, whether the e-stop is latched or not.
 
-    So do the lines that the driver sends at the exit.
+    The lines that the driver sends at its exit stop them too.
     """
     for words in ("guard", "guard latched", "exit"):
         bench = nominal()

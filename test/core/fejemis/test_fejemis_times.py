@@ -2,7 +2,7 @@
 
 """Tests of the stamps of readings.
 
-Some lines contain the Teensy's time, those of the IMU do not.
+Some lines contain the Teensy's time. The lines of the IMU do not.
 """
 
 import itertools
@@ -24,7 +24,10 @@ from omnibot_driver.simulator.fejemis import Firmware
 
 
 def late(chance: random.Random) -> float:
-    """Return the delay of a read in s: 0.36 ms on average, and in 1 % up to 20 ms longer."""
+    """Return a random delay of a read, in s.
+
+    Usually, it is about 0.36 ms. For 1 % of the reads, it is up to 20 ms longer.
+    """
     stall_s = chance.uniform(0.0, 0.02) if chance.random() < 0.01 else 0.0
     return 3e-4 + chance.expovariate(1 / 6e-5) + stall_s
 
@@ -39,7 +42,10 @@ def within(errors: list[float]) -> float:
 @pytest.mark.parametrize("ppm", [-100.0, 0.0, 100.0])
 @pytest.mark.parametrize("loss", [0.0, 0.03])
 def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
-    """Stamps of poses are right within 0.05 ms, and those of IMU samples within 0.2 ms."""
+    """Lines arrive late, and some are lost. Stamps of poses are right within 0.05 ms.
+
+    Stamps of IMU samples are right within 0.2 ms.
+    """
     chance = random.Random(f"{ppm} {loss}")
     clock, imu, pairs = TeensyClock(), ImuSamples("m/s^2"), ImuPairs()
     phase_s, start_s = chance.random() * 0.01, chance.random() * 50
@@ -73,7 +79,10 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
 
 
 def test_a_time_that_cannot_be_the_boards_is_refused() -> None:
-    """The clock ignores a single implausible time. Several that agree show a restart."""
+    """The clock ignores a single implausible time of the board.
+
+    Several implausible times that agree with each other show a restart of the board.
+    """
     clock = TeensyClock()
     assert all(clock.see(100.0 + 0.02 * n, 5.0 + 0.02 * n) for n in range(50))
     assert not clock.see(10.98, 6.0)
@@ -102,9 +111,10 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 @pytest.mark.parametrize("waited_s", [0.012, 0.03, 0.2])
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
-    """The first line waits for the host. Then every read brings two lines, 20 ms apart.
+    """The first line waited for the host. Then every read brings two lines, sent 20 ms apart.
 
-    The older line of each read seems plausible, and the newer one early. Three times are lost.
+    Compared with the first line, the newer line of each read seems early. The clock rejects at most
+    three times, and is then right.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -118,9 +128,9 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 
 
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
-    """Every third time is damaged in the same digit, so that damaged times agree.
+    """Every third time is damaged in the same digit, so that the damaged times agree.
 
-    The right times between them are smaller. This shows the damage.
+    The correct times between them are smaller, which shows the damage. The clock stays right.
     """
     clock = TeensyClock()
     for n in range(100):
@@ -132,9 +142,9 @@ def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
 
 @pytest.mark.parametrize("seed", range(6))
 def test_rare_reads_lose_no_odometry(seed: int) -> None:
-    """The driver reads each port every 50 ms, so each read brings two or three poses.
+    """The driver reads each port only every 50 ms, so each read brings two or three poses.
 
-    The time that the first line waits depends on the seed.
+    No odometry and no IMU sample is lost, however long the first line waited (``seed``).
     """
     bench, chance = Bench(), random.Random(seed)
     for _ in range(chance.randrange(2000)):
@@ -194,7 +204,10 @@ def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
 
 
 def test_an_orientation_that_waited_has_the_time_of_its_imu_sample() -> None:
-    """The drive board's lines wait for 0.3 s, and then arrive in one read."""
+    """The drive board's lines wait for 0.3 s, and then arrive in one read.
+
+    Each orientation still gets the stamp of the IMU sample before it.
+    """
     bench = nominal()
     bench.run(3.0)
     waiting = bytearray()
@@ -236,7 +249,10 @@ def test_stamps_of_each_kind_of_extra_reading_go_forward_by_themselves() -> None
 
 
 def test_lines_that_waited_before_the_port_was_opened_are_not_a_restart() -> None:
-    """After the lines that waited, the board's time jumps ahead. A restart would set it back."""
+    """Old lines waited before the port was opened. After them, the board's time jumps ahead.
+
+    The clock follows without reporting a restart, because a restart would set the time back.
+    """
     clock = TeensyClock()
     for n in range(20):
         clock.see(5.0 + 0.02 * n, 100.0 + 1e-4 * n)
@@ -270,7 +286,10 @@ def test_what_waited_while_the_host_was_stalled_is_not_a_restart() -> None:
 
 
 def numbered() -> Bench:
-    """Return a bench that sends the number of the cycle as the x of gyro and acceleration lines."""
+    """Return a bench whose gyro and acceleration lines show the number of their board cycle.
+
+    The number, divided by 1000, is the x value of the line.
+    """
     bench = nominal()
     drive = bench.robot.drive
     drive._items["gyro"] = lambda: f"gyro {drive._cycles % 20_000 / 1000:.3f} 0.100 0.200"
@@ -293,7 +312,10 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
 
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
-    """A read every 100 ms has ten samples. 1 % of the lines is lost or comes twice."""
+    """A read every 100 ms has ten samples. In some cases, 1 % of the lines is lost or comes twice.
+
+    No published sample has lines of two cycles.
+    """
     bench = numbered()
     chance = random.Random(5)
     times = {"all": 1, "lost": 0, "twice": 2}[kept]
