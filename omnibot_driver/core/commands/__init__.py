@@ -1,3 +1,3 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion commands: which packets a received command becomes, and when they are sent."""
+"""Motion commands: how a received command becomes packets, and when these are sent."""

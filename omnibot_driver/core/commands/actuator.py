@@ -30,7 +30,7 @@ class Actuator(Protocol):
     def commanded(self) -> BodyTwist | None:
         """Body velocity of the last command sent, as rounded by the encoding, in the board's axes.
 
-        None if that command does not determine the velocity.
+        None if the command, such as a goal, does not determine the velocity.
         """
 
     @property

@@ -2,8 +2,8 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method returns the reason why not, as a sentence with a remedy, or an empty string. This module
-knows modes and phases.
+Each method returns the reason for a refusal, as a sentence with a remedy, or an empty string if
+there is no reason. This module knows modes and phases.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -18,7 +18,7 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    * ``leaving``: the driver is shutting down, so everything is refused.
+    * ``leaving``: whether the driver is shutting down. Everything is then refused.
     * ``missing``: which lines are not open, as a sentence; empty if none.
     """
 
@@ -41,16 +41,16 @@ class Interlocks:
         return "the driver is shutting down" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused: its sender is still active.
+        """Record that a motion command was refused, which shows that its sender is still active.
 
-        Call this for every refusal, also by an earlier check.
+        Call this for every refused command, also if another check has refused it.
         """
         self._interlock.be_active(now)
 
     def why_not_drive(self, motion: Setpoint, now: float) -> str:
         """Return the reason why this motion is refused; empty if the motion is allowed.
 
-        Call once per command: the motion interlock counts the calls.
+        Call this once for each command, because each call is recorded as the arrival of a command.
         """
         if self.leaving or self.missing:
             return self.why_not_request()

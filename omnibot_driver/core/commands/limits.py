@@ -19,7 +19,7 @@ class SpeedLimits:
 
     * ``linear_mps``: length of the linear velocity, in m/s.
     * ``wheel_radps``: rate of the fastest wheel, in rad/s.
-    * ``linear_mps2``, ``angular_radps2``: in m/s² and rad/s²; 0: unlimited.
+    * ``linear_mps2``, ``angular_radps2``: accelerations in m/s² and rad/s²; 0: unlimited.
     """
 
     linear_mps: float = 0.5
@@ -53,7 +53,7 @@ class SpeedLimits:
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
         """Return the twist reached from ``now`` in ``duration_s`` with limited acceleration.
 
-        The linear velocity changes along a straight line; the yaw rate independently.
+        The linear velocity changes along a straight line. The yaw rate changes independently of it.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),

@@ -65,8 +65,9 @@ class MotionInterlock:
     def arrive(self, now: float, timeout_s: float, *, stands: bool) -> str:
         """Record a command, and return the reason why it is refused; empty if it is allowed.
 
-        ``stands``: a command to stand still, always allowed. A pause of ``timeout_s`` ends the
-        refusal.
+        ``stands``: whether the command is to stand still, which is always allowed.
+
+        ``timeout_s``: time without commands that ends a refusal after a first stop.
         """
         silent = now - self._commanded_at >= timeout_s
         if not stands:

@@ -126,7 +126,7 @@ class CommandPipeline:
         )
 
     def begin(self, now: float) -> None:
-        """Forget earlier commands and measurements."""
+        """Discard the current command, and forget the measurements so far."""
         self.policy.discard(now)
         self._monitor.begin()
 
@@ -186,7 +186,7 @@ class CommandPipeline:
     ) -> Fault | None:
         """Return the fault that the robot's newest measured motion shows, or None.
 
-        The motion is the newest estimate's ``rolling``; if unknown, ``reading``.
+        The motion is taken from the newest estimate; if unknown there, from ``reading``.
         """
         seconds = reading.duration_s
         if not seconds or reading.restarted or not reading.measured:
@@ -236,8 +236,8 @@ class CommandPipeline:
     def stop_unheard(self, unheard_s: float, now: float) -> list[str]:
         """Stop the robot, because the board has sent nothing for ``unheard_s``; return notices.
 
-        A velocity is commanded again and again, so its sender goes on or is refused. A goal is
-        commanded only once.
+        Only a discarded goal gives a notice, because a goal is sent only once. The sender of a
+        velocity repeats the command, and sees the refusal.
         """
         had_goal = isinstance(self.policy.current, GoalSetpoint)
         self.policy.halt(now)
@@ -265,7 +265,7 @@ class CommandPipeline:
         ):
             self.interlock.trip(now)
             why = (
-                "the robot is moving away from it; check that the board's switch is set to"
+                "the robot is moving away from the goal; check that the board's switch is set to"
                 " positional control."
                 f" {self.interlock.until.value}"
             )

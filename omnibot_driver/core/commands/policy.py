@@ -58,9 +58,9 @@ class CommandPolicy:
         """Command in effect, or None."""
         self.commanded_at = -math.inf
         self.quiet = False
-        """Whether ``fall_silent`` was called, and ``halt`` has not been called since."""
+        """Whether the policy sends nothing while it waits for the proof of the last Stop."""
         self.unconfirmed = False
-        """Whether Stop was repeated for ``unproved_s`` without proof that the robot has stopped."""
+        """Whether Stop was repeated for the longest time without proof that the robot stopped."""
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
 

@@ -22,7 +22,7 @@ PACE_S: Final = 0.01
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
 
-With less, damaged set-points act longer (docs/internals/integrity.md).
+If it is shorter, a damaged set-point has a longer effect (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""
@@ -48,7 +48,8 @@ class SetpointStream:
     """An actuator that repeats the set-point in effect.
 
     * ``proof``: receives a report of each stop and motion sent.
-    * ``heard``: called with all packets that are written, also those of requests, and the time.
+    * ``heard``: function that is called with all packets written, also those of requests, and the
+      time.
     """
 
     def __init__(
@@ -96,8 +97,8 @@ class SetpointStream:
     def wrote(self, packets: Packets, now: float) -> None:
         """Record that the packets of a request were written, and adapt what to send next.
 
-        A damaged motion frame may wait in the board for its last bytes. Packets other than Stop
-        can complete it to a wrong motion, so the set-point is then repeated at once.
+        The board may hold an incomplete motion frame, whose last bytes were lost. Packets other
+        than Stop can complete this frame to a wrong motion, so the set-point is repeated at once.
         """
         if self._heard is not None:
             self._heard(packets, now)

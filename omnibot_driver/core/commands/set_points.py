@@ -2,7 +2,7 @@
 
 """Set-points: motion commands that return the order to send at each time.
 
-The actuator asks for the order with each frame, so acceleration limits need no timer.
+The actuator requests the order for each frame, so acceleration limits need no timer.
 """
 
 import math
@@ -21,10 +21,8 @@ AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
 LEAVING_RAD: Final = 2.0
-"""``LEAVING_M``, ``LEAVING_RAD``: growth of the distance to the goal that shows leaving.
-
-No controller overshoots that far.
-"""
+"""``LEAVING_M``, ``LEAVING_RAD``: growth of the distance to the goal, in m and rad, that shows that
+the robot drives away from it. No controller overshoots as far."""
 
 
 class Authority(Enum):
@@ -64,9 +62,9 @@ class Setpoint(Protocol):
 class BaseSetpoint:
     """A body velocity, approached from the previous one within the acceleration limits.
 
-    * ``is_zero``: as argument ``Actuator.is_zero``, which may raise CommandRefused; then its
-      result.
-    * ``before``: the previous set-point; a ramp starts at its velocity, else at rest.
+    * ``is_zero``: as an attribute, whether the order makes the robot stand still. As an argument,
+      the function that returns this; it may raise CommandRefused.
+    * ``before``: the previous set-point. A ramp starts at its velocity; at rest if it has none.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 
@@ -115,8 +113,8 @@ class BaseSetpoint:
 class SteadySetpoint:
     """A command whose order does not change.
 
-    * ``is_zero``: as argument ``Actuator.is_zero``, which may raise CommandRefused; then its
-      result.
+    * ``is_zero``: as an attribute, whether the order makes the robot stand still. As an argument,
+      the function that returns this; it may raise CommandRefused.
     """
 
     settled: Final = True
@@ -143,8 +141,9 @@ class GoalSetpoint:
 
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
-    * ``alignment``: ``Odometry.alignments`` at the time of the command.
-    * ``check``: raises CommandRefused if the order cannot be encoded.
+    * ``alignment``: how often the relation of these two frames had changed before the command
+      (``Odometry.alignments``).
+    * ``check``: function that raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """
 

@@ -15,35 +15,35 @@ STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
 """``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill.
 
-Above two encoder counts in 40 ms; below the slowest command (0.014 m/s).
+They exceed two encoder counts in 40 ms, but not the slowest command (0.014 m/s).
 """
 STILL_S: Final = 0.1
-"""Default duration of standstill for a proof, in s: three displacements of 40 ms, rounded down."""
+"""Default duration of standstill for a proof, in s. Three displacements of 40 ms exceed it."""
 SLACK_S: Final = 1e-6
 """Tolerance for rounding, in s: in floating point, a sum of ten times 0.1 s is less than 1 s."""
 AT_LEAST: Final = 2
 """Smallest number of displacements in a proof.
 
-One could be damaged, or describe the time before the wheels turned.
+A single one could be damaged, or could have been measured before the wheels turned.
 """
 PROOFS: Final = 2.0
-"""Shortest wait for a proof, as a multiple of the standstill that the proof needs."""
+"""Shortest wait for a proof, as a multiple of the duration of standstill that a proof needs."""
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
 A displacement of longer duration includes the motion of lost displacements.
 """
 UNDER_WAY_S: Final = 0.05
-"""Time after Stop in which displacements are ignored, in s: they may describe the time before Stop
+"""Time after Stop in which displacements are ignored, in s. They may have been measured before Stop
 arrived."""
 
 
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: since Stop, no motion was sent and the robot stood for ``still_s``.
-    * ``owed``: motion was sent, and no standstill is proved since.
-    * ``measured``: a measured displacement has arrived since Stop.
+    * ``proved``: whether, since Stop, no motion was sent and the robot stood for ``still_s``.
+    * ``owed``: whether a motion was sent, and no standstill was proved since then.
+    * ``measured``: whether a measured displacement has arrived since Stop.
     """
 
     def __init__(self, still_s: float = STILL_S) -> None:

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Motion commands through a session to a simulated board: authority, ramps, stamps and limits."""
+"""Tests of motion commands through a session to a simulated board.
+
+They test changes of the commanding topic, ramps, stamps and limits.
+"""
 
 import itertools
 import math
@@ -42,7 +45,10 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return time and words of each Stop and each base velocity (mode 1) since ``mark``."""
+    """Return the time in s and the words of each Stop and base velocity (mode 1) on the line.
+
+    ``mark``: number of the first frame, counted from the beginning of the test.
+    """
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
         (at, [int.from_bytes(data[n : n + 2], "big", signed=True) for n in (3, 5, 7)])
@@ -76,7 +82,10 @@ def notices(bench: Bench) -> list[str]:
 
 
 def test_what_the_base_cannot_do_is_set_to_zero_and_said_once(bench: Bench) -> None:
-    """A base that cannot move sideways is driven forward only. A command with NaN is refused."""
+    """A diagonal motion is commanded to a base that cannot move sideways.
+
+    The base drives forward only, and one notice says so. A command with NaN is refused.
+    """
     noise = OdometryNoise(wheels=DifferentialKinematics(wheel_radius_m=1.0, track_m=0.4))
     settings = replace(bench.settings, odometry=OdometrySettings(noise=noise))
     bench.session.configure(settings, bench.now)
@@ -121,7 +130,10 @@ def test_a_refused_command_does_not_take_the_authority(bench: Bench) -> None:
 
 
 def test_a_step_is_ramped_with_its_direction_kept() -> None:
-    """A step from rest to (0.3, 0.4) m/s at 1 m/s² takes 0.5 s. On the line, 1 m/s is 70 LSB."""
+    """A robot at rest is commanded to drive at (0.3, 0.4) m/s. The acceleration limit is 1 m/s².
+
+    The commands on the line reach this velocity within 0.5 s, always in the same direction.
+    """
     bench = running(limits=GENTLE)
     start, begun = len(bench.written), bench.now
     for _ in range(6):
@@ -139,7 +151,10 @@ def test_a_step_is_ramped_with_its_direction_kept() -> None:
 
 @pytest.mark.parametrize("every_ms", [1, 5, 10, 18])
 def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None:
-    """Commands arrive every 1 ms or 18 ms, and each continues the ramp of the last one."""
+    """The same velocity is commanded every 1, 5, 10 or 18 ms. Each command continues the ramp.
+
+    The ramp has the same slope in all cases.
+    """
     motion = None
     for now_ms in range(301):
         now, wanted = now_ms / 1000, BodyTwist(0.5, 0.0, 0.0)
@@ -171,7 +186,10 @@ def test_a_reversal_is_ramped_through_zero() -> None:
 
 
 def test_turning_is_ramped_by_its_own_limit() -> None:
-    """The user commands 0.5 rad/s from rest. At a limit of 2 rad/s², the ramp takes 0.25 s."""
+    """A robot at rest is commanded to turn at 0.5 rad/s. The acceleration limit is 2 rad/s².
+
+    The yaw rate on the line reaches 0.5 rad/s (250 LSB) after 0.25 s.
+    """
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.drive(0.0, 0.0, 0.5)
@@ -213,7 +231,10 @@ def test_what_comes_after_a_stop_begins_at_rest() -> None:
 
 
 def test_wheels_are_not_ramped() -> None:
-    """Acceleration limits apply to the base only."""
+    """Wheel rates are commanded from rest, and sent at once.
+
+    Acceleration limits apply only to velocities of the base.
+    """
     bench = running(limits=GENTLE)
     start = len(bench.written)
     bench.turn_wheels(10.0, 0.0, 0.0)
@@ -221,7 +242,10 @@ def test_wheels_are_not_ramped() -> None:
 
 
 def test_a_stamped_command_expires_by_its_stamp(bench: Bench) -> None:
-    """The stamp of a command is 0.3 s old on arrival. At a timeout of 0.5 s, 0.2 s are left."""
+    """The stamp of a command is 0.3 s old on arrival, and the timeout is 0.5 s.
+
+    The command expires 0.2 s after its arrival.
+    """
     bench.drive(0.3, age_s=0.3)
     bench.run(0.19)
     assert bench.written[-1][1] != STOP

@@ -21,7 +21,10 @@ def bench() -> Bench:
 
 
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
-    """A driving robot stops. The driver then sends only ES and Stop, always together."""
+    """The e-stop is latched while the robot drives. The robot stops, and commands are refused.
+
+    The driver then sends only ES, the board's own emergency stop, and Stop, always together.
+    """
     bench.drive(0.5)
     bench.run(0.1)
     start = len(bench.written)
@@ -38,7 +41,10 @@ def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
 
 
 def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> None:
-    """Only a release ends the e-stop. After the release, the robot waits for a newer command."""
+    """A reconnect, a restart of the board, ~/start and ~/reset do not end a latched e-stop.
+
+    After its release, the robot waits for a new command.
+    """
     bench.session.estop(True, bench.now)
     bench.settle()
     bench.close()
@@ -63,7 +69,10 @@ def test_the_estop_survives_reconnect_restart_start_and_reset(bench: Bench) -> N
 def test_an_estop_is_the_first_frame_that_a_reconnected_board_hears_after_the_opening(
     bench: Bench,
 ) -> None:
-    """The e-stop is latched while the port is closed. The answer to the user warns of this."""
+    """The e-stop is latched while the port is closed. The answer says that the port is not open.
+
+    After a reconnect, the emergency stop follows directly after the opening bytes.
+    """
     bench.close()
     assert "port is not open" in estop(bench, True)
     start = len(bench.written)
@@ -93,9 +102,9 @@ def test_only_a_release_ends_an_estop_and_a_command_from_before_it_is_worth_noth
 
 
 def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> None:
-    """After the release of the e-stop, the board ignores all commands until it is reset.
+    """The board ignores all commands after the release of the e-stop, until it is reset.
 
-    The driver advises ~/reset in one notice.
+    One notice advises the user to call ~/reset.
     """
     bench = driving(estop_latches=True)
     estop(bench, True)

@@ -115,7 +115,10 @@ def test_what_is_not_finite_is_never_allowed(bad: float, place: int) -> None:
 
 
 def test_the_linear_speed_is_limited_as_a_vector_and_not_by_axis() -> None:
-    """(3, −4) m/s becomes (0.3, −0.4) m/s at a limit of 0.5 m/s. The yaw rate stays."""
+    """A velocity of (3, −4) m/s is commanded at a limit of 0.5 m/s.
+
+    It becomes (0.3, −0.4) m/s, and the yaw rate stays the same.
+    """
     limited = SpeedLimits().twist(BodyTwist(3.0, -4.0, 0.1))
     found = (limited.vx_mps, limited.vy_mps, limited.yaw_rate_radps)
     assert found == pytest.approx((0.3, -0.4, 0.1))
@@ -154,9 +157,9 @@ def test_what_is_finite_is_not_refused(values: list[float]) -> None:
 def test_a_velocity_changes_by_no_more_than_the_acceleration_allows(
     now: BodyTwist, wanted: BodyTwist, acceleration: float, duration_s: float
 ) -> None:
-    """The linear velocity approaches the wanted one in a straight line.
+    """The linear velocity approaches the wanted velocity along a straight line.
 
-    The yaw rate has its own limit.
+    The yaw rate approaches independently, within its own acceleration limit.
     """
     limits = SpeedLimits(linear_mps2=acceleration, angular_radps2=acceleration)
     now, wanted = limits.twist(now), limits.twist(wanted)
@@ -193,6 +196,9 @@ def test_what_is_young_enough_is_not_refused(age_s: float) -> None:
 def test_what_is_too_old_or_from_the_future_is_refused_with_its_age(
     age_s: float, said: str
 ) -> None:
-    """The refusal states the age of the stamp, and says that the clocks must agree."""
+    """A command's stamp is too old, or too far in the future. The command is refused.
+
+    The refusal contains the age of the stamp, and says that the computers' clocks must agree.
+    """
     with pytest.raises(CommandRefused, match=f"cmd_vel refused.*{said}.*clocks agree"):
         require_timely("cmd_vel", age_s, 0.5)

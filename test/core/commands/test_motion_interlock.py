@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion interlock: when a robot may move again after a trip of the motion monitor."""
+"""Tests of the motion interlock: when a robot may move again after a trip of the motion monitor.
+
+In a trip, the motion monitor stops a robot that does not move as commanded.
+"""
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
 
@@ -23,7 +26,10 @@ def test_motion_is_allowed_until_something_trips() -> None:
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """The sender goes on after a trip. Motion is refused until no command comes for the timeout."""
+    """After a trip of the motion monitor, a sender continues to send motion commands.
+
+    All of them are refused, because the pause between them is shorter than the command timeout.
+    """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -32,7 +38,10 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """Motion is allowed one timeout after the last command, not one timeout after the trip."""
+    """After a trip of the motion monitor, no command arrives for the command timeout.
+
+    Motion is then allowed again. The timeout begins with the last command, not with the trip.
+    """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -81,7 +90,10 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """The board has no ~/start. The release matters only after a second trip."""
+    """The board has no ~/start. After a second trip of the motion monitor, motion is refused.
+
+    The release of the e-stop ends this refusal. After a first trip, it has no effect.
+    """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)
     interlock.release()

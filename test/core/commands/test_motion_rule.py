@@ -2,7 +2,8 @@
 
 """Tests of the motion rule: only a fresh command moves the robot.
 
-The board must also send data at that time.
+A command is not fresh if it is older than the timeout, or than an interruption such as a pause. The
+board must also send data.
 """
 
 import contextlib
@@ -61,7 +62,10 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
 
 
 def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench) -> None:
-    """While the board's data is lost, the board restarts and another program starts the board."""
+    """While the board's data is lost, the board restarts and another program starts it.
+
+    Only the counters in its frames show the restart. The driver discards the current command.
+    """
     bench = driving(boot_time_s=0.05)
     bench.drive(0.4)
     bench.speaks = False
@@ -80,9 +84,9 @@ def test_a_restart_that_only_the_counters_tell_discards_the_command(bench: Bench
 
 
 def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
-    """The last motion frame comes during the boot.
+    """The board restarts while the robot drives. The last motion frame arrives during the boot.
 
-    After the boot, the board could read an S in it.
+    After the boot, the board could read a byte of a motion frame as the letter S (start).
     """
     bench = driving(boot_time_s=0.4)
     bench.board.reboot()
@@ -98,7 +102,10 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """The board misses a request for a pause or a reset, so the robot drives on."""
+    """The user requests a pause or a reset, which the board does not receive, so it drives on.
+
+    From the request on, the driver sends no motion frame.
+    """
     bench.drive(0.4)
     start = len(bench.written)
     bench.hears = False
@@ -110,7 +117,10 @@ def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Requ
 
 @pytest.mark.parametrize("state", ["connecting", "paused"])
 def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
-    """A paused board would take a byte 0x52 of a motion command for R, and reset."""
+    """The board is silent or paused. Motion commands are refused and not sent.
+
+    A paused board would read a byte 0x52 of a motion command as the letter R, and reset.
+    """
     bench = Bench(run=False)
     bench.open()
     bench.run_until_state(state)
@@ -120,7 +130,7 @@ def test_motion_is_refused_unless_the_board_runs(state: str) -> None:
 
 
 def test_motion_is_refused_without_a_port() -> None:
-    """The refusal of a command says that the board is not connected."""
+    """A command arrives before the port is open. The refusal says the board is not connected."""
     with pytest.raises(CommandRefused, match="not connected"):
         Bench().drive(0.3)
 
@@ -138,7 +148,10 @@ def test_the_robot_stands_still_after_the_timeout(bench: Bench) -> None:
 
 
 def test_a_robot_that_is_not_heard_is_driven_no_further_and_shows_connecting(bench: Bench) -> None:
-    """The board's data is lost, but the board still receives. The driver sends Stop."""
+    """The board's data is lost while the robot drives. The board still receives commands.
+
+    The driver sends Stop, and later shows the state ``connecting``.
+    """
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = False
@@ -169,9 +182,9 @@ def test_stop_is_sent_also_to_a_board_that_is_not_heard(bench: Bench) -> None:
 
 
 def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Bench) -> None:
-    """The user sends a thousand zero commands a second.
+    """A thousand zero commands a second arrive while the board is silent.
 
-    The driver sends one Stop per control tick.
+    The driver sends only one Stop in each control tick of 10 ms.
     """
     bench.speaks = False
     bench.run(0.5)
@@ -188,7 +201,10 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """During the cut, the robot drives on with its last command."""
+    """The line is cut in both directions while the robot drives, so it drives on.
+
+    When the line works again, the driver stops the robot.
+    """
     bench.drive(0.5)
     bench.run(0.1)
     bench.speaks = bench.hears = False

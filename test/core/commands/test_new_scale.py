@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The board's scales change while the robot drives, and the current command is converted."""
+"""Tests of changes of the board's scales (LSB per unit) while the robot drives.
+
+The current command is converted to the new scale.
+"""
 
 from robots import driving
 from session_bench import STOP, Bench, bare
@@ -26,7 +29,10 @@ def going_to(x_m: float) -> Bench:
 
 
 def test_a_velocity_is_repeated_in_the_new_scale() -> None:
-    """At 0.4 m/s, 28 LSB become 40 LSB when the scale changes from 70 to 100 LSB per m/s."""
+    """The robot drives at 0.4 m/s, and the scale changes from 70 to 100 LSB per m/s.
+
+    The repeated command changes from 28 LSB to 40 LSB.
+    """
     bench = driving()
     bench.drive(0.4)
     bench.run(0.1)
@@ -37,7 +43,10 @@ def test_a_velocity_is_repeated_in_the_new_scale() -> None:
 
 
 def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> None:
-    """At 10 rad/s, 20 LSB become 41 LSB when the wheel radius is doubled."""
+    """The wheels are commanded to turn at 10 rad/s, and the configured wheel radius is doubled.
+
+    The repeated command changes from 20 LSB to 41 LSB.
+    """
     bench = driving()
     bench.turn_wheels(10.0, 0.0, -10.0)
     bench.run(0.1)
@@ -48,7 +57,10 @@ def test_wheel_rates_are_repeated_in_the_new_scale_and_for_the_new_wheel() -> No
 
 
 def test_a_goal_is_repeated_in_the_new_scale() -> None:
-    """For a goal at 1 m, 1000 LSB become 500 LSB when the scale is halved."""
+    """The robot drives to a goal at 1 m, and the scale of positions is halved.
+
+    The repeated goal changes from 1000 LSB to 500 LSB.
+    """
     bench = going_to(1.0)
     assert last(bench) == bytes.fromhex("FF FE 01 03 E8 00 00 00 00")
     bench.configure_board(position_scale=500.0)
@@ -57,7 +69,10 @@ def test_a_goal_is_repeated_in_the_new_scale() -> None:
 
 
 def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() -> None:
-    """A goal at 10 m with 10,000 LSB per m does not fit a 16-bit word."""
+    """With a new scale, the current goal at 10 m does not fit into a 16-bit word.
+
+    The driver sends Stop, and a notice says why.
+    """
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
     assert last(bench) == bare(STOP)
@@ -87,7 +102,10 @@ def test_a_ramp_goes_on_from_where_it_was() -> None:
 
 
 def test_what_the_new_scale_rounds_to_nothing_is_stop() -> None:
-    """The new scale rounds the commanded speed to 0. The driver sends Stop, not zeros in mode 1."""
+    """With a new scale, the commanded speed is rounded to 0 on the line.
+
+    The driver sends the Stop frame, not a velocity frame with zeros.
+    """
     bench = driving()
     bench.drive(0.05)
     bench.configure_board(linear_scale=5.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Goals through a session to a simulated board whose switch is set to position control."""
+"""Tests of goals (cmd_pose), sent to a simulated board whose switch is set to position control."""
 
 import math
 from collections.abc import Callable
@@ -75,7 +75,10 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The board's heading counts full turns. A goal never turns the robot back by them."""
+    """The board's heading counts full turns, and may begin at several of them.
+
+    The driver converts a goal so that the robot turns by less than half a turn.
+    """
     at = 1000 * math.tau * turns + 3000.0
     bench = at_position_control(BoardPose(0.0, 0.0, at))
     bench.go_to(0.0, 0.0, 0.4)
@@ -137,7 +140,10 @@ def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
 
 @pytest.mark.parametrize("options", [{"imu_only": True}, {"use_board_pose": False}])
 def test_goals_are_refused_where_the_boards_pose_is_not_known(options: dict[str, bool]) -> None:
-    """Without the board's pose, a goal in odom cannot be converted to the board's frame."""
+    """The board's pose is not known, or not used. Goals are refused.
+
+    Without this pose, a goal in the odometry frame cannot be converted to the board's frame.
+    """
     bench = at_position_control(**options)  # type: ignore[arg-type]
     with pytest.raises(CommandRefused, match="not known"):
         bench.go_to(1.0, 0.0, 0.0)
@@ -182,7 +188,10 @@ def estop(bench: Bench) -> None:
 def test_whatever_discards_a_command_discards_a_goal(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """After a reset, for example, the robot rests. A new goal is then reached."""
+    """The robot drives to a goal. An event such as a reset or an e-stop discards this goal.
+
+    The robot then stays at rest until a new goal arrives.
+    """
     bench.go_to(3.0, 0.0, 0.5)
     bench.run(1.0)
     event(bench)
@@ -200,9 +209,9 @@ def test_whatever_discards_a_command_discards_a_goal(
 
 
 def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) -> None:
-    """No data arrives for 0.35 s, for example because the computer is busy.
+    """No data arrives for 0.35 s while the robot drives to a goal. The goal is discarded.
 
-    This ends the goal. Its sender does not send it again, so the driver must say so.
+    A notice says so, because a goal is sent only once, and its sender would wait in vain.
     """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
@@ -216,9 +225,9 @@ def test_the_user_is_told_that_a_short_silence_has_ended_a_goal(bench: Bench) ->
 
 
 def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Bench) -> None:
-    """The odometry is reset, so the driver sends Stop.
+    """The odometry is reset while the robot drives to a goal. The driver sends the Stop frame.
 
-    Zeros in mode 1 would be a goal at the origin.
+    A velocity frame with zeros (mode 1) would be a goal at the origin.
     """
     bench.go_to(3.0, 0.0, 0.0)
     bench.run(1.0)
@@ -234,7 +243,10 @@ def test_standing_still_on_the_way_to_a_goal_is_the_manuals_stop_frame(bench: Be
 def test_a_robot_that_drives_away_from_its_goal_is_stopped(
     goal: tuple[float, float, float],
 ) -> None:
-    """The board's switch is on velocity, so the board takes the goal for a velocity."""
+    """The driver sends a goal, but the board's switch is set to velocity control.
+
+    The board takes the goal for a velocity. The driver stops the robot and names the switch.
+    """
     bench = Bench(BoardSettings(running=True), control="position")
     bench.open()
     bench.run(1.5)

@@ -23,7 +23,10 @@ def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
 
 
 def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -> None:
-    """A Stop and a command are due when the e-stop is latched. Neither is sent."""
+    """The commanding topic has changed, so a Stop and a command are due. The e-stop is latched.
+
+    Neither the Stop nor the command is sent; only the e-stop is.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -33,7 +36,11 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 
 
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
-    """The e-stop is ES and Stop, because some firmware does not know ES. Both are sent twice."""
+    """The e-stop is latched just after a command. It is sent at once, twice, and then repeated.
+
+    It consists of ES, the board's own emergency stop, and Stop, because some firmware does not know
+    ES.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.latch(1.001)
@@ -46,7 +53,7 @@ def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stre
 def test_what_others_write_does_not_keep_the_emergency_stop_from_being_repeated(
     stream: Stream,
 ) -> None:
-    """The e-stop is latched, and letters are written at 50 Hz.
+    """While the e-stop is latched, other requests write letters such as S (start) at 50 Hz.
 
     The e-stop is still repeated at 20 Hz.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the pace, the repetition and the timeout of set-points with arbitrary bytes."""
+"""Tests of the stream of set-points: its pace, repetition and timeout. The frames are arbitrary."""
 
 import math
 from typing import Any
@@ -75,7 +75,10 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """Stop is sent at 20 Hz: for 1 s if the robot is seen at rest, otherwise for 5 s."""
+    """A command expires. The driver then sends Stop at 20 Hz.
+
+    It ends after 1 s if the robot is seen at rest, otherwise after 5 s.
+    """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
     stops = [at for at, frame in run(stream, 1.0, 1.6) if frame == STOP]
@@ -119,7 +122,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """Zeros precede a letter. They may turn an incomplete frame into a wrong command."""
+    """A letter, such as S (start), is sent while the robot drives. The command is then sent again.
+
+    Zeros precede the letter. They may turn an incomplete frame in the board into a wrong command.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     stream.actuator.wrote(packed(b"S"), 1.02)
@@ -142,7 +148,7 @@ def test_a_flood_of_stops_keeps_the_pace(stream: Stream) -> None:
 def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
     stream: Stream,
 ) -> None:
-    """A motion has a new frame each time.
+    """A motion, such as a ramp, has a different frame each time.
 
     The driver sends each frame 18 ms after the previous one.
     """
@@ -153,9 +159,9 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
 
 
 def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
-    """The authority changes. The driver sends Stop at once.
+    """Another topic commands the robot (another authority). The driver sends Stop at once.
 
-    The new command follows one control tick later.
+    The new command follows one control tick (10 ms) later.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -166,7 +172,10 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """The driver sends the first command, one Stop, and the newest command."""
+    """Three topics command the robot within 2 ms. The second and third replace the one before.
+
+    The driver sends the first command, one Stop, and the newest command.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, TURN, 1.001, Authority.WHEELS)
@@ -212,9 +221,9 @@ def test_what_is_discarded_leaves_the_line_quiet(stream: Stream) -> None:
 
 
 def test_a_late_pacer_stops_instead_of_repeating_an_old_command(stream: Stream) -> None:
-    """The pacer stalls for a minute while a command is active.
+    """The pacer, the thread that repeats commands, stalls for a minute while a command is active.
 
-    It then sends Stop, not the command.
+    It then sends Stop instead of the expired command.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -234,7 +243,11 @@ STEPS = st.lists(
 def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
     steps: list[tuple[str, float]],
 ) -> None:
-    """Events come in random order. The driver sends Stop between two authorities."""
+    """Commands, stops, e-stops and releases come in random order.
+
+    Only commands younger than the timeout are sent, none during an e-stop, and always a Stop
+    between two commanding topics.
+    """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""
     for step, pause in steps:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commands through a session are checked, limited and written in the manual's frames."""
+"""Tests that commands are checked, limited, and written as the frames of the manual."""
 
 import math
 
@@ -17,14 +17,20 @@ def bench() -> Bench:
 
 
 def test_a_command_is_on_the_wire_before_the_call_returns(bench: Bench) -> None:
-    """The driver sends a command at once: 0.3 m/s as 21 LSB, −0.2 m/s as −14, 0.5 rad/s as 250."""
+    """A twist is commanded. The driver sends its frame before the call returns.
+
+    The frame is computed by hand: 0.3 m/s is 21 LSB, −0.2 m/s is −14 LSB, 0.5 rad/s is 250 LSB.
+    """
     start = len(bench.written)
     bench.drive(0.3, -0.2, 0.5)
     assert bare(bench.written_since(start)) == bytes.fromhex("FF FE 01 00 15 FF F2 00 FA")
 
 
 def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
-    """10 rad/s at a radius of 29 mm is 20 LSB. A limit scales all wheels by the same factor."""
+    """Wheel rates are commanded. The frame has rim speeds: 10 rad/s at 29 mm radius is 20 LSB.
+
+    If a wheel exceeds its limit, all wheels are scaled by the same factor.
+    """
     start = len(bench.written)
     bench.session.command_wheels((10.0, -10.0, 0.0), bench.now)
     bench.settle()
@@ -37,7 +43,10 @@ def test_wheel_commands_are_rim_speeds_on_the_wire(bench: Bench) -> None:
 
 
 def test_a_zero_twist_is_the_stop_frame_and_never_zeros_in_mode_one(bench: Bench) -> None:
-    """The driver sends a zero twist as Stop. Zeros in mode 1 may mean a goal at the origin."""
+    """A zero twist is commanded. The driver sends the Stop frame.
+
+    A velocity frame with zeros may mean a goal at the origin, because both use mode 1.
+    """
     bench.drive(0.3)
     start = len(bench.written)
     bench.drive()

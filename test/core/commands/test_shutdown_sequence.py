@@ -61,7 +61,10 @@ def test_a_shutdown_while_a_start_is_in_flight_ends_paused() -> None:
 
 
 def test_a_shutdown_under_estop_repeats_the_estop(bench: Bench) -> None:
-    """The e-stop is latched at shutdown. The last frame that the driver writes is ES."""
+    """The e-stop is latched at shutdown.
+
+    The last frame that the driver writes is ES, the board's own emergency stop.
+    """
     bench.session.estop(True, bench.now)
     assert bench.last_words("stop") == 3 * STOP + EMERGENCY_STOP
 
@@ -75,9 +78,10 @@ def left(bench: Bench) -> None:
 
 
 def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends() -> None:
-    """The driver checks that the robot rests, and writes nothing.
+    """At shutdown, the robot has stopped. The driver checks once more that it stays at rest.
 
-    A bad line could make a motion of any frame.
+    During this check, the driver writes nothing, because a bad line could turn any frame into a
+    motion.
     """
     bench = driving()
     left(bench)
@@ -91,7 +95,10 @@ def test_a_robot_that_was_driven_is_looked_at_in_silence_before_the_driver_ends(
 
 
 def test_a_last_stop_that_the_line_made_a_motion_is_not_the_last() -> None:
-    """The line inserts a byte into the last Stop. The robot moves, so Stop is sent again."""
+    """At shutdown, a fault of the line turns the last Stop into a motion.
+
+    The driver sees that the robot moves, and sends Stop again.
+    """
     bench = driving()
     left(bench)
     bench.board.receive(bytes(8) + bytes.fromhex("FF FE 02 00 20 00 20 00 20"))

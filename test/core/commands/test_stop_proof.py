@@ -47,9 +47,9 @@ def test_three_displacements_of_nothing_after_stop_are_a_proof(proof: StopProof)
 
 
 def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProof) -> None:
-    """Displacements come only every 0.4 s, and the first may have begun before Stop.
+    """Displacements arrive only every 0.4 s, and the first may have begun before Stop.
 
-    The proof then takes longer than with frequent displacements.
+    The proof of rest therefore takes longer than with frequent displacements.
     """
     assert proof.takes_s < 0.3
     rare = DisplacementReading(0.04, 0.0, 0.0, frame="body", duration_s=0.4, lost=0)
@@ -64,7 +64,10 @@ def test_a_proof_takes_as_long_as_its_displacements_need_to_come(proof: StopProo
 
 
 def test_one_displacement_alone_is_not_a_proof_however_long_it_is(proof: StopProof) -> None:
-    """One displacement after Stop does not prove rest, even if it covers 0.1 s. Two together do."""
+    """One displacement of zero after Stop does not prove rest, even if it covers 0.1 s.
+
+    Two such displacements prove rest.
+    """
     long = DisplacementReading(0.0, 0.0, 0.0, frame="body", duration_s=0.1, lost=0)
     proof.look(long, 10.1)
     assert not proof.proved
@@ -96,7 +99,10 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """A robot was driven, so rest must be proved. A new connection or a Stop does not prove it."""
+    """A robot was driven, so a proof of rest is owed.
+
+    Only displacements of zero give this proof; a new connection or a Stop does not.
+    """
     assert not proof.owed
     proof.moved()
     proof.stopped(10.0)
@@ -139,9 +145,9 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """The robot moves in any way.
+    """The robot has moved in any way before.
 
-    Four displacements in a row that are close to zero then prove rest.
+    Four displacements in a row that are close to zero prove rest.
     """
     proof = StopProof()
     proof.stopped(10.0)

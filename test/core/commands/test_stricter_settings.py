@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Speed limits and the command timeout change while the robot drives."""
+"""Tests of changes of speed limits and command timeout while the robot drives."""
 
 from collections.abc import Callable
 
