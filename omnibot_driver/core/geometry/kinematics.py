@@ -2,8 +2,8 @@
 
 """The interface that every arrangement of wheels offers to the driver.
 
-Axes are REP-103's: x forward, y left, yaw counter-clockwise. Rates are in rad/s, in the order of
-``joints``. Small displacements convert in the same way.
+Axes are REP-103's: x forward, y left, yaw counter-clockwise. Wheel rates are in rad/s, in the order
+of ``joints``. The same methods convert small displacements of body and wheels.
 """
 
 from collections.abc import Sequence

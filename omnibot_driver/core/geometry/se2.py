@@ -41,7 +41,7 @@ class Pose:
         return all(map(math.isfinite, (self.x_m, self.y_m, self.yaw_rad)))
 
     def turned(self, angle_rad: float) -> "Pose":
-        """Return this displacement rotated by ``angle_rad``. Its yaw component does not change."""
+        """Return this displacement, rotated by ``angle_rad``. The yaw component stays the same."""
         cos, sin = math.cos(angle_rad), math.sin(angle_rad)
         return Pose(cos * self.x_m - sin * self.y_m, sin * self.x_m + cos * self.y_m, self.yaw_rad)
 

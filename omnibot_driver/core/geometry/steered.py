@@ -45,7 +45,7 @@ class SteeredKinematics:
     def steering_rad(self, twist: BodyTwist) -> float:
         """Return the steered wheel's angle in rad, from -pi/2 to pi/2; 0 at rest.
 
-        Positive: to the left, e.g. pi/2 on the spot.
+        A positive angle is to the left, for example pi/2 for a left turn on the spot.
         """
         speed, sideways = twist.vx_mps, self.wheelbase_m * twist.yaw_rate_radps
         if speed < 0.0:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Correction of the IMU's biases, and figures of the IMU that are measured at standstill."""
+"""Correction of the IMU's biases, and IMU figures for diagnostics, measured at standstill."""
 
 from dataclasses import dataclass
 

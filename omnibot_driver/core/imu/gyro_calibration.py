@@ -2,8 +2,8 @@
 
 """The gyro's bias: measured on request, refined at standstill, never learnt from motion.
 
-At rest, displacements are almost zero and readings hardly vary. Without displacements, a steady
-turn looks the same, so the bias is limited.
+At rest, displacements are almost zero and readings hardly vary. If no displacements arrive, a
+steady turn looks like rest, so a large bias is not accepted.
 
 This module knows readings and times; it does not read a clock, and does not know when to measure.
 """
@@ -27,19 +27,20 @@ A service call may take five seconds. The remaining second is for writing a file
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3
-"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations accepted as rest.
+"""``STILL_RADPS``, ``STILL_MPS2``: largest standard deviations of gyro and accelerometer readings,
+in rad/s and m/s², that are accepted as rest.
 
-They are ten times the noise; a touched robot exceeds them.
+They are ten times the sensors' noise. A robot that is touched exceeds them.
 """
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
 """``STILL_M``, ``STILL_RAD``: largest displacement, in m and rad, that is accepted as rest: resting
 wheels may report one count back and forth."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
-"""Largest accepted bias: the initial zero-rate output in the MPU-6050 product specification,
-section 6.1."""
+"""Largest accepted bias in rad/s: the initial zero-rate output in the MPU-6050 product
+specification, section 6.1."""
 REFINEMENT: Final = 0.05
-"""Fraction of the bias error that is corrected after each ``BLOCK_S`` at rest. Half of the error is
+"""Fraction of the bias error that is corrected after each second at rest. Half of the error is
 corrected in 14 s."""
 
 
@@ -104,8 +105,8 @@ class GyroCalibration:
     """Measures and refines the gyro's bias.
 
     * ``bias``: mean reading of the gyro at rest, in rad/s.
-    * ``refine``: correct the bias after each ``BLOCK_S`` at rest, if displacements came.
-    * ``answers``: one RequestDone per finished measurement.
+    * ``refine``: whether to correct the bias after each second at rest, if displacements arrive.
+    * ``answers``: one RequestDone for each finished measurement.
     """
 
     def __init__(self, bias: Vector3, *, refine: bool) -> None:

@@ -45,7 +45,7 @@ def gravity_advice(gravity_mps2: float, accel_range_g: int) -> str:
 class ImuScale:
     """The conversion for one range of the accelerometer and one range of the gyro.
 
-    The ranges are keys of ACCEL_COUNTS_PER_G and GYRO_COUNTS_PER_DPS.
+    The ranges are 2, 4, 8 or 16 g, and 250, 500, 1000 or 2000 degrees per second.
     """
 
     accel_range_g: int = 2

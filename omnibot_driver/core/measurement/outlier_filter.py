@@ -3,7 +3,7 @@
 """The outlier filter: it rejects physically impossible readings that arrive in valid frames.
 
 A spike is a single wrong reading: it leaps (changes implausibly much), and the next reading leaps
-back. So the filter holds a reading that leaps until the next one arrives.
+back. Therefore, the filter holds a leaping reading until the next reading arrives.
 docs/internals/architecture.md gives the rules.
 
 This module knows readings and the robot's limits; it does not know bytes or a clock.
@@ -29,31 +29,34 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""A change can be a spike only if it is more than this many times the largest recent step."""
+"""A change between two readings can be a spike only if it is more than this many times as large as
+the largest recent change."""
 CALMING: Final = 0.95
-"""Factor by which the stored largest recent step shrinks with each reading. After 20 readings, a
+"""Factor by which the stored largest recent change shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Largest fraction of an IMU leap that remains in the reading after a spike.
+"""Largest fraction of the leap that remains in the IMU reading after a spike.
 
-If one acceleration leaps alone, the other values also change by at most this fraction.
+If only one acceleration leaps, the other values change by at most this fraction of its leap.
 """
 END_OF_SCALE: Final = 0.99996
-"""Smallest fraction of the full scale that is regarded as the end of the scale. The largest
-positive word is just above this fraction."""
+"""Smallest fraction of the accelerometer's full scale that is regarded as the end of the scale. The
+largest positive reading of 16 bits is just above it."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a leaping displacement, and the poses after it."""
 BACK: Final = 0.25
-"""A leap of a displacement was a spike only if the next displacement leaps back, so that at most
-this fraction of the leap remains."""
+"""A leaping displacement was a spike only if at most this fraction of its leap remains in the next
+displacement."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    * ``force_step_mps2``: largest change between two readings that is never a spike.
-    * ``full_scale_mps2``: of the accelerometer; infinite if its readings are not integers.
+    * ``force_step_mps2``: change of an acceleration between two readings, in m/s², up to which it
+      is never a spike.
+    * ``full_scale_mps2``: full scale of the accelerometer, in m/s²; infinite if its readings are
+      not integers.
     """
 
     fastest_mps: float = 2.0
@@ -194,9 +197,9 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading. If it is a pose, its ``lost`` includes the rejected displacements.
+        """Return the reading. In a pose, add the number of rejected displacements to ``lost``.
 
-        The pose already includes their motion.
+        The pose already includes the motion of these displacements.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -222,7 +225,8 @@ class _Spikes:
     The caller divides each value by the change that is always allowed.
 
     * ``left``: largest fraction of a spike that remains in the next reading.
-    * ``knocked``: number of first values that a knock may change in a single reading.
+    * ``knocked``: how many of the values, from the first on, a knock against the robot may change
+      in a single reading. For these, only a flipped bit is a spike.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -241,8 +245,9 @@ class _Spikes:
     ) -> tuple[bool, bool]:
         """Return whether the previous values were a spike, and whether these values leap.
 
-        ``periods``: since the previous values. ``topmost_bit``: highest bit of the ``knocked``
-        values.
+        ``periods``: number of sampling periods since the previous values.
+
+        ``topmost_bit``: value of the highest bit of the accelerations, scaled like ``values``.
         """
         leaping, self._leaping = self._leaping, None
         was_single = False
@@ -274,7 +279,8 @@ class _Spikes:
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
         """Return whether a flipped bit can explain the step, within the recent variation.
 
-        ``value``: magnitude after the step. False at the end of the scale: a knock can reach it.
+        ``value``: magnitude of the reading after the step. At the end of the scale, the result is
+        False, because a knock can cause such a reading.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -2,8 +2,8 @@
 
 """The measurement pipeline: readings are stamped, checked, integrated, corrected and counted.
 
-``hear`` processes IMU readings at once; the others wait for ``flush``. This module knows readings
-and the parts that process them; it does not know commands or modes.
+The method ``hear`` processes IMU readings at once; other readings wait for the method ``flush``.
+This module knows readings and the parts that process them; it does not know commands or modes.
 """
 
 from collections.abc import Sequence
@@ -86,9 +86,9 @@ class MeasurementPipeline:
         self._clock.restart()
 
     def hear(self, readings: Sequence[Reading], now: float) -> list[ImuEstimate]:
-        """Return the IMU estimates that these readings complete. ``now``: their time of arrival.
+        """Return the IMU estimates that these readings make possible. ``now``: time of arrival.
 
-        Other readings, and IMU readings after them, wait for ``flush``.
+        Readings of another kind, and IMU readings after them, wait for ``flush``.
         """
         estimates: list[ImuEstimate] = []
         edge = self._board.edge

@@ -23,8 +23,8 @@ class StreamStatistics:
 
     Only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
 
-    * ``imu_period_s``: in s, if displacements share the IMU's clock and show lost IMU readings;
-      else None.
+    * ``imu_period_s``: period of the IMU in s, by which displacements show how many IMU readings
+      were lost; None if they do not show this.
     """
 
     imu_period_s: float | None = None

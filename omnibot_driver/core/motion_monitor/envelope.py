@@ -18,29 +18,31 @@ from omnibot_driver.core.motion_monitor.set_point_history import Velocity
 STRETCH: Final = 1.2
 """Largest allowed ratio of speed to set-point.
 
-Users measure the scales by hand, and controllers overshoot.
+Users measure the board's scales by hand, and controllers overshoot.
 """
 NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """``NOISE_MPS``, ``NOISE_RADPS``: speeds outside the hull that are always allowed.
 
-Causes: encoder resolution, rounding, and slopes with a slow controller.
+They are in m/s and rad/s. Encoder resolution, rounding, and slopes with a slow controller cause
+them.
 """
 SIDEWAYS: Final = 0.1
 """Deviation allowed in any direction, as a fraction of the commanded speed or yaw rate.
 
-It is independent of the noise, so the squares are added.
+The deviation is independent of the noise, so the squares of the two are added.
 """
 OVERSHOOT: Final = 0.15
 """Overshoot allowed in any direction, as a fraction of the change of the set-point.
 
-None is allowed if the earlier set-point was rest.
+No overshoot is allowed if the earlier set-point was rest.
 """
 SKEW_RADPS_PER_MPS: Final = 0.1
 SKEW_MPS_PER_RADPS: Final = 0.03
-"""``SKEW_RADPS_PER_MPS``, ``SKEW_MPS_PER_RADPS``: allowed turn per speed, speed per turn.
+"""``SKEW_RADPS_PER_MPS``: yaw rate in rad/s that is allowed for each commanded m/s.
 
-Wheels differ by some per cent.
+``SKEW_MPS_PER_RADPS``: speed in m/s that is allowed for each commanded rad/s. The robot's wheels
+differ by some per cent.
 """
 CHANGING_RADPS_PER_MPS: Final = 0.4
 """Yaw rate in rad/s that is allowed for each m/s by which the set-point changes.
@@ -49,8 +51,8 @@ The wheels accelerate differently.
 """
 
 YAW_MPS_PER_RADPS: Final = NOISE_MPS / NOISE_RADPS
-"""Factor that converts a yaw rate in rad/s to a speed in m/s. It converts ``NOISE_RADPS`` to
-``NOISE_MPS``."""
+"""Factor that converts a yaw rate in rad/s to a speed in m/s: the ratio of the two tolerated noise
+speeds."""
 _DIRECTIONS: Final = tuple(
     (math.cos(angle), math.sin(angle)) for angle in (k * math.tau / 16 for k in range(16))
 )
@@ -62,8 +64,9 @@ def outside(
 ) -> tuple[float, float]:
     """Return how far the motion is outside the envelope, in m/s and in rad/s; <= 0: inside.
 
-    ``explained``: velocities by set-points, current first. An unknown heading leaves linear
-    directions unchecked.
+    ``explained``: velocities that the set-points allow, that of the current set-point first.
+
+    ``heading_known``: if False, the direction of the linear velocity is not checked.
     """
     current_x, current_y, _ = explained[0]
     fastest = change = leaving = left = right = 0.0
@@ -90,7 +93,7 @@ def outside(
 def on_the_way(motion: BodyTwist, setpoints: Sequence[BodyTwist]) -> bool:
     """Return whether the motion is near a set-point or between two successive set-points.
 
-    Such motion is inside the envelope. This quick check precedes ``outside``.
+    Such motion is inside the envelope. This quick check precedes the exact one, ``outside``.
     """
     x, y, yaw = motion.vx_mps, motion.vy_mps, YAW_MPS_PER_RADPS * motion.yaw_rate_radps
     last = setpoints[0]
@@ -122,7 +125,7 @@ def dot(one: BodyTwist, other: BodyTwist) -> float:
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
     """Return how far a velocity is outside the hull, in m/s; 0 or less if it is inside.
 
-    The hull contains rest and all set-points times ``STRETCH``.
+    The hull contains rest and all set-points, multiplied by 1.2 (``STRETCH``).
     """
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:

@@ -14,16 +14,16 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s before a displacement: set-points from then on are compared with its motion.
+"""Time in s before a displacement. Its motion is compared with the set-points from this time on.
 
-A robot clearly slower than all of them is assumed to be held.
+A robot that is clearly slower than all these set-points is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of a limit that one short, or one long, displacement adds to the error.
+"""Largest fraction of the error's limit that one short displacement, or one long one, adds.
 
-So only three displacements in a row, or two long ones, exceed the limit.
+So at least three displacements in a row, or two long ones, are needed to exceed the limit.
 """
 
 
@@ -66,8 +66,9 @@ class FollowingError:
     ) -> None:
         """Add one displacement to the error. If it is inside the envelope, reset the error.
 
-        ``motion``: mean twist in ``seconds`` from ``begun_s`` on. An unknown heading leaves linear
-        directions unchecked.
+        ``motion``: mean twist during ``seconds`` from the time ``begun_s`` on.
+
+        ``heading_known``: if False, the direction of the linear velocity is not checked.
         """
         newest = history.since(begun_s - RISING_S)
         way_mps = turn_radps = 0.0

@@ -26,10 +26,8 @@ LAG_S: Final = 0.4
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
-"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds above which the robot must move.
-
-Without motion for ``BLOCKED_S``, it is regarded as blocked.
-"""
+"""``PLAIN_MPS``, ``PLAIN_RADPS``: commanded speeds, in m/s and rad/s, above which the robot must
+move. If it does not move for 1 s (``BLOCKED_S``), it is regarded as blocked."""
 MOVING_MPS: Final = 0.02
 MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
@@ -140,7 +138,7 @@ class MotionMonitor:
         return fault not in told
 
     def count_refused(self, count: int, now: float) -> Fault | None:
-        """Return the fault that ``REFUSED_IN_A_ROW`` rejected displacements show, or None.
+        """Return the fault that four rejected displacements in a row show, or None.
 
         ``count``: displacements that the outlier filter has rejected since the driver began.
         """
@@ -163,8 +161,9 @@ class MotionMonitor:
     ) -> Fault | None:
         """Return the fault that a displacement shows, or None.
 
-        ``motion``: mean twist in the ``seconds`` before ``stamp_s``. An unknown heading leaves
-        linear directions unchecked.
+        ``motion``: mean twist during the ``seconds`` before ``stamp_s``.
+
+        ``heading_known``: if False, the direction of the linear velocity is not checked.
         """
         self._refused_before = self._refused
         begun_s, current = stamp_s - seconds, self._history.current
@@ -193,7 +192,8 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot that moves outside its envelope.
 
-        Along a set-point (within 60°) it is too fast; otherwise it moves the wrong way.
+        If it moves within 60° of a set-point's direction, it is too fast. Otherwise, it moves in
+        the wrong direction.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -208,7 +208,7 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        A pushed robot is sent Stop ever less often.
+        While a robot is being pushed, Stop is sent at ever longer intervals.
         """
         if not self._error.outside:
             self._stood_s += seconds
@@ -226,7 +226,7 @@ class MotionMonitor:
         return Fault.UNCOMMANDED
 
     def _blocked(self, motion: BodyTwist, seconds: float, *, heading_known: bool) -> Fault | None:
-        """Return the fault of a driven robot that has not moved for ``BLOCKED_S``, else None."""
+        """Return the fault of a robot that has not moved for 1 s although commanded, else None."""
         current = self._history.current
         assert current is not None
         wanted, turning = speed_of(current), current.yaw_rate_radps

@@ -2,7 +2,7 @@
 
 """The history of set-points, and the velocities of the robot that they explain.
 
-A replaced set-point explains its full velocity for ``HELD_S``, then an ever smaller part. This
+For 0.3 s, a replaced set-point explains its full velocity, and then an ever smaller part. This
 module knows velocities and times; it does not know how the robot moves.
 """
 
@@ -23,12 +23,12 @@ tuples more quickly."""
 HELD_S: Final = 0.3
 """Time in s for which a robot may keep the full velocity of a replaced set-point.
 
-Covers the line's delay, a lost repetition, and a controller's dead time.
+This includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant in s of the decay of a replaced set-point after ``HELD_S``.
+"""Time constant in s by which the explained part of a replaced set-point decays after ``HELD_S``.
 
-Covers robots with a time constant up to 0.35 s.
+It is long enough for robots with a time constant of up to 0.35 s.
 """
 FADED_S: Final = 1.1
 """Time in s after which a replaced set-point is ignored. By then, it explains less than 2 % of its

@@ -17,12 +17,12 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST
 MOST_M: Final = 0.6
 """Largest distance in m that a robot is assumed to make up for.
 
-There the controllers' integrators reach their limits.
+At this distance, the integrators of the wheel controllers reach their limits.
 """
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
-A single one does not prove a hold: the robot may have turned round.
+A single long displacement does not prove that the robot is held: it may have turned round.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
@@ -34,7 +34,7 @@ HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""
 BACK_MPS: Final = 0.01
 BACK_RADPS: Final = 0.025
-"""``BACK_MPS``, ``BACK_RADPS``: largest backward speeds of a held robot.
+"""``BACK_MPS``, ``BACK_RADPS``: largest backward speeds of a held robot, in m/s and rad/s.
 
 Faster backward motion does not add to the wind-up.
 """
@@ -52,15 +52,16 @@ class WindUp:
     def __init__(self) -> None:
         self.way_m = 0.0
         self._unproved_m: float | None = None
-        """Distance in m lost in one long displacement; added if the next one is held too.
+        """Distance in m by which the robot fell behind in one long displacement.
 
-        0: held, and already added. None: not held.
+        It is added to the wind-up if the robot is also held in the next displacement. Then it is 0.
+        None if the robot was not held.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Return whether the wind-up explains motion outside the envelope: shorter than ``way_m``.
+        """Subtract motion outside the envelope; return whether the wind-up was large enough for it.
 
-        The motion is always subtracted. ``way_mps``, ``turn_radps``: excess over the envelope.
+        ``way_mps``, ``turn_radps``: excess over the envelope, during ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -83,8 +84,11 @@ class WindUp:
     ) -> None:
         """Add the distance by which a held robot falls behind. Otherwise the wind-up decays.
 
-        ``motion``: mean twist, inside the envelope. ``newest``: set-points not yet reached, the
-        current first.
+        ``motion``: mean twist during ``seconds``; it is inside the envelope.
+
+        ``newest``: set-points that the robot may still be approaching, the current one first.
+
+        ``heading_known``: if False, the direction of the linear velocity is not checked.
         """
         current, lost_mps = newest[0], 0.0
         if current is AT_REST and not self.way_m:

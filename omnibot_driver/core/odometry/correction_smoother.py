@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The published pose, which approaches the corrected pose no faster than the robot could move.
+"""The published pose. It approaches the corrected pose no faster than the robot could move.
 
 This module does not know how the corrections are found.
 """
@@ -50,14 +50,20 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and move ``pose`` along as far as the room allows."""
+        """Move ``target`` by a displacement, and ``pose`` by as much of it as the room allows.
+
+        ``room_m``, ``room_rad``: the most by which ``pose`` may move.
+        """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)
         self.move(chord.times(linear, linear, angular), room_m, room_rad)
         self.target = behind
 
     def follow(self, seconds: float) -> None:
-        """Correct ``pose`` by the part that is due after ``seconds``, as far as the room allows."""
+        """Move ``pose`` by the part of the correction that is due after ``seconds``.
+
+        ``pose`` moves at most by the rest of the possible motion that ``move`` has not used.
+        """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0
         self._settling_s = max(0.0, self._settling_s - seconds)

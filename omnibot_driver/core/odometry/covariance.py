@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The uncertainty of the odometry, from three sources of error that are kept separately.
+"""The uncertainty of the odometry, from three sources of error that are stored separately.
 
-They are the wheels, unreported motion in gaps, and corrections still due.
-docs/internals/architecture.md explains when each shrinks.
+The sources are the wheels, unreported motion in gaps, and corrections still due.
+docs/internals/architecture.md explains when the error of each source shrinks.
 
 This module knows covariances and the wheels' geometry; it does not know frames or boards.
 """
@@ -27,7 +27,7 @@ INITIAL_VARIANCE: Final = 1e-6
 class OdometryNoise:
     """How fast the uncertainty grows. Each wheel has its own errors, which add to the body's error.
 
-    * ``wheel_drift``: standard deviation of a wheel after 1 m of rim motion, in m.
+    * ``wheel_drift``: standard deviation of a wheel's random error after 1 m of rim motion, in m.
     * ``wheel_scale``: standard deviation of a wheel's relative size error.
     * ``wheel_slip``: mean slip of all wheels, as a fraction of the distance.
     * ``wheels``: geometry with a wheel radius of 1 m, so that wheel rates are rim speeds in m/s.
@@ -72,7 +72,7 @@ class Covariance:
     def with_errors(self, errors: Iterable[tuple[float, float, float, float]]) -> "Covariance":
         """Return the covariance after adding independent errors, each as (variance, x, y, yaw).
 
-        Each is the vector (x, y, yaw) times a random number.
+        An error is the vector (x, y, yaw) times a random number with this variance.
         """
         xx = xy = x_yaw = yy = y_yaw = yaw_yaw = 0.0
         for variance, x, y, yaw in errors:
@@ -124,7 +124,8 @@ class Uncertainty:
     def move(self, heading_rad: float, tangent: Pose) -> None:
         """Move the body along a tangent (twist x time), and add the errors of its wheels.
 
-        ``heading_rad``: before the move. Plain numbers are used, because Pose objects are slow.
+        ``heading_rad``: heading before the move. The code uses plain numbers, because Pose objects
+        are slow.
         """
         if not (tangent.x_m or tangent.y_m or tangent.yaw_rad):
             return
@@ -155,9 +156,10 @@ class Uncertainty:
             self.gap = self.gap.carried(dx_m, dy_m)
 
     def miss(self, duration_s: float, fastest_mps: float, fastest_radps: float) -> None:
-        """Add a gap in the reports. The fastest speeds limit the motion in it.
+        """Add the uncertainty of a gap in the reports, of ``duration_s``.
 
-        Accelerating and braking in the gap deviates by at most a·t²/4 from constant speed.
+        The fastest speeds limit the motion in the gap. If the robot accelerates and brakes in time
+        t with acceleration a, it deviates by at most a·t²/4 from a motion at constant speed.
         """
         square = duration_s * duration_s / 4
         self.gap += Covariance.diagonal(

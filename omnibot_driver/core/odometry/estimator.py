@@ -2,9 +2,9 @@
 
 """The odometry estimator: from displacements and the board's own poses to pose, twist, covariance.
 
-``_board`` is the robot's pose in the board's frame; the CorrectionSmoother has its pose in the
-odometry frame. Both move by the same tangents, so the board's next pose recovers lost motion. This
-module knows SE(2); it does not know bytes, clocks or ROS.
+The robot's pose is stored twice: in the board's frame (``_board``), and in the odometry frame (in
+the CorrectionSmoother). Both poses move by the same tangents (twist x time), so the board's next
+pose shows lost motion. This module knows SE(2); it does not know bytes, clocks or ROS.
 """
 
 import math
@@ -24,7 +24,7 @@ from omnibot_driver.core.values import value
 LONGEST_WAIT_S: Final = 1.0
 """Longest time, in s of the board's clock, to wait for a pose that gives the heading.
 
-Then an unconfirmed pose's heading, or 0, is assumed.
+Afterwards, the heading of an unconfirmed pose is assumed, or 0 without any pose.
 """
 LONG_GAP_S: Final = 1.0
 """Duration of lost displacements, in s, above which the next displacements wait for a pose that
@@ -44,8 +44,9 @@ in this time."""
 class OdometrySettings:
     """The settings of the odometry.
 
-    * ``use_board_pose``: the board's poses correct the odometry; else only the initial heading.
-    * ``fastest_mps``, ``fastest_radps``: never exceeded, even by a pushed robot.
+    * ``use_board_pose``: whether the board's poses correct the odometry. If not, only the initial
+      heading comes from them.
+    * ``fastest_mps``, ``fastest_radps``: speeds that even a pushed robot does not exceed.
     * ``linear_scale``, ``angular_scale``: true distance and turn, divided by the board's.
     """
 
@@ -61,10 +62,11 @@ class OdometrySettings:
 class OdometryEstimate:
     """The odometry at ``stamp_s``: pose and covariance in the odometry frame, twist in body axes.
 
-    * ``twist``: None if the duration is unknown.
+    * ``twist``: None if the duration of the displacement is unknown.
     * ``rolled``: sum of the tangents (twist x time) of all motion so far, in the board's axes.
-    * ``rolling``: rate of ``rolled``; None if unknown.
-    * ``twist_variances``: linear in m²/s², angular in rad²/s²; None: the parameters' values.
+    * ``rolling``: twist in the board's axes, by which ``rolled`` changes; None if unknown.
+    * ``twist_variances``: linear in m²/s², angular in rad²/s². If None, the values of the
+      parameters are published.
     """
 
     stamp_s: float
@@ -79,7 +81,8 @@ class OdometryEstimate:
 class Odometry:
     """The odometry of one robot.
 
-    * ``axis_signs``: convert the board's body axes, not its earth frame, to REP-103.
+    * ``axis_signs``: factors that convert the board's body axes to REP-103. They do not apply to
+      its earth frame.
     """
 
     def __init__(self, settings: OdometrySettings, axis_signs: Signs = (1, 1, 1)) -> None:
@@ -99,7 +102,7 @@ class Odometry:
 
     @property
     def refused_poses(self) -> int:
-        """Number of poses that were impossible, or that the next pose did not confirm."""
+        """Number of poses that were impossible, or unexpected and not confirmed by the next one."""
         return self._belief.refused
 
     def configure(self, settings: OdometrySettings) -> None:
@@ -171,9 +174,10 @@ class Odometry:
         return estimates
 
     def in_board_frame(self, place: Pose) -> Pose | None:
-        """Convert ``place`` from the odometry frame into the board's frame, by the shorter turn.
+        """Convert ``place`` from the odometry frame into the board's frame.
 
-        Return None before a pose of the board has related the frames.
+        From the robot's present heading, the result needs the shorter turn. Return None before a
+        pose of the board has shown how the frames are related.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -247,10 +251,10 @@ class Odometry:
         self._board, self._restarted, self._belief.doubted = board, None, None
 
     def _judge(self, told: Pose, confirmed: bool) -> None:
-        """Accept a pose, or keep it as ``doubted`` until the next pose.
+        """Accept a pose of the board, or keep it as ``doubted`` until the next pose.
 
-        A pose that is reachable and expected is accepted, and so is one that confirms the last
-        doubted pose. If that one is unreachable, only the relation of the frames changes.
+        A pose is accepted if it is reachable and expected, or if it confirms the last doubted pose.
+        If the accepted pose is unreachable, the board's frame has moved, not the robot.
         """
         assert self._board is not None
         way = self._board.way_to(told)
@@ -303,7 +307,10 @@ class Odometry:
         return OdometryEstimate(stamp_s, follower.pose, twist, covariance, track.rolled, rolling)
 
     def _cross(self, tangent: Pose, seconds: float, stamped_s: float = math.inf) -> None:
-        """Add assumed motion for a gap; see ``PoseTracker.move`` for ``stamped_s``."""
+        """Add assumed motion for a gap that lasted ``seconds``.
+
+        ``stamped_s``: duration of the gap by the stamps before and after it, in s.
+        """
         if self._board is not None:
             self._board = self._board.moved(roll(tangent))
         self._belief.bridged(roll(tangent))
@@ -317,7 +324,10 @@ class Odometry:
             self._cross(tangent.times(lost, lost, lost), lost * period_s)
 
     def _move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Move along a tangent in the board's body axes; see ``PoseTracker.move``."""
+        """Move along a tangent (twist x time) in the board's body axes, which took ``seconds``.
+
+        ``stamped_s``: the same duration, in s, by the stamps before and after.
+        """
         self._track.move(tangent, seconds, stamped_s)
         self._belief.passed(seconds)
 

@@ -34,8 +34,8 @@ class GapInterpolation:
     ) -> tuple[Pose, Pose]:
         """Return the tangents of the lost displacements and of ``reading``, in body axes.
 
-        A tangent is twist x time. ``heading_rad``: before the losses; None before any pose:
-        readings count as body axes.
+        A tangent is twist x time. ``heading_rad``: heading before the losses. If it is None,
+        because no pose has arrived, readings are taken to be in body axes.
         """
         last, self.last = self.last, None
         if reading.duration_s is None:

@@ -31,7 +31,7 @@ class PendingDisplacements:
         return waiting
 
     def forget_losses(self) -> None:
-        """Set ``lost`` to 0: the motion of the lost displacements is known now."""
+        """Set ``lost`` to 0, because the motion of the lost displacements is known now."""
         if self._waiting:
             reading, stamp_s = self._waiting[0]
             self._waiting[0] = replace(reading, lost=0), stamp_s
@@ -54,7 +54,7 @@ class PendingDisplacements:
     def unheard_s(self, last_stamp_s: float | None) -> float:
         """Return the time in s without a report before the first waiting displacement.
 
-        ``last_stamp_s``: stamp before the gap; used if the displacement has no duration.
+        ``last_stamp_s``: stamp before the gap, which is used if the displacement has no duration.
         """
         if not self._waiting:
             return 0.0
@@ -66,7 +66,7 @@ class PendingDisplacements:
     def unstamped_s(self, last_stamp_s: float | None) -> float:
         """Return the duration of the gap in s according to the stamps, but at most ``unheard_s``.
 
-        The gap lasts from ``last_stamp_s`` to the begin of the first waiting displacement.
+        The gap lasts from ``last_stamp_s`` to the beginning of the first waiting displacement.
         """
         unheard_s = self.unheard_s(last_stamp_s)
         if not self._waiting or last_stamp_s is None:

@@ -2,8 +2,8 @@
 
 """The gate for the board's poses: accepts a pose that is finite, reachable and as expected.
 
-The next pose must confirm an unexpected one. This module knows poses and gaps; it does not know
-what an accepted pose changes.
+An unexpected pose is accepted only if the next pose confirms it. This module knows poses and gaps;
+it does not know what an accepted pose changes.
 """
 
 import math
@@ -16,10 +16,8 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations above which a pose must be confirmed.
-
-Possible motion in open gaps is added.
-"""
+"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations from the expected pose, in m and rad, above
+which the next pose must confirm a pose. The possible motion in open gaps is added to them."""
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
@@ -31,12 +29,13 @@ class PoseGate:
     """Decides which poses of the board are accepted.
 
     * ``proved``: the last accepted pose; None if there is no valid one.
-    * ``doubted``: the unexpected pose to confirm, moved along with the robot; or None.
+    * ``doubted``: the unexpected pose that the next pose must confirm, moved along with the robot;
+      None if there is none.
     """
 
     def __init__(self) -> None:
         self.refused = 0
-        """Number of poses that were impossible, or that the next pose did not confirm."""
+        """Number of poses that were impossible, or unexpected and not confirmed by the next one."""
         self.proved: Pose | None = None
         self.doubted: Pose | None = None
         self._unproved_s = 0.0
@@ -78,7 +77,9 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached a pose since the last accepted one.
 
-        ``seconds``: added to the time recorded by ``passed``. ``mps``, ``radps``: largest speeds.
+        ``seconds``: time in s in addition to the time that ``passed`` has recorded.
+
+        ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.
         """
         if self.proved is None:
             return False

@@ -4,7 +4,7 @@
 
 Inputs are tangents (twist x time) as the board reports them: in the board's axes, computed with
 assumed wheel sizes. Outputs are in REP-103's axes, with true distances and turns. This module does
-not know which of the board's reports to believe.
+not know which of the board's reports are right.
 """
 
 from typing import Final
@@ -51,7 +51,10 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Return the twist of a motion that took ``seconds``, in REP-103's and the board's axes."""
+        """Return the twist of a motion that took ``seconds``, first in REP-103's axes.
+
+        The second result is the same twist in the board's axes.
+        """
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:
             return rolling, rolling
@@ -60,16 +63,17 @@ class PoseTracker:
     def way_to(self, place: Pose) -> Pose:
         """Return the tangent from the robot's pose to ``place``, by the shorter turn.
 
-        The tangent is as the board reports it: in its body axes, not yet corrected by ``scale``.
+        A tangent is twist x time. It is as the board reports it: in the board's body axes, not yet
+        corrected by ``scale``.
         """
         x, y, yaw = self._signed_size
         return log_of(self.follower.target.way_to(place)).times(1 / x, 1 / y, 1 / yaw)
 
     def move(self, tangent: Pose, seconds: float, stamped_s: float) -> None:
-        """Move along a tangent that took ``seconds``.
+        """Move along a tangent (twist x time) that took ``seconds``.
 
-        ``stamped_s``: time between the stamps before and after, in s. It limits the step of the
-        published pose.
+        ``stamped_s``: time between the stamps before and after the motion, in s. It limits the step
+        of the published pose.
         """
         follower, chord = self.follower, roll(self._part(tangent))
         move = follower.move if stamped_s >= seconds else follower.trail

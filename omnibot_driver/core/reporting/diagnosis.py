@@ -26,7 +26,7 @@ LARGEST_SKEW_PPM: Final = 115.0
 SKEW_KNOWN_S: Final = 75.0
 """Time in s for which one arrival time affects the estimated clock skew.
 
-A shorter skew may come from a busy computer, so it is not reported.
+A skew that lasts for a shorter time may come from a busy computer, so it is not reported.
 """
 
 BUSY_SHARE: Final = 0.1

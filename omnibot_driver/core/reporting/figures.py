@@ -16,8 +16,9 @@ class LinkFigures:
 
     * ``trouble``: why the port is not open, as a sentence; empty while open.
     * ``opened``: how often the port was opened.
-    * ``overruns``: how often the kernel lost bytes since the opening; None: not counted.
-    * ``waited_s``: the reader's wait for the processor, in s; None: not counted.
+    * ``overruns``: how often the kernel lost bytes since the opening; None if not counted.
+    * ``waited_s``: total time for which the reader thread waited for the processor, in s; None if
+      not counted.
     """
 
     port: str
@@ -42,7 +43,7 @@ class CommandFigures:
     """The figures of the commands.
 
     * ``source``: the topic that commands the robot now, or None.
-    * ``age_s``: age in s of its last command.
+    * ``age_s``: age in s of the last command from that topic.
     * ``trips``: how often the motion monitor has stopped the robot.
     * ``interlock``: why motion is refused, with a remedy; empty if allowed.
     """
@@ -60,7 +61,8 @@ class CommandFigures:
 class ImuFigures:
     """The figures of the IMU.
 
-    * ``gravity_mps2``, ``noise_radps``: at the last standstill; None before the first.
+    * ``gravity_mps2``, ``noise_radps``: gravity and the gyro's noise, measured at the last
+      standstill; None before the first.
     * ``advice``: names the parameter that contradicts the measured gravity; or empty.
     """
 

@@ -2,7 +2,7 @@
 
 """Notices about lost data, unconfirmed stops and silence, each with a remedy.
 
-Each is given once or at a limited rate. This module knows counts, times and texts only.
+A notice is given only once, or at a limited rate. This module knows only counts, times and texts.
 """
 
 import math
@@ -56,7 +56,7 @@ class ThrottledNotice:
     def since_told(self, count: int, now: float) -> int:
         """Return how much the counter has grown since its last report, if a new report is due.
 
-        Return 0 within ``NEWS_S`` of the last report.
+        Return 0 if the last report is less than 10 s old (``NEWS_S``).
         """
         if count == self._told or now - self._told_at < NEWS_S:
             return 0
@@ -77,7 +77,9 @@ class Notices:
     def counted(self, lost: int, overruns: int, refused: Refused, now: float) -> list[str]:
         """Return notices of lost frames and rejected readings that were not reported before.
 
-        All counts are totals. ``lost``: odometry frames. ``overruns``: of the serial port.
+        All counts are totals since the driver began. ``lost``: lost odometry frames.
+
+        ``overruns``: how often the serial port overran, so that the computer lost bytes.
         """
         news = []
         if overruns != self._overruns:
@@ -106,10 +108,11 @@ class Notices:
         return [sentence]
 
     def unconfirmed(self, mode: Mode, *, measured: bool, blind: bool = False) -> list[str]:
-        """Return the notice that a stop is unconfirmed: Stop was repeated in vain.
+        """Return the notice that a stop is unconfirmed, although Stop was repeated.
 
-        ``measured``: displacements arrived. ``blind``: the board did not measure its wheels after
-        the last command.
+        ``measured``: whether displacements have arrived since Stop.
+
+        ``blind``: whether the board did not measure its wheels after the last command.
         """
         if mode is Mode.IMU_ONLY:
             return self.once(STOP_UNSEEN)
@@ -131,7 +134,7 @@ class Notices:
 def why_silent(silence_s: float, *, bytes_came: bool, baudrate: bool) -> str:
     """Return a sentence that reports missing data and says what to check.
 
-    ``bytes_came``: invalid bytes arrived. ``baudrate``: the port has a baud rate.
+    ``bytes_came``: whether invalid bytes arrived. ``baudrate``: whether the port has a baud rate.
     """
     if bytes_came:
         return (

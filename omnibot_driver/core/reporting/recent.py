@@ -14,8 +14,7 @@ RECENT_S: Final = 10.0
 
 
 class RecentFigures:
-    """The figures since the session's state last changed, at most those of the last
-    ``RECENT_S``."""
+    """The figures of the last 10 s, but only those since the session's state last changed."""
 
     def __init__(self) -> None:
         self._counts: dict[str, tuple[int, float]] = {}
@@ -31,7 +30,7 @@ class RecentFigures:
             self._window.popleft()
 
     def grew(self, name: str, count: int, now: float) -> bool:
-        """Store ``count`` for ``name``; return whether it has grown in the last RECENT_S."""
+        """Store ``count`` as the counter ``name``; return whether it has grown in the last 10 s."""
         before, at = self._counts.get(name, (count, -math.inf))
         if count > before:
             at = now

@@ -18,7 +18,7 @@ SMALLEST_STEP_S: Final = 1e-6
 class ArrivalClock:
     """Stamps readings with their arrival time, in increasing order.
 
-    A stamp exceeds the arrival only if the previous stamp reached it.
+    A stamp is later than the arrival only if the previous stamp already equals the arrival time.
     """
 
     skew_ppm = 0.0

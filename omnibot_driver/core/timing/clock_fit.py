@@ -17,9 +17,9 @@ from typing import Final
 BLOCK_TICKS: Final = 100
 """Number of ticks in a block: one second of 10 ms ticks."""
 BLOCKS_KEPT: Final = 75
-"""Number of blocks that are kept: 75 s.
+"""Number of blocks that are kept: 75 s of 10 ms ticks.
 
-If an adapter's timer is 100 ppm off, its phase to the tick repeats every 20 s.
+If an adapter's timer is 100 ppm off, its phase relative to the tick repeats every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
@@ -27,7 +27,7 @@ margin."""
 SUPPORT: Final = 0.75
 """Place at which the fitted clock touches the points' hull, as a fraction of the hull's time span.
 
-A later place follows the recent points more closely. An earlier place is less affected by jitter.
+With a larger fraction, the clock follows recent points more closely, but jitter affects it more.
 """
 FEWEST_READS: Final = 12
 """Smallest number of reads in a block from which a lower bound is derived. With fewer reads, the
@@ -36,9 +36,9 @@ LATE_PART: Final = 0.1
 """Largest assumed fraction of late reads. A read is late if its delay exceeds ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest distance of an earliest point below a latest point, as a fraction of a period.
+"""Largest accepted distance of an earliest point below a latest point, as a fraction of a period.
 
-A 16 ms timer in the adapter causes 2 ms, a fifth of the tick.
+With a 16 ms timer in the adapter, the distance is 2 ms, a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]
@@ -48,7 +48,7 @@ Point = tuple[int, float]
 class ClockFit:
     """The fitted clock, which gives the time of each tick, from the first tick seen on.
 
-    * ``slope_s``: the fitted period in s; ``period_s`` is nominal.
+    * ``slope_s``: the fitted period of the ticks in s. ``period_s``: the nominal period.
     """
 
     def __init__(self, period_s: float, first: Point) -> None:
@@ -71,7 +71,7 @@ class ClockFit:
 
         The tick is the newest one of a read.
 
-        ``cut``: the read ended within this tick's sample.
+        ``cut``: whether the read ended within this tick's sample.
         """
         tick, arrival = latest
         anchor_tick, anchor_s = self._anchor
@@ -105,7 +105,10 @@ class ClockFit:
             self._lay_under()
 
     def _height(self, point: Point) -> float:
-        """Return the time in s of a point, minus ``slope_s`` times its tick."""
+        """Return the time of a point, minus the fitted period times the number of its tick, in s.
+
+        Of two points, the lower one has the smaller result.
+        """
         return point[1] - self.slope_s * point[0]
 
     def _within_skew(self, slope_s: float) -> float:
@@ -139,7 +142,7 @@ class ClockFit:
     def _lay_under(self) -> None:
         """Place the fitted clock under the latest points, along an edge of their lower convex hull.
 
-        This edge is at the fraction ``SUPPORT`` of the hull's time span.
+        This edge is at three quarters of the hull's time span (``SUPPORT``).
         """
         cut = [at for at, was_cut in self._latest if was_cut]
         hull = _hull(cut or [at for at, _ in self._latest])

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Sampling times from arrival times: the board's clock, as seen by the host's clock.
+"""Computes sampling times from arrival times: the board's clock, as seen by the host's clock.
 
 Ticks are counted. ``ClockFit``, the *fitted clock*, gives their times. One constant error remains:
 the smallest delay that ever occurs. docs/internals/time.md explains why.
@@ -30,16 +30,17 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
-An adapter with a timer of 16 ms reads at five phases of the tick. 12 reads have each phase twice.
+An adapter with a timer of 16 ms reads at five phases of the tick. Each phase occurs twice in 12
+reads.
 """
 CALM: Final = 0.45
-"""Largest difference from the fitted clock, in periods, of a read whose tick is certain.
+"""Largest difference from the fitted clock, in periods, of a read whose tick number is certain.
 
-The previous read must be as near to the fitted clock. Keep the value below 0.5.
+The previous read must also be this near to the fitted clock. Keep the value below 0.5.
 """
 LARGEST_RISE: Final = 0.02
-"""Fraction by which the step from one stamp to the next may exceed the period. So if a new fit
-makes the fitted clock later, the stamps approach it slowly."""
+"""Fraction by which the step from one stamp to the next may exceed the period. If a new fit makes
+the fitted clock later, the stamps therefore approach it slowly."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two stamps, used if the arrival times leave no more room."""
 
@@ -48,9 +49,9 @@ WHOLE: Final = SampleBoundary(ahead=0, latest_s=0.0, earliest_s=0.0)
 
 
 class DeviceClock:
-    """Stamps readings with the times at which the board sampled them, estimated from arrivals.
+    """Stamps readings with their sampling times, which it estimates from arrival times.
 
-    The board sends one ImuReading per tick of ``period_s`` (nominal).
+    In each tick, the board sends one ImuReading. ``period_s``: nominal period of the ticks, in s.
     """
 
     def __init__(self, period_s: float) -> None:
@@ -72,22 +73,27 @@ class DeviceClock:
         self._seen_tick: int | None = None
         self._settled = False
         self._calm: ClockFit | None = None
-        """The fitted clock if the last read was near it and cut no sample, else None."""
+        """The fitted clock, if the last read was near to it and ended with a complete sample.
+
+        Otherwise None, and the fast path is not used.
+        """
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
-        Two new ticks within half a period had both waited to be read.
+        If the next new tick is seen within half a period, both ticks had waited to be read.
         """
         self._awaited: Point | None = None
-        """Lower bound for the tick after the newest one: at this time in s, it had not arrived
-        yet."""
+        """Lower bound for the time of the tick after the newest one: at this time in s, that tick
+        had not arrived yet."""
         self._cut_off: Point | None = None
-        """Lower bound for the tick whose sample the last read cut, or None.
+        """Lower bound for the time of the tick whose sample was incomplete in the last read.
 
-        Valid only if the rest of the sample arrives.
+        None if the last read ended with a complete sample.
+
+        The bound is valid only if the rest of the sample arrives.
         """
 
     @property
@@ -101,8 +107,9 @@ class DeviceClock:
     ) -> list[float]:
         """Return the sampling time in s of each reading. Their last bytes were read at ``now``.
 
-        Stamps increase from tick to tick, up to ``now``. A displacement has its tick's stamp.
-        ``edge``: end of the read.
+        Stamps increase from tick to tick, up to ``now``. A displacement has the stamp of its tick.
+
+        ``edge``: where the read ended, relative to the board's samples; None if unknown.
         """
         ticks = self._count(readings)
         if ticks and ticks.count(ticks[0]) == len(ticks) and isinstance(readings[0], ImuReading):
@@ -136,7 +143,8 @@ class DeviceClock:
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """Return the stamp in s of one reading that came alone and on time, else None.
 
-        This is the fast path. After None, nothing has changed: call ``stamps``.
+        This is the fast path. If the result is None, nothing has changed, and the caller must call
+        ``stamps``.
         """
         if reading.lost:
             return None
@@ -181,7 +189,7 @@ class DeviceClock:
         return ticks
 
     def _missing(self, reading: DisplacementReading) -> int:
-        """Return how many more ticks the counter in the displacements shows than were counted."""
+        """Return how many more ticks the displacement's counter shows than were counted so far."""
         if self._displaced_tick is None or reading.duration_s is None:
             return 0
         self._displacement_ticks = round(reading.duration_s / self._period_s)
@@ -191,8 +199,9 @@ class DeviceClock:
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
         """Compare the newest arrival with the fitted clock, and correct the count of the ticks.
 
-        Return the correction: positive if ticks were lost but not counted. ``counted``: whether
-        displacements confirm the tick's number.
+        Return the correction in ticks: positive if ticks were lost but not counted.
+
+        ``counted``: whether displacements in this read confirm the number of the tick.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:
@@ -239,8 +248,8 @@ class DeviceClock:
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record a new tick that was read at ``now``.
 
-        ``lag_s``: how much later it arrived than the fitted clock says, in s. Of ticks read
-        together, only the last delay is kept.
+        ``lag_s``: how much later the tick arrived than by the fitted clock, in s. Of ticks that
+        were read together, only the delay of the last one is stored.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -255,7 +264,10 @@ class DeviceClock:
     def _stamp(self, tick: int, latest_s: float, room_s: float) -> None:
         """Set a tick's stamp by the fitted clock, but limit the step from the last stamp.
 
-        ``latest_s``: latest allowed stamp. ``room_s``: step that leaves room for later stamps.
+        ``latest_s``: latest allowed stamp, in s.
+
+        ``room_s``: step from the last stamp, in s, that leaves room for the stamps of later
+        readings.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
