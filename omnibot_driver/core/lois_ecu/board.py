@@ -44,8 +44,8 @@ RESET_AGAIN_S: Final = 0.9
 """Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four groups
 of ticks have arrived."""
 STEADY_S: Final = 0.3
-"""Tick counts are steady if unchanged for this time in s. It exceeds the usual period of the
-ticks."""
+"""Time in s for which unchanged tick counts are regarded as steady. The usual period of the ticks
+is shorter."""
 
 
 class LoisEcuBoard(Board):
@@ -113,7 +113,7 @@ class LoisEcuBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode ``data``, and return the readings that its bytes complete.
 
-        If only ``mode`` changes, the result is ``NOTHING_MEASURED``.
+        If only ``mode`` changes, return the placeholder reading ``NOTHING_MEASURED``.
         """
         before = self.mode
         readings = self._read(self._ecu.receive(data, now))
@@ -184,7 +184,7 @@ class LoisEcuBoard(Board):
         return [ResetReading(proof.remark)]
 
     def _tangent(self, fused: FusedOdometry) -> Pose:
-        """Return how far the robot moved forward and turned since the last estimate."""
+        """Return how far the robot moved forward (m) and turned (rad) since the last estimate."""
         left_m, right_m = fused.wheel_ways_m
         sign = -1.0 if self.settings.inverted else 1.0
         return Pose((left_m + right_m) / 2, 0.0, sign * (right_m - left_m) / self.settings.track_m)
@@ -213,14 +213,14 @@ class LoisEcuBoard(Board):
     def leave(self) -> None:
         """Make ``due`` return nothing from now on.
 
-        So the driver's last Stop is the last line that is sent.
+        The driver's last Stop is then the last line that is sent.
         """
         self._leaving = True
 
     def due(self, now: float) -> Packets:
         """Return the lines to write now.
 
-        They are settings, repeated resets, the ball command, and RPM 0/0 after a Stop.
+        Such lines are settings, repeated resets, the ball command, and RPM 0/0 after a Stop.
         """
         if self._leaving:
             return NO_PACKETS
@@ -270,7 +270,7 @@ class LoisEcuBoard(Board):
         return packed(self._ecu.stop())
 
     def emergency_stop(self) -> Packets:
-        """Return RPM 0/0, because the board has no e-stop command.
+        """Return the set-points RPM 0/0, because the board has no e-stop command.
 
         In a terminal mode, return nothing.
         """
@@ -310,12 +310,12 @@ class LoisEcuBoard(Board):
         self._ecu.say(SetLed(on), now)
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Request a record from the board. Later, a RecordReading or a RecordFailed is returned.
+        """Request a record. A later reading contains the record, or the reason of a failure.
 
         Raises RequestRefused if the board could not complete the record.
         """
         self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
-        """Send the ball command only once, because a repetition would distribute another ball."""
+        """Make ``due`` return the ball command once. A repetition would distribute another ball."""
         self._once += packed(self._ecu.distribute_ball())

@@ -2,7 +2,8 @@
 
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-- Public firmware: odometry follows the ticks (0x12). Only wheels that are commanded forward count.
+- Public firmware: odometry follows the ticks (0x12). Ticks count only while a wheel is commanded
+  forward.
 - Manual: odometry has its own command byte (0x20). Ticks count both ways.
 
 This module works on changes of the counts and on the order of groups.
@@ -15,10 +16,10 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of groups of ticks without odometry directly after them. From this number on, odometry
-with its own command byte shows a board as in the manual."""
+"""Number of groups of ticks that no odometry follows directly. If odometry with its own command
+byte arrives after them, the board works as in the manual."""
 UNCOUNTED_M: Final = 0.06
-"""Distance in m, both wheels added. If wheels roll backward this far and no count falls, ticks do
+"""Sum of both wheels' distances in m. If wheels roll backward this far and no count falls, ticks do
 not count backward."""
 
 
@@ -58,7 +59,10 @@ class BoardKind:
             motion.signed |= self._lone_ticks >= LONE_TICKS
 
     def watch(self, told: Told | None) -> None:
-        """Detect that ticks do not count backward: a wheel rolls backward, but no count falls."""
+        """Detect that ticks do not count backward: a wheel rolls backward, but no count falls.
+
+        ``told``: changes in the board's own odometry, None if unknown.
+        """
         if told is None or not self._motion.signed or self._seen_signed:
             return
         for index, wheel in enumerate(self._motion.wheels):

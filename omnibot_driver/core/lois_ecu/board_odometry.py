@@ -21,11 +21,11 @@ MOST_RPM: Final = 150.0
 class Told:
     """Changes that a group of odometry (0x20) reports since the group before.
 
-    ``turned_m``: distance of the right rim minus that of the left rim.
+    ``turned_m``: distance of the right rim minus that of the left rim, in m.
 
-    ``along_m``: distance of the middle of the axle.
+    ``along_m``: distance of the middle of the axle, in m.
 
-    ``speeds_mps``: left and right rim. None if the velocity does not result from whole RPM.
+    ``speeds_mps``: speeds of the left and right rim. None unless they are whole RPM.
     """
 
     turned_m: float

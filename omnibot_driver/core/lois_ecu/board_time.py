@@ -2,7 +2,8 @@
 
 """Estimation of the delay with which a group of ticks was read, from the board's time in the group.
 
-Two clocks are fitted: always running (manual), or stopped while sending (public firmware).
+Two models of the board's clock are fitted. In one, the clock always runs (manual). In the other, it
+stops while the board sends (public firmware).
 
 This module works on clock counts, numbers of lines and arrival times.
 """
@@ -18,7 +19,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored groups: usually five seconds, in which an error of 100 ppm adds 0.5 ms."""
+"""Number of stored groups. They usually cover five seconds, in which a clock error of 100 ppm adds
+0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s. A longer delay means that the board has restarted, or that its
@@ -28,8 +30,8 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Groups that arrive within this time in s were probably read together after a pause. Only the
-last, with the smallest delay, is stored."""
+"""Groups that arrive within this time in s were probably read together after a pause. Only the last
+of them is stored, because its delay is the smallest."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -100,7 +102,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height of each point above a straight line that touches the points from below."""
+    """Return the height in s of each point above a straight line that no point is below."""
     half = len(kept) // 2
     points = list(kept)
     # A read may be late but never early, so the line lies below all arrivals. Its slope is that

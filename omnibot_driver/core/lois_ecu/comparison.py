@@ -41,21 +41,21 @@ ALONG_VARIANCE: Final = 0.15
 heading and distance in 0x20 (odometry), in squared ticks."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual of a count, in ticks, above which the wheel's speed has changed without a new
-set-point."""
+"""Residual of a count (reported minus expected), in ticks, above which the wheel's speed is assumed
+to have changed without a new set-point."""
 SAME_TICKS: Final = 0.6
-"""Smallest residual, in ticks, at which an unchanged count is used. At a smaller residual, the next
-tick may not be due yet."""
+"""Smallest residual (reported minus expected count), in ticks, at which an unchanged count corrects
+the filter. At a smaller residual, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP``, ``LEAP_M``: limits of a heading's residual, in standard deviations and m at the rims.
-Beyond both, the board has added up an old speed."""
+"""``LEAP``, ``LEAP_M``: limits of the reported minus the expected heading, in standard deviations
+and in m at the rims. Beyond both, the board has computed the heading from an old speed."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
 """``BLIND_M``, ``SWINGING_M``: standard deviation in m that 1 m without ticks adds to a wheel's
-distance. The second is for an oscillating speed."""
+distance. ``SWINGING_M`` is for an oscillating speed."""
 SWERVED_M: Final = 0.05
 """Standard deviation in m that 1 m at an oscillating speed adds to the position, in addition to
 ``SWINGING_M``."""

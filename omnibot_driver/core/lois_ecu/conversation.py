@@ -85,7 +85,7 @@ class LoisConversation:
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
         """Return the readings that ``data`` completes.
 
-        Called also with b"" at the time ``held_until``.
+        Must also be called with b"" at the time ``held_until``.
         """
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
@@ -250,7 +250,7 @@ class LoisConversation:
         return self._lines(outbound.STOP)
 
     def emergency_stop(self) -> bytes:
-        """Return RPM 0/0. In a terminal mode, return nothing.
+        """Return the set-points RPM 0/0. In a terminal mode, return nothing.
 
         In a terminal mode, the driver sends only Stop: the public firmware then reads at most 480
         characters a second.
@@ -260,14 +260,16 @@ class LoisConversation:
     def velocity(self, twist: BodyTwist) -> bytes:
         """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
 
-        Stop if it rounds to zero. Raises CommandRefused while a mode or its change forbids motion.
+        Return Stop if the velocity rounds to zero. Raises CommandRefused while a mode or its change
+        forbids motion.
         """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Return the lines that command the rates of the left and right wheel, in rad/s.
 
-        Stop if both round to zero. Raises CommandRefused while a mode or its change forbids motion.
+        Return Stop if both rates round to zero. Raises CommandRefused while a mode or its change
+        forbids motion.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")

@@ -2,8 +2,8 @@
 
 """Decoder that turns a stream of bytes into reports.
 
-A line begins at the last ``:`` before its line feed. The module reads no clock, and no input raises
-an error. Fewer than ``LONGEST_LINE`` bytes are held.
+A line begins at the last ``:`` before its line feed. The decoder stores fewer than ``LONGEST_LINE``
+bytes of an unfinished line. The module reads no clock, and no input raises an error.
 """
 
 from dataclasses import dataclass, field
@@ -41,7 +41,7 @@ class LoisDecoder:
 
     ``terminal``: whether text is a sensor's line instead of damage.
 
-    ``times``: arrival time of each report's last line, for the last call.
+    ``times``: for each report of the last call, the time in s at which its last line arrived.
     """
 
     def __init__(self, *, sum_required: bool = True) -> None:
@@ -55,7 +55,7 @@ class LoisDecoder:
 
     @property
     def statistics(self) -> DecoderStatistics:
-        """Counters.
+        """Counters of lines, faults and groups.
 
         To continue the counters of an earlier decoder, assign them before the first data.
         """

@@ -10,8 +10,8 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
-"""Data from which the motion since the last estimate is known. "standing" means that the robot is
-at rest."""
+"""Data from which the motion since the last estimate was computed. "standing" means that the robot
+is at rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class FusedOdometry:
 
     ``displacement``: since the previous estimate, in the robot's axes.
 
-    ``wheel_ways_m``: the same for the board's left and right wheel, at nominal size.
+    ``wheel_ways_m``: distances of the board's left and right wheel since then, at nominal size.
     """
 
     stamp_s: float

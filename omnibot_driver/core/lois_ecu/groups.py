@@ -80,7 +80,7 @@ class Assembler:
         self._astray = False
         self._after_ticks = False
         self._appends = True
-        """Whether the board is believed to send odometry directly after its ticks."""
+        """Whether the board probably sends odometry directly after its ticks."""
         self._at = -math.inf
 
     @property

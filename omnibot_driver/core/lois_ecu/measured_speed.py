@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
 """``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
-that 0x20 misses when a wheel starts."""
+that 0x20 (odometry) misses when a wheel starts."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that 0x20 misses above ``FAST_RPM``.
+"""Variance, in squared ticks per s, of the motion that 0x20 (odometry) misses above ``FAST_RPM``.
 
 Sending delays a tick. If the next tick comes soon after it, the board measures no speed.
 """

@@ -79,9 +79,10 @@ class Stream(IntEnum):
 class TerminalMode(IntEnum):
     """What the serial line between the board and the host carries.
 
-    ``HOST_WITHOUT_SUM``: the protocol, but lines from the host have no checksum.
+    ``HOST``: the protocol. ``HOST_WITHOUT_SUM``: the same, but lines from the host have no
+    checksum.
 
-    Other modes than ``HOST``: a serial input of the board.
+    Other modes: data of a device at a serial input of the board.
     """
 
     HOST = 0
@@ -289,8 +290,8 @@ class BoardOdometry:
 class Record:
     """A complete record with as many samples as were requested.
 
-    ``left``, ``right``: by wheel. RPM samples: tick times in ``record_request.COUNT_S``. Torque:
-    12-bit values. Headings: degrees, all in ``left``.
+    ``left``, ``right``: samples by wheel. RPM: times between ticks, in ``record_request.COUNT_S``.
+    Torque: 12-bit values. Headings: degrees, all in ``left``.
     """
 
     kind: RecordKind

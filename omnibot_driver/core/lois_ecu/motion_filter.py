@@ -2,8 +2,8 @@
 
 """Kalman filter of the motion of both wheels, and of the values by which the board reports it.
 
-Wheels have nominal size and the board's left and right. This module works on commands and the
-firmware's counters, without messages.
+The wheels have their nominal size. Left and right are those of the board. This module works on
+commands and the firmware's counters, without messages.
 """
 
 import math
@@ -37,7 +37,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts. Of a longer time, only the end is
+"""Longest time in s that one call of ``advance`` predicts. If more time has passed, only its end is
 predicted."""
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
@@ -54,9 +54,9 @@ EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
 """``EXCESS_MEAN``, ``EXCESS_STDDEV``: excess of a backward speed, as a fraction of the set-point.
 
-``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
+``EXCESS_CHANGE``: standard deviation that a change of the set-point adds to this excess.
 
-First value: the board's own gains. Second value: the user's gains.
+First value: with the board's own gains. Second value: with the user's gains.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6

@@ -2,7 +2,7 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-While the public firmware does not count ticks, ``motion_filter`` predicts the motion, and
+While the public firmware does not count ticks, ``motion_filter`` predicts the motion.
 ``comparison`` corrects the prediction by the board's own odometry (0x20).
 
 Time is an argument. All times are arrival times in s.
@@ -36,7 +36,7 @@ LATE_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, until a better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""After the last report, the pose is predicted for this number of tick periods, at least for
+"""The pose is predicted for this number of tick periods after the last report, and for at least
 ``UNHEARD_S`` s."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
@@ -203,9 +203,9 @@ class LoisOdometry:
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
         """Process odometry: 0x20, or odometry directly after ticks (0x12).
 
-        It corrects the next predictions and estimates.
+        The reported odometry corrects the next predictions and estimates.
 
-        ``late_s``: how much later than usual the odometry arrived.
+        ``late_s``: how much later than usual the odometry arrived, in s.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now

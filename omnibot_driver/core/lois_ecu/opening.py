@@ -2,7 +2,7 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-Rounds of all settings follow until ticks with the requested period and a date confirm them.
+All settings are written in rounds, until a date and ticks with the requested period confirm them.
 """
 
 import math
@@ -38,8 +38,8 @@ AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting. It is shorter than
 the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Times in s from a group to the next round or date request, used in turn. At one fixed time, the
-board might always be sending."""
+"""Delays in s from a group to the next round or date request, used in turn. With a constant delay,
+the board might be sending, and so not receiving, each time."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
 period."""
@@ -72,7 +72,7 @@ class SettingsWriter:
         self._arrivals: deque[float] = deque(maxlen=6)
         self._rounds = 0
         self.overwritten = False
-        """Whether the terminal mode was written. This overwrites "left short correction"."""
+        """Whether the terminal mode was written, which overwrites "left short correction"."""
 
     @property
     def confirmed(self) -> bool:
@@ -182,7 +182,7 @@ class SettingsWriter:
             self._queue.append((now + index * LINE_S, command))
 
     def _turned(self, rounds: int) -> list[Command]:
-        """Return all commands. Each round begins with another command.
+        """Return the commands of a round. Each round begins with another command.
 
         In a fixed order, a board that sends a group once a round could always miss the same line.
         """
@@ -210,7 +210,7 @@ class SettingsWriter:
 
     @property
     def _dates_come_periodically(self) -> bool:
-        """Whether the user has set a period of the date. A request would end the sending."""
+        """Whether the user has set a period of the date. A request for one date would end it."""
         return self.settings.periods_ms.get(Stream.GPS_DATE, PERIOD_OFF) < PERIOD_ONCE
 
     def recovery(self) -> bytes:

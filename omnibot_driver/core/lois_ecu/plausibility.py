@@ -2,7 +2,7 @@
 
 """Plausibility of a complete group of lines: its values, and their change since the last group.
 
-Two groups that only fit each other show a restart or reset.
+If two groups fit each other, but not the group before them, the board has restarted or was reset.
 
 This module works on values and arrival times.
 """
@@ -31,8 +31,8 @@ board sends."""
 SURE_AFTER: Final = 2
 """Number of further comparisons that must confirm the unit of the board's clock."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest time in s between two groups that can show the clock's unit. Arrival times are
-inexact."""
+"""Shortest time in s between two groups that can show the clock's unit. Over a shorter time, the
+errors of the arrival times are too large."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -80,11 +80,11 @@ class Gate(Generic[Group]):
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what a subclass has learnt about the board's counters."""
+        """Forget what a subclass has inferred from earlier groups: the counters restarted."""
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of ticks. It also learns the unit of the board's clock, and then requires this unit."""
+    """Check of ticks. It infers the unit of the board's clock, and then requires this unit."""
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)
@@ -92,7 +92,7 @@ class TicksGate(Gate[Ticks]):
         self._steps = 0
 
     def passes(self, group: Ticks, now: float) -> bool:
-        """Return whether to accept the ticks. Store them, and learn the clock's unit."""
+        """Return whether to accept the ticks. Store them, and infer the unit of the clock."""
         last = self._last
         passed = super().passes(group, now)
         if passed and last is not None and now - last[1] > LEARNT_FROM_S:

@@ -16,7 +16,7 @@ from omnibot_driver.core.readings import DisplacementReading
 class FixReading:
     """GPS position in degrees, north and east positive.
 
-    ``valid``: whether the GPS knows its position and the date. Without a position, it sends 0/0.
+    ``valid``: whether the GPS has a position and the date. Without a position, the GPS sends 0/0.
     """
 
     latitude_deg: float

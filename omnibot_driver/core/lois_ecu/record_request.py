@@ -2,7 +2,7 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-Repetitions come soon, because each request restarts the record.
+The repetitions come soon, because each request restarts the record.
 """
 
 import math
@@ -29,8 +29,8 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times of sending in s since the first request. The intervals outlast a pause of the board's
-reception, and are not multiples of its usual periods."""
+"""Times in s, since the first request, at which a request is sent. The intervals are longer than a
+pause of the board's reception, and are not multiples of its usual periods."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
 """Time unit, in s, of an RPM record's samples, by the unit of the time in 0x12 (ticks)."""
 
@@ -82,7 +82,7 @@ class RecordRequest:
     ) -> list[LoisReading]:
         """Return the readings, with the result of the request if it is known now.
 
-        ``prevented``: why the record cannot come, as a sentence. Empty if it may.
+        ``prevented``: why the record cannot come, as a sentence. Empty if it can come.
         """
         if self.kind is None:
             return found

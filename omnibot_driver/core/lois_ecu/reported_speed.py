@@ -3,7 +3,7 @@
 """Corrections of one wheel by the speeds that a LOIS ECU reports for it.
 
 The board measures a wheel's speed at each tick of this wheel. So the reported speed of a wheel at
-rest is old. If sending delayed the tick, the speed is wrong.
+rest is old. While the board sends, it notices ticks late. The measured speed is then wrong.
 
 This module works on reported speeds and the motion filter, without messages.
 """
@@ -16,10 +16,11 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Assumed age in s of odometry when its last line arrives. The values are from the beginning of the
-first line."""
+"""Assumed age in s of the values of odometry when its last line arrives. The board takes these
+values before it sends the first line."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, above which the filter doubts its own estimate."""
+"""Residual, in standard deviations, above which the filter increases the variance of its
+estimate."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used. A slower wheel may have rested between its last two
 ticks."""
@@ -32,16 +33,18 @@ JUMP_RPM_PER_S: Final = 200.0
 A larger change shows a delayed tick."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""``STRAY_RPM + STRAY_PART * expected``: largest plausible residual of a reported speed. Only for a
-constant set-point and gains that the user set."""
+"""``STRAY_RPM + STRAY_PART * expected``: largest plausible residual of a reported speed. It applies
+only with a constant set-point and gains that the user set."""
 COASTED_TICKS: Final = 1.0
-"""Ticks to subtract from the distance of a wheel that came to rest. It rolls less far than its last
-speed suggests."""
+"""Number of ticks to subtract from the distance of a wheel that came to rest. Such a wheel has
+rolled less far than its last speed suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""Fraction of the time between two reports for which an unexpected change of speed lasts."""
+"""Assumed fraction of the time between two reports for which an unexpected change of speed
+lasts."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a wheel's controller without ticks, as a fraction of ``WINDUP_M``."""
+"""Largest assumed integral of a controller while its wheel does not tick, as a fraction of
+``WINDUP_M``. At ``WINDUP_M``, the wheel starts."""
 
 
 class ReportedSpeed:

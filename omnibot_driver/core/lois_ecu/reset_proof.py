@@ -21,8 +21,8 @@ STEADY_TICKS: Final = 3
 """Smallest count whose change to zero at rest proves a reset. Backlash of the gears explains
 smaller changes."""
 UNPROVED_S: Final = 2.5
-"""Longest time in s to wait for a proof while the reset is repeated. After counts of zero, no proof
-is possible."""
+"""Longest time in s to wait for a proof while the reset is repeated. If the counts were zero
+before, no proof is possible."""
 
 
 class ResetProof:
@@ -41,7 +41,7 @@ class ResetProof:
     def again(self, before: Ticks | None, *, steady: bool) -> None:
         """Record that the reset is repeated. Replace ``before`` if the new counts can prove more.
 
-        Only counts of wheels at rest can prove more.
+        New counts can prove more only if they are not near zero and the wheels are at rest.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
@@ -50,7 +50,8 @@ class ResetProof:
     def look(self, ticks: Ticks, now: float) -> bool:
         """Return whether the driver can report the reset now.
 
-        The counts must be near zero, and either prove the reset or ``UNPROVED_S`` must have passed.
+        The counts must be near zero. They must also prove the reset, unless ``UNPROVED_S`` has
+        passed.
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks

@@ -2,8 +2,8 @@
 
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-The public firmware repeats the last speed of a wheel at rest. Such a speed has just fallen, to 5 to
-17 RPM.
+The public firmware repeats the last speed of a wheel at rest. Just before, the reported speed has
+fallen to between 5 and 17 RPM.
 
 This module works on reported speeds and the time between them.
 """
@@ -15,14 +15,14 @@ SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
 """``SLOWEST_RPM``, ``FASTEST_RPM``: range of the last reported speed of a wheel that came to rest.
-A slower wheel is starting, a faster one ticks once more."""
+At a lower speed, the wheel is starting. At a higher speed, another tick follows."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""While the board reports no speeds, this module counts only this fraction of the time."""
+"""Fraction of the time that is counted while the board reports no speeds."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -34,7 +34,7 @@ TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 
 ``FAR``: after a fall by ``FELL_FAR_RPM``.
 
-``LONE``: the same, from a speed that was reported only once.
+``LONE``: after such a fall from a speed that was reported only once.
 
 ``NEAR``: after a smaller fall.
 
@@ -64,7 +64,7 @@ class RestingWheel:
 
     @property
     def swings(self) -> bool:
-        """Whether the reported speed fell far in the last ``SWINGS_S``."""
+        """Whether the reported speed fell by ``FELL_FAR_RPM`` or more in the last ``SWINGS_S``."""
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:

@@ -17,14 +17,14 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop to RPM 0/0. RPM 0/0 ends the counting of ticks."""
+"""Time in s from a Stop until RPM 0/0 is sent, which ends the counting of ticks."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
 class SetPoints:
     """Encoder of set-points. It also remembers which set-points were sent.
 
-    ``saturated``: number of commands that were slowed.
+    ``saturated``: number of commands that were slowed, because a value was above its limit.
 
     ``stopped_at_s``: time since which only zeros were sent, or infinity.
 
@@ -82,7 +82,7 @@ class SetPoints:
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now. If so, RPM 0/0 is treated as sent."""
+        """Return whether to send RPM 0/0 now. A call that returns True records it as sent."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S
@@ -130,7 +130,7 @@ class SetPoints:
 
     @property
     def kinematics(self) -> DifferentialKinematics:
-        """Kinematics of the robot, with its own left and right wheel."""
+        """Kinematics of the robot. Left and right are those of the robot, not of the board."""
         settings = self.settings
         return DifferentialKinematics(
             wheel_radius_m=settings.wheel_radius_m, track_m=settings.track_m
@@ -139,7 +139,7 @@ class SetPoints:
     def _board_order(self, pair: tuple[int, int]) -> tuple[int, int]:
         """Swap the two values if the board is inverted.
 
-        This converts a pair to or from the board's order.
+        The swap converts a pair from the robot's order to the board's order, or back.
         """
         return (pair[1], pair[0]) if self.settings.inverted else pair
 

@@ -31,14 +31,14 @@ class LoisEcuSettings:
 
     ``duty_scale``: duty, in percent, for each m/s of a wheel's rim.
 
-    ``low_pass``: 0..1, part of a new set-point that each controller step applies. Must be written
-    before RPM mode works.
+    ``low_pass``: 0..1, part of a new set-point that each controller step applies. It must be
+    written before RPM mode works.
 
     ``written``: further settings that the user wants on the board.
 
-    ``periods_ms``: periods of the board's messages. Other messages keep theirs.
+    ``periods_ms``: periods of the board's messages. Periods that are not listed stay unchanged.
 
-    ``declination_rad``: of magnetic north, east positive.
+    ``declination_rad``: angle from true to magnetic north, east positive.
     """
 
     wheel_radius_m: float = 0.13

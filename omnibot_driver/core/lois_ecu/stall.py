@@ -24,10 +24,11 @@ LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. Beyond both, a
-repeated speed is that of a wheel at rest."""
+"""``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. If a repeated
+speed is beyond both, the wheel is at rest."""
 UNLIKE: Final = 1.15
-"""Largest assumed ratio, between two wheels that roll backward, of speed divided by set-point."""
+"""The speed of each wheel is divided by its set-point. If both wheels roll backward, the two
+quotients are assumed to differ at most by this factor."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
 """Smallest number of groups without motion after which a wheel is stalled. On a bad line, few
@@ -39,7 +40,7 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``saturated``: for each wheel, whether it may roll at an unchanged reported speed.
+    ``saturated``: for each wheel, whether full power may keep it rolling at a constant speed.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
@@ -48,8 +49,8 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.saturated = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of groups since ``_seen_at`` that could have shown motion, but did
-        not."""
+        """For each wheel: number of groups, since the wheel last turned or was started, that could
+        have shown motion, but did not."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None

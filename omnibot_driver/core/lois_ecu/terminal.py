@@ -17,7 +17,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which the driver sends Stop if it cannot see whether the robot is at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""For this time in s after a mode is written, earlier reports may still arrive."""
+"""Time in s after a mode is written for which reports of the earlier mode may still arrive."""
 
 
 class ModeChange:
@@ -29,7 +29,7 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The sensor's mode that was written. None once the board's own messages have arrived
+        """The sensor's mode that was written last. None once the board's own messages have arrived
         again."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
@@ -42,7 +42,7 @@ class ModeChange:
         self._told = None
 
     def want(self, mode: TerminalMode) -> None:
-        """Request a mode. A sensor's mode begins when the robot is at rest."""
+        """Request a terminal mode. The mode of a sensor begins only when the robot is at rest."""
         if mode in SENSORS and mode is not self.wanted:
             self.stop_first(f"terminal_mode is changing to {mode.name.lower()}")
         self.wanted = mode
@@ -125,7 +125,7 @@ class ModeChange:
     def protocol_heard(self, now: float) -> None:
         """Record that the board sent a message of its own.
 
-        So its terminal mode has ended or not begun.
+        This message shows that a terminal mode has ended or not begun.
         """
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return

@@ -35,19 +35,20 @@ from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
 UNKNOWN_FROM_YEAR: Final = 38
-"""Year of the century from which a date shows that the GPS receiver does not know the date."""
+"""Two-digit year (38 for 2038). If a date has this year or a later one, the GPS receiver does not
+have the date yet."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count by rolling back.
-A larger fall shows a restart."""
+"""``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count that wheels can
+cause by rolling back. A larger fall shows a restart."""
 ROLLED_OUT_TICKS: Final = 10
 STARTING_TICKS_PER_S: Final = 20.0
 """``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count after a restart, while a
 wheel rolls out and starts again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest assumed time in s of rolling back while the unit of the board's clock is forgotten. The
-clock then cannot confirm the time since the last ticks."""
+"""Longest assumed time in s of rolling back while the unit of the board's clock is unknown again.
+The clock then cannot confirm how long ago the last ticks were sent."""
 
 
 class Translation:
@@ -84,7 +85,8 @@ class Translation:
         self._stamp_s: float | None = None
         self._date: GpsDate | None = None
         self._dated = False
-        """Whether the GPS knows the date. It stays True when midnight makes ``_date`` unknown."""
+        """Whether the GPS has reported a date. The value stays True when midnight makes ``_date``
+        unknown."""
         self._clock = (0, 0, 0)
         self._gps_works = False
 
@@ -223,14 +225,14 @@ class Translation:
 
 
 def _began_within(duration_s: float, ticks: Ticks) -> bool:
-    """Return whether the clock, read in ns, and the counts began at zero within ``duration_s``."""
+    """Return whether the clock, in ns, and the counts began at zero at most ``duration_s`` ago."""
     age_s = ticks.time_counts * UNIT_S["ns"]
     most = ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * age_s
     return age_s <= duration_s and max(abs(ticks.left), abs(ticks.right)) <= most
 
 
 def _is_date(date: GpsDate) -> bool:
-    """Return whether the GPS receiver knows the date. Otherwise it sends zeros or e.g. 1980.
+    """Return whether the GPS receiver has the date. Without it, it sends zeros or a false year.
 
     Dates from 2038 on do not fit into a ROS time.
     """

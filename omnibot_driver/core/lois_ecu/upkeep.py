@@ -2,7 +2,8 @@
 
 """Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
 
-This module combines the classes for these tasks. It does not know what the board sends.
+This module combines the classes for settings, modes, records and recovery. It does not know what
+the board sends.
 """
 
 import math

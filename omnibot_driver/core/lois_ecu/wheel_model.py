@@ -26,7 +26,7 @@ CommandKind = Literal["rpm", "duty"]
 class _Effect:
     """Effect that a command has on a wheel at the time ``at_s``.
 
-    ``halts``: whether the RPM target becomes zero, instead of ``kind`` and ``speed_mps``.
+    ``halts``: whether the RPM target becomes zero. ``kind`` and ``speed_mps`` are then ignored.
     """
 
     at_s: float
@@ -87,7 +87,7 @@ class WheelModel:
             self._effects = deque(sorted(self._effects, key=_at), maxlen=128)
 
     def next_change_s(self) -> float:
-        """Return when the next effect is due, or infinity."""
+        """Return the time in s at which the next effect is due, or infinity."""
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:

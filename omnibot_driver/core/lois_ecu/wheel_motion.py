@@ -16,11 +16,13 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
 m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""States of the body: position, and the turn and distance that 0x20 (odometry) should show.
+"""Indices of the body's states: position, and the turn and distance that 0x20 (odometry) should
+show.
 
-``BIAS``: two states, the error of each wheel's speed.
+``BIAS``: first of two states, the error of each wheel's speed.
 
-``EXCESS``: two states, the excess of each wheel's backward speed, as a fraction of its set-point.
+``EXCESS``: first of two states, the excess of each wheel's backward speed, as a fraction of its
+set-point.
 """
 STATES: Final = 18
 
@@ -46,8 +48,8 @@ ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Assumed time in s for which a wheel deviated from the model before its halt. First for the
-board's own gains, then for the user's."""
+"""Assumed time in s, before a halt, for which the wheel's motion differed from the model. First for
+the board's own gains, then for the user's."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -61,7 +63,7 @@ class Step:
 
     ``new``: means of the states after the step.
 
-    ``unsure_mps``: standard deviation of ``HELD``, by the wheel's first state.
+    ``unsure_mps``: standard deviation of each last measured speed, by the wheel's first state.
 
     ``rows``: changed rows of the transition matrix.
 
@@ -80,15 +82,16 @@ class Wheel:
 
     ``base``: index of the wheel's first state in the filter.
 
-    ``blind``: whether the wheel moved or had a target while uncounted. The caller clears the flag.
+    ``blind``: whether the wheel moved or had a target while its ticks were not counted. The caller
+    clears the flag.
     """
 
     def __init__(self, base: int) -> None:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m when the wheel last certainly turned, or began a command. Later estimated
-        motion may have to be subtracted."""
+        """Distance in m that the wheel had rolled when it last certainly turned, or began a
+        command. Motion that is estimated later may have to be subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:

@@ -94,7 +94,7 @@ class OmniBot:
 
     @property
     def settings(self) -> OmniBotSettings:
-        """Settings that the driver cannot learn from the board's data."""
+        """Settings that the board's data does not show."""
         return self._settings
 
     @settings.setter
@@ -124,9 +124,9 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended in the stream of IMU samples; None if this is unknown.
+        """Where the last read ended in the stream of IMU samples; None if this place is unknown.
 
-        The undecoded bytes show it: they may begin with an IMU frame.
+        The place follows from the undecoded bytes, which may begin with an IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)

@@ -2,7 +2,8 @@
 
 """The cost of an interpretation of the bytes: the evidence against it as one number.
 
-A cost is about -ln(probability). Odd content costs less than damage, so true shocks are delivered.
+A cost is about -ln(probability). Unusual content costs less than damage, so the frames of a real
+shock are accepted.
 
 This module knows what boards send and lines damage; it does not know the search (``trellis``) or
 the acceptance (``decoder``).
@@ -43,23 +44,26 @@ BAD_RUN: Final = 6.0
 Noise, or the loss of many bytes at once, causes such a run.
 """
 BAD_TAIL: Final = 2.5
-"""Extra cost of a bad run that begins after a frame but not with a header; such a run is rare."""
+"""Extra cost of a run of unexplained bytes that begins after a frame but not with a header.
+
+Such a run is rare.
+"""
 UNKNOWN_START: Final = 1.0
 """Cost of assuming that the first bytes are not the beginning of a frame.
 
 After a silence, a whole frame is more likely.
 """
 BAD_BYTE: Final = 0.35
-"""Cost of each byte of a bad run, in addition to ``BAD_RUN``.
+"""Cost of each byte of a run of unexplained bytes, in addition to ``BAD_RUN``.
 
-A bad run of 14 bytes costs more than any true IMU frame.
+A run of 14 bytes costs more than any true IMU frame.
 """
 BAD_HEADER: Final = 0.5
-"""Cost of a header within a bad run; a header may arise by chance, or from a gyro at rest."""
+"""Cost of a header within unexplained bytes; it may arise by chance, or from a gyro at rest."""
 GAP: Final = 5.0
 """Cost of a pause of the line within a frame; the board sends a frame without a pause."""
 BAD_TEXT: Final = 4.0
-"""Cost of a complete text within a bad run: nine fixed bytes hardly arise by chance."""
+"""Cost of a complete text within unexplained bytes: nine fixed bytes hardly arise by chance."""
 KNOWN_GAP: Final = 11.0
 """Cost of a pause within a frame, on a line that so far paused only between frames.
 
@@ -68,7 +72,8 @@ The frame is then accepted only with more evidence.
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
 ENDS_IN_NOISE: Final = 2.0
-"""Cost if the line falls silent within a bad run; normally it falls silent after a frame."""
+"""Cost if the line falls silent within unexplained bytes; normally it falls silent after a
+frame."""
 
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
@@ -85,9 +90,9 @@ It is low because a shock lasts several frames.
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
-"""Cost of an acceleration below 0.5 g, one word of which has the bytes of an IMU header.
+"""Cost of an acceleration below 0.5 g if one of its words has the bytes of an IMU header.
 
-The supposed header is probably a gyro word of -6.
+The header of this frame is then probably a gyro word of -6 in another frame.
 """
 JUMP: Final = 2.5
 """Cost of a counter that did not advance by one, because an earlier frame was lost."""
@@ -96,7 +101,7 @@ IMPOSSIBLE: Final = 2.0
 OFF_BEAT: Final = 1.0
 """Cost of an unexpected number of IMU frames per delta, or of deltas per pose.
 
-Expected at 25 Hz: four and five.
+At 25 Hz, four and five are expected.
 """
 
 CONTRADICTED: Final = 1.5
@@ -108,7 +113,8 @@ ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
 """``ROUNDING``, ``ROUNDING_PER_DELTA``: rounding error of a sum of deltas, in 0.1 mrad.
 
-For n deltas: ``ROUNDING`` + n * ``ROUNDING_PER_DELTA``, e.g. 4 for five.
+For n deltas, the error is at most ``ROUNDING`` + n * ``ROUNDING_PER_DELTA``. For five deltas, it is
+at most 4.
 """
 FASTEST: Final = 1e5
 """Largest possible speed: 10 m/s or 10 rad/s, in the unit 0.1 mm/s or 0.1 mrad/s."""
@@ -166,7 +172,8 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Limits within which an IMU frame costs nothing, in counts (integers compare faster).
+        """Limits of the content of an IMU frame that has no cost, in counts (integers compare
+        faster).
 
         Least and largest squared acceleration; largest steps of an acceleration and a gyro word.
         """
@@ -262,9 +269,10 @@ class Expectation:
 
 
 def may_be_lent(frame: Frame, before: Context) -> bool:
-    """Return whether the last byte of this frame may belong to the next header.
+    """Return whether the last byte of this frame may be the first byte of the next header.
 
-    An IMU frame's last word must also differ from the one before, unless the byte is FF.
+    The byte must occur in headers. An IMU frame's last word must also differ from that of the IMU
+    frame before, unless the byte is FF.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -2,9 +2,9 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-A header proves nothing: a gyro at rest reads the same. A frame *in step* with the last one is
-accepted unless evidence speaks against it. *Uncertain* bytes wait until ``trellis`` has a clear
-result, or ``DOUBT_BYTES`` are held.
+A header alone proves nothing: a gyro at rest gives the same bytes. A frame *in step* with the last
+one is accepted unless evidence speaks against it. *Uncertain* bytes wait until ``trellis`` has a
+clear result, or ``DOUBT_BYTES`` are held.
 
 This module reads no clock, and no input makes it raise an exception.
 """
@@ -43,7 +43,7 @@ SHORTEST_RUN: Final = DELTA_LENGTH
 CALM_S: Final = 10.0
 """Time in s without damage after which a line is regarded as one that loses few bytes.
 
-The decoder then doubts the last byte of a frame less.
+The decoder then needs less evidence to accept the last byte of a frame.
 """
 FRAMES_TO_SETTLE: Final = 3
 """An uncertain frame is discarded when this number of certain frames has followed it."""
@@ -148,7 +148,7 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Accept ``data`` if it consists of calm frames that were due; return whether it does."""
+        """Accept ``data`` if it consists of due frames with usual content; else return False."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -289,7 +289,7 @@ class FrameDecoder:
     ) -> Iterator[tuple[Segment, bool]]:
         """Yield the pieces before the first undecided one, each with whether to accept it.
 
-        Later bytes cannot change a decided piece. Pieces that end by ``until`` are decided too.
+        A piece is decided if later bytes cannot change it, or if it ends by ``until``.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

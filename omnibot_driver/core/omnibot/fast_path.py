@@ -55,8 +55,9 @@ class Walk:
     """Consecutive frames from the first byte held on. No evidence speaks against these frames.
 
     * ``ends``: the position after each frame.
-    * ``lessons``: what to learn: number of frames before, the frame, the last IMU frame before.
-    * ``known``: number of frames, and the Context's fields after them, at some places.
+    * ``lessons``: IMU frames to learn from: number of frames before it, the frame, the IMU frame
+      before.
+    * ``known``: for some places: number of frames before it, and the Context's fields there.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -90,9 +91,9 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Return whether a frame follows at position ``at``: then odd content before it is a shock.
+    """Return whether a frame follows at position ``at``, so that odd content before it is a shock.
 
-    The bytes after this frame must be able to begin another. At the end of ``held``, return
+    The bytes after this frame must be able to begin another frame. At the end of ``held``, return
     ``closed``.
     """
     if at == len(held):

@@ -3,7 +3,7 @@
 """The order in which a running board sends frames, and what it reveals about lost frames.
 
 At 25 Hz: a delta every fourth IMU frame, a pose every fifth delta. So the number of discarded bytes
-tells which frames were lost. SEQ and arrival times correct errors.
+shows which frames were lost. SEQ and arrival times correct errors.
 """
 
 from functools import cache
@@ -58,7 +58,8 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: discarded bytes before it. For a pose: 0; its losses count with the next frame.
+        ``skipped``: discarded bytes before it. For a pose, return 0: the next result includes its
+        losses.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:

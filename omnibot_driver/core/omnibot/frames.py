@@ -23,9 +23,9 @@ DELTA_HEADER: Final = b"\xff\xfb"
 POSE_HEADER: Final = b"\xff\xfc"
 COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
-"""The bytes of headers.
+"""The bytes that occur in frame headers.
 
-If a frame that ends with such a byte lost one, that byte belongs to the next header.
+If a frame lost a byte and seems to end with such a byte, this byte begins the next header.
 """
 
 _IMU: Final = struct.Struct(">2s6h")
@@ -146,7 +146,7 @@ def encode(frame: Frame | CommandFrame, pose_byte_order: ByteOrder = "big") -> b
 def measure(data: bytes | bytearray, at: int) -> int:
     """Return the length in bytes of the frame that begins at position ``at``.
 
-    INCOMPLETE: more bytes may complete a frame. NO_FRAME: no frame begins with these.
+    INCOMPLETE: more bytes may complete a frame. NO_FRAME: no frame begins with these bytes.
     """
     if data[at] == _TEXT_BEGIN:
         return _measure_paused(data, at)

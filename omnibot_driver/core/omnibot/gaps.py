@@ -3,7 +3,7 @@
 """The pauses in which the line was idle, and how reliable they are.
 
 A board pauses only between frames; adapters and late readers (``late_reads``) cause other pauses.
-Accepted frames show which pauses this line has.
+Accepted frames show whether this line pauses only between frames.
 
 This module knows positions and times; it does not know what a frame contains.
 """
@@ -28,7 +28,7 @@ from omnibot_driver.core.omnibot.late_reads import (
 LATE_S: Final = 0.011
 """Longest normal pause in s between two reads: about one tick.
 
-Longer: lost bytes, a collecting adapter, or a late reader.
+A longer pause shows lost bytes, an adapter that collects bytes, or a late reader.
 """
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
@@ -48,7 +48,7 @@ class InterFrameGaps:
     * ``byte_s``: time in s that the line takes for a byte.
     * ``sharp``: whether the first byte after a pause normally begins a frame.
     * ``between``: whether a frame normally begins somewhere in the read after a pause.
-    * ``certain``: whether more confirmations of both change nothing.
+    * ``certain``: whether ``sharp`` and ``between`` have been confirmed as often as is counted.
     * ``at_pace``: whether the last read's bytes came without a pause before them.
     * ``collected``: whether the last read's bytes were collected for more than a tick.
     """
@@ -68,7 +68,7 @@ class InterFrameGaps:
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
         """Record that ``arrived`` bytes were read at ``now``, ``pause_s`` s after the last read.
 
-        ``place``: of the first, among the bytes held.
+        ``place``: position of the first new byte among the bytes held.
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
@@ -98,7 +98,7 @@ class InterFrameGaps:
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Learn from accepted frames whether the pauses of this line are between frames.
+        """Check by accepted frames whether the pauses of this line are between frames.
 
         ``ends``: the position after each accepted frame, among the bytes held.
         """

@@ -33,23 +33,23 @@ HALF_TICK_S: Final = TICK_S / 2
 GAP_S: Final = 4e-3
 """Pause in s that is longer than any pause of the board while it sends a frame."""
 NEAR_S: Final = 2e-3
-"""Largest distance of a delay from a whole number of ticks, in s, for lost bytes.
+"""Largest difference, in s, between the delay after lost bytes and a whole number of ticks.
 
 Lost bytes delay frames by whole ticks.
 """
 INTO_TICK_S: Final = 1e-3
-"""A delta or pose begins about this time, in s, after its tick began: an IMU frame precedes it."""
+"""Time in s from the beginning of a tick to a delta or pose, which an IMU frame precedes."""
 PUNCTUAL_S: Final = 1e-3
 """The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Bytes arrive at the pace of the line if their times of arrival agree with the baud rate, within
-this time in s."""
+"""Largest difference, in s, between the time in which bytes arrived and the time that the line
+needs for them. Within this difference, they arrived at the pace of the line."""
 FEW_BYTES: Final = 2
 """The pace at which bytes arrive can be measured only with more bytes than this."""
 TICKS_TO_PROVE: Final = 2
-"""Number of late ticks, after a first late tick, that prove lost bytes.
+"""Number of late ticks that prove lost bytes, not counting the first late tick.
 
-Each must have its own read, and be as late as the first.
+Each tick must be in a read of its own, and be as late as the first.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
 """Number of bytes after a frame within which the cause of a pause in it is decided.

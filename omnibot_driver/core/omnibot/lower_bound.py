@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A lower bound for what the interpretation of the remaining bytes costs, found from headers alone.
+"""A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
 
 The headers show the smallest possible number of damaged frames.
 
-This module knows the shapes of frames and the lowest prices; it does not know what is searched
+This module knows the shapes of frames and the lowest prices; it does not know the search
 (``trellis``).
 """
 
@@ -20,7 +20,10 @@ REACH: Final = 15 + 2
 
 _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
-"""Costs of the last 15, 14, ... 1 bytes of a bad run; the first is a little below ``DAMAGE``."""
+"""Costs of the last 15, 14, ... 1 bytes of a run of unexplained bytes (a bad run).
+
+The first cost is a little below ``DAMAGE``, the cost of a damaged frame.
+"""
 
 
 def least_costs(data: bytes) -> list[float]:
@@ -57,7 +60,7 @@ def least_costs(data: bytes) -> list[float]:
 def _undamaged(data: bytes) -> dict[int, int]:
     """Return, for each possible start of a frame, where the undamaged frames from there end.
 
-    Positions in ``data``, in descending order of the keys.
+    Keys and values are positions in ``data``. The keys are in descending order.
     """
     size = len(data)
     ends: dict[int, int] = {}

@@ -31,8 +31,8 @@ CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
 """``CLEARLY_M``, ``TIMES``: when a pose contradicts the configured frame of the deltas.
 
-In the configured frame, the summed deltas miss the pose by more than ``CLEARLY_M``, and by more
-than ``TIMES`` the distance by which they miss it in the other frame.
+The sum of the deltas must miss the pose by more than ``CLEARLY_M``. In the other frame, it must
+miss the pose by less than this distance divided by ``TIMES``.
 """
 
 FEWEST_DELTAS: Final = 10

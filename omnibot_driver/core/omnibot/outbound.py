@@ -33,7 +33,7 @@ Seven zeros complete any frame that lost its end, and one zero may be lost. Thre
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """Zeros before a motion frame.
 
-They may complete a damaged frame. They are few, so that the motion frame soon replaces it.
+The zeros may complete a damaged frame. They are few, so that the motion frame soon replaces it.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

@@ -18,13 +18,13 @@ WRAP: Final = 256
 LATE_S: Final = 0.5
 """Smallest difference of elapsed and counted time, in s, that suggests a restart.
 
-The clock's drift is added. Arrival times err by up to 0.24 s (full host buffer, every tenth byte
-lost).
+The clock's drift is added to this limit. Arrival times err by up to 0.24 s if the host's buffer is
+full and every tenth byte is lost.
 """
 DRIFT: Final = 0.01
 """Largest relative error of the board's clock, and so of the time that the counter shows.
 
-After minutes of silence, only the board's pose proves a restart.
+After minutes of silence, this error is too large. Only the board's pose then proves a restart.
 """
 EARLY_S: Final = 0.2
 """Largest excess of counted over elapsed time after a restart, in s.
@@ -66,7 +66,8 @@ class Sequence:
         self._ahead: int | None = None
         """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        It may be damaged. Until a delta continues it, elapsed time gives the losses.
+        It may be damaged. Until a delta continues it, the number of lost deltas follows from the
+        elapsed time.
         """
         self._left: tuple[int, float, int] | None = None
         """The last counter before a supposed restart, its arrival time in s, and the first counter

@@ -31,7 +31,8 @@ def is_begun(
 ) -> bool:
     """Return whether the pieces and ``data`` together are an incomplete IMU frame that is due.
 
-    False after ``GAP_S``: the decoder must judge such a pause.
+    If ``GAP_S`` has passed since the first piece, return False: the decoder must judge such a
+    pause.
     """
     if pieces:
         data = joined(pieces) + data
@@ -55,7 +56,8 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    Return None and change nothing after ``GAP_S``, for a rejected frame, or if a byte may be lost.
+    Return None and change nothing if the frame is not accepted or a byte may be lost. The same
+    holds when ``GAP_S`` has passed since the first piece.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -81,7 +83,7 @@ def take_single(
     *,
     first: int = IMU_LENGTH,
 ) -> ImuReading | None:
-    """Return the reading of ``data`` if it is one calm IMU frame that was due.
+    """Return the reading of ``data`` if it is one IMU frame that was due, with usual content.
 
     Otherwise return None and change nothing. ``now``: arrival in s of the ``first`` bytes. The
     caller has checked the last byte if ``data`` came in pieces.

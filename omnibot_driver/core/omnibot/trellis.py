@@ -27,7 +27,7 @@ from omnibot_driver.core.omnibot.lower_bound import DAMAGE, least_costs
 from omnibot_driver.core.values import value
 
 SURE: Final = 3.5
-"""Least extra cost of each other interpretation of a sure frame's first byte.
+"""A frame is sure if every other interpretation of its first byte costs at least this much more.
 
 Such an interpretation is at least 30 times less likely.
 """
@@ -37,9 +37,9 @@ STEP: Final = 5.5
 The limit rises until the search finds a path.
 """
 BEYOND: Final = 0.025
-"""Small addition to the cost limit: half of 0.05, the step of all prices.
+"""Small addition to the cost limit, so that rounding errors have no effect.
 
-So rounding errors have no effect.
+All prices are multiples of 0.05; this addition is half of 0.05.
 """
 
 _LENGTHS: Final = {0xFA: 14, 0xFB: 9, 0xFC: 15}
