@@ -47,8 +47,8 @@ class BoardFigures:
     * ``faults``: how often the framing was lost.
     * ``discarded_bytes``: bytes that belong to no valid frame.
     * ``saturated``: commands that exceeded the range of the board's encoding.
-    * ``odom_hz``: rate of ``odom``; None: published once per odometry reading.
-    * ``own``: figures of this kind of board, by label, e.g. its version.
+    * ``odom_hz``: rate of the topic ``odom``; None: published once per odometry reading.
+    * ``own``: figures that only this kind of board has, by label, e.g. its version.
     """
 
     rates_hz: Mapping[RateName, float] = field(default_factory=dict)
@@ -102,18 +102,18 @@ class Board(Protocol):
     clock: ReadingClock | None = None
     """Clock for readings that carry the board's time.
 
-    None: the stamps come from the board's ticks or the arrivals.
+    If None, the stamps are computed from the board's ticks or from the arrival times.
     """
 
     @property
     def mode(self) -> Mode:
-        """Mode that the board is believed to be in."""
+        """Mode of the board, as inferred from its data."""
 
     @property
     def edge(self) -> SampleBoundary | None:
         """Position in the stream of IMU samples at which the last read of the port ended.
 
-        None if uncertain or unchanged.
+        None if this position is uncertain or has not changed.
         """
         return None
 
@@ -148,7 +148,7 @@ class Board(Protocol):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Decode bytes from a channel, update ``mode``, and return the completed readings in order.
 
-        ``now``: time of arrival. A reading may need later bytes as proof; a later call returns it.
+        ``now``: time of arrival. If a reading needs later bytes as proof, a later call returns it.
         """
 
     def flush(self, now: float) -> list[Reading]:
@@ -161,7 +161,7 @@ class Board(Protocol):
     def stalled(self) -> None:
         """Record that this process stalled, so the guard may have sent ``last_words``.
 
-        Stop commands can also switch off other motors, e.g. a brush motor.
+        The Stop in these packets can also have switched off other motors, e.g. a brush motor.
         """
         return
 
@@ -171,7 +171,7 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the subscriptions, polls and relayed values that are due; no commands.
+        """Return the subscriptions, polls and relayed values that are due, but no motion commands.
 
         Called at ``wake_at``. The driver always writes these packets.
         """
@@ -180,7 +180,7 @@ class Board(Protocol):
     def elapse(self, now: float) -> list[Reading]:
         """Return the readings that follow from elapsed time. Called at ``wake_at``.
 
-        OdometryReadings and NoticeReadings from here do not show that the board is alive.
+        OdometryReadings and NoticeReadings in the result do not show that the board is alive.
         """
         return []
 
@@ -231,11 +231,11 @@ class Board(Protocol):
         return NO_PACKETS
 
     def reset(self) -> Packets:
-        """Return the packets that reboot the board. Until data arrives, its mode is unknown."""
+        """Return the packets that reboot the board. The mode is then unknown until data arrives."""
         return NO_PACKETS
 
     def stop(self) -> Packets:
-        """Return the packets that stop the robot. They can depend on the robot's motion."""
+        """Return the packets that stop the robot. The packets can depend on the robot's motion."""
 
     def emergency_stop(self) -> Packets:
         """Return the board's own emergency stop, without Stop; empty if the board has none."""

@@ -44,8 +44,8 @@ class Inbound:
     def hear(self, data: bytes, now: float, channel: int = 0) -> list[ImuEstimate]:
         """Decode bytes, and return the estimates to publish at once. Call ``process`` afterwards.
 
-        If the mode changes, ``hear`` calls ``process`` itself, before any command. The estimates
-        then become events.
+        If these bytes change the mode, the estimates become events, and the result is empty.
+        ``hear`` then calls ``process`` itself, before any command is handled.
         """
         self._liveness.came_at = now
         before = self._board.mode

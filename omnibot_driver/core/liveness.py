@@ -12,7 +12,7 @@ from omnibot_driver.core.traits import Traits
 
 
 class Liveness:
-    """Knows when a board last sent data, and from when on its silence is a fault.
+    """The times at which a board last sent data, and the limits for its silence.
 
     * ``heard_at``: arrival of the last reading, in s.
     * ``came_at``: arrival of the last bytes, valid or not, in s.
@@ -41,7 +41,7 @@ class Liveness:
         return now - self.heard_at >= self.unheard_s
 
     def fell_silent(self, now: float) -> bool:
-        """Return whether a silence has just exceeded ``silence_s``. True once for each silence."""
+        """Return True once for each silence of the board, after ``Traits.silence_s``."""
         if self._silent_since == self.heard_at or now - self.heard_at < self.silence_s:
             return False
         self._silent_since = self.heard_at

@@ -19,17 +19,18 @@ START_RETRY_S: Final = 0.5
 PAUSE_RETRY_S: Final = 1.5
 """Time of uninterrupted data, in s, after which a pause or reset is sent again.
 
-A paused board sends a notice every second; without one, the command was lost.
+A paused board sends a notice every second. If none arrives, the command was lost.
 """
 FLOWING_S: Final = 0.1
-"""Largest time, in s, that one pause between two reads adds to the time of data.
+"""Longest interval between two reads, in s, that is added in full to the time of uninterrupted
+data.
 
-A running board sends every 10 ms.
+Of a longer interval, only this time is added. A running board sends every 10 ms.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command or a notice of a paused board takes to arrive.
 
-A notice within this time after a command, or before data, proves nothing.
+A notice proves nothing if it follows a command, or precedes data, within this time.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -175,7 +176,7 @@ class ModeManager:
     def heard_reset(self, now: float, remark: str = "") -> None:
         """Record that the board has obeyed a reset.
 
-        ``remark``: a sentence that says what is not proved about the reset; empty if all is proved.
+        ``remark``: what is not proved about the reset, as a sentence; empty if all is proved.
         """
         if self.phase is Phase.RESETTING and now - self._said_at >= IN_FLIGHT_S:
             self.output += self._board.wake()
@@ -246,8 +247,8 @@ class ModeManager:
     def _begin_pausing(self, now: float, *, with_p: bool) -> None:
         """Begin to pause the board.
 
-        ``with_p``: whether a P may be obeyed or on its way. P resumes a paused board, so the next P
-        waits ``PAUSE_RETRY_S``.
+        ``with_p``: whether the board may have obeyed a P, or a P may still arrive. Another P would
+        resume a paused board, so the next P waits ``PAUSE_RETRY_S``.
         """
         self.phase = Phase.PAUSING
         self._paused_with_p, self._shown_at = with_p, math.inf

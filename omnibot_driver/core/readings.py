@@ -54,8 +54,9 @@ NOTHING_MEASURED: Final = DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, me
 class PoseReading:
     """The board's own dead reckoning, in the earth frame that it has chosen itself.
 
-    * ``lost``: lost displacements included here; the next displacement does not count them again.
-    * ``restarted``: whether the poses' counter starts again; the displacements' counter did before.
+    * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
+      does not count them again.
+    * ``restarted``: whether the counter of poses starts again, after that of displacements did.
     """
 
     x_m: float
@@ -147,10 +148,11 @@ Reading = (
 class SampleBoundary:
     """Where a read of the port ended in the stream of IMU samples. Times count from the read.
 
-    * ``ahead``: samples (0 or 1) after the last ImuReading, of which at least a part came.
+    * ``ahead``: number of samples (0 or 1) after the last ImuReading that have arrived at least in
+      part.
     * ``cut``: whether the sample counted in ``ahead`` is incomplete.
     * ``latest_s``: longest time until the last sample is complete; 0: complete already.
-    * ``earliest_s``: shortest time until the next sample, or the cut one, is complete.
+    * ``earliest_s``: shortest time until the next sample, or the incomplete one, is complete.
     """
 
     ahead: int

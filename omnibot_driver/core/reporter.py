@@ -26,7 +26,8 @@ from omnibot_driver.core.reporting.notices import (
 )
 
 NEWS_EVERY_S: Final = 0.1
-"""Shortest time between two searches for news, in s. A search at every read would be too slow."""
+"""Shortest time between two searches for new notices, in s. A search at every read would be too
+slow."""
 DISCONNECTED: Final = "disconnected"
 
 

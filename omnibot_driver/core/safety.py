@@ -37,7 +37,7 @@ BUTTON_HELD: Final = (
 
 
 class SafetyStops:
-    """Stops the robot for safety, and reports this to ``reporter``."""
+    """The safety stops of one session. Each stop is reported to ``reporter``."""
 
     def __init__(
         self,
@@ -95,8 +95,8 @@ class SafetyStops:
     def estop(self, active: bool, now: float, *, by: str) -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: named in the notice. Raises RequestRefused for a release while the robot's button is
-        held.
+        ``by``: who latches or releases, as named in the notice. Raises RequestRefused for a release
+        while the robot's button is held.
         """
         latched = self._policy.latched
         if active:

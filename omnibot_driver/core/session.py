@@ -233,7 +233,8 @@ class Session:
     def begin_task(self, name: str, token: object, limit_s: float, now: float) -> None:
         """Begin a task that takes the board a long time. A RequestDone answers within ``limit_s``.
 
-        ``name``: noun in messages, e.g. "recording". Raises RequestRefused.
+        ``name``: noun in messages, e.g. "recording". Raises RequestRefused if no task can begin
+        now.
         """
         if reason := self.interlocks.why_not_task():
             raise RequestRefused(reason)
@@ -250,8 +251,8 @@ class Session:
     def estop(self, active: bool, now: float, *, by: str = "the driver") -> str:
         """Latch or release the e-stop, and return the resulting state as a sentence.
 
-        ``by``: named in the notice. Raises RequestRefused for a release while the robot's button is
-        held.
+        ``by``: who latches or releases, as named in the notice. Raises RequestRefused for a release
+        while the robot's button is held.
         """
         return self._safety.estop(active, now, by=by)
 

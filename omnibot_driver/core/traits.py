@@ -22,7 +22,7 @@ class Traits:
     * ``silence_s``: time without data, in s, after which the mode is unknown.
     * ``own_odometry``: OdometryReadings give the pose; else the driver integrates displacements.
     * ``stands_after_s``: time without motion, in s, that proves a standstill.
-    * ``unproved_s``: longest repetition of Stop without such a proof, in s.
+    * ``unproved_s``: longest time, in s, for which Stop is repeated without this proof.
     * ``calibrates_gyro``: the board subtracts the bias; its profile offers ``~/calibrate_gyro``.
     * ``stops_within_s``: longest time to obey an acknowledged stop, in s; 0: no acknowledgement.
     * ``slack_mps``, ``slack_radps``: extra tolerance of the motion monitor, for coarse

@@ -89,7 +89,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this. ``keeps_speed_of_stalled_wheel`` disables it.
+        The manual implies this. The quirk ``keeps_speed_of_stalled_wheel`` disables it.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0

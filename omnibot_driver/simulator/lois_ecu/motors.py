@@ -76,7 +76,7 @@ class Motor:
     def _through_gap(self, turns: float) -> float:
         """Return by how many turns the wheel moves when the motor makes ``turns``.
 
-        The backlash between them absorbs the rest.
+        The backlash between motor and wheel absorbs the rest.
         """
         backlash = self._settings.backlash_turns
         if not backlash:
@@ -87,7 +87,7 @@ class Motor:
 
 
 class Encoder:
-    """An encoder disc, on which short and long levels alternate. Both together are a period.
+    """An encoder disc, on which short and long levels alternate. A period is one of each.
 
     ``steps``: edges per turn.
 
@@ -151,8 +151,8 @@ class Gains:
 class SpeedController:
     """The board's speed controller, with measured and target RPM as input and a duty as output.
 
-    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), by the trapezoidal rule. The coefficients are always
-    for ``NOMINAL_STEP_S``.
+    G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), discretised by the trapezoidal rule. The coefficients
+    are always for ``NOMINAL_STEP_S``.
     """
 
     def __init__(self, gains: Gains) -> None:

@@ -52,7 +52,7 @@ def sentence(body: str) -> bytes:
 class Compass:
     """A compass that averages its last three raw readings of 0..359 degrees.
 
-    ``over_north``: whether it averages plain numbers, wrongly near north.
+    ``over_north``: whether it averages plain numbers. The mean is then wrong near north.
     """
 
     def __init__(self, noise_deg: float, *, over_north: bool, random: Random) -> None:

@@ -42,8 +42,8 @@ class Edge:
 class Vehicle:
     """The robot. ``truth``: its true pose and motion.
 
-    ``corrections``: the board's factors for each encoder's short and long level. The levels fit
-    these factors exactly.
+    ``corrections``: the board's factors for each encoder's short and long level. The true lengths
+    of the levels fit these factors exactly.
     """
 
     def __init__(
