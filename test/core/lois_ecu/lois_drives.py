@@ -57,7 +57,8 @@ CLASSES: dict[str, Program] = {
 
 
 MOTIONS = ("straight", "curve", "in place", "reverse", "reverse curve", "jerky", "left", "right")
-"""Names of motions in ``test/integrity/lois_odometry.py``. "left" and "right" are squares."""
+"""Names of motions in ``test/integrity/lois_odometry.py``. "left" and "right" are drives along
+squares."""
 
 
 VARIED = (

@@ -22,7 +22,7 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware, name: str) -> None:
     """The robot drives 5 m forward with wheels of the right size.
 
-    The odometry is right within 2 % and 3°, as promised.
+    The position is right within 2 % of the distance, and the heading within 3°.
     """
     one = driven(firmware, name)
     assert one.way_m > 5.0
@@ -32,9 +32,9 @@ def test_forward_it_is_within_2_percent_and_3_degrees_on_5_m(firmware: Firmware,
 
 @BOTH
 def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> None:
-    """The public firmware counts no ticks of the wheel that turns backward.
+    """The robot turns in place. The public firmware counts no ticks of the wheel that rolls back.
 
-    The angle is still right within 3 %.
+    The estimated angle is still right within 3 %.
     """
     one = driven(firmware, "in place")
     assert one.turned_rad > 8.0
@@ -46,7 +46,7 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
     """Wheels of wrong sizes slip on uneven ground. The covariance fits the error of the pose.
 
-    One drive of 10,000 exceeds the limit by chance.
+    The limit allows one wrong alarm in 10,000 drives.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
@@ -55,7 +55,8 @@ def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
 def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -> None:
     """The robot drives a square with turns on the spot.
 
-    The public firmware counts no ticks of a wheel that turns backward.
+    The public firmware counts no ticks of a wheel that turns backward. The pose is still right
+    within 3 sigma.
     """
     one = motion(nominal("firmware", 1000), name, side_m=1.0)
     assert off_m(one) < 0.15
@@ -63,9 +64,9 @@ def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """The wheels reverse several times a second. Documented firmware reports each tick.
+    """The wheels reverse several times a second. A board as in the manual reports each tick.
 
-    The odometry ends within 5 cm and 5°.
+    The odometry ends within 5 cm and 5° of the true pose.
     """
     one = motion(nominal("documented", 1001), "jerky")
     assert off_m(one) < 0.05
@@ -77,9 +78,9 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """One lost byte in a hundred damages 60 % of the groups of lines.
+    """One byte in a hundred is lost, which damages 60 % of the groups of lines.
 
-    The tick counters of the next groups include the lost ticks.
+    The tick counters of the next groups include the lost ticks, so the odometry stays accurate.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)

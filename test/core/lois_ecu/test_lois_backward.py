@@ -21,9 +21,9 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 @BOTH
 def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: Firmware) -> None:
-    """Backward, the public firmware counts no ticks and reports integer RPM.
+    """The robot drives backward. The public firmware then counts no ticks and reports integer RPM.
 
-    So the heading drifts. The mean error is 4.9 % of the way.
+    The distance is right within 3 %. The mean error of the position is below 10 % of the distance.
     """
     drives = [driven(firmware, "reverse", seed) for seed in (1, 2, 3)]
     for one in drives:
@@ -37,9 +37,10 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the boot gains, the right wheel stops. The board still reports its last speed.
+    """With the board's own gains, the right wheel stops. The board still reports its last speed.
 
-    The median is checked, because a few drives are worse.
+    The covariance fits the error of the pose. The median of five drives is checked, because a few
+    drives are worse.
     """
     seeds = range(1000, 1005)
     drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
@@ -53,7 +54,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 ) -> None:
     """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
 
-    An odometry that believed 20 RPM would turn by 600°.
+    The odometry detects the rest. Otherwise its heading would be wrong by 600°.
     """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -61,9 +62,9 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 
 
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
-    """A wheel is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
+    """A wheel at rest is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
 
-    A rolling wheel would slow down, so the wheel rests.
+    A rolling wheel would slow down, so the odometry detects the rest and adds no distance.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
@@ -76,7 +77,7 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
 def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: int) -> None:
     """The robot drives backward with the user's gains. Wheels overshoot or roll too fast.
 
-    The odometry is still right within 10 %.
+    The position is still right within 10 % of the distance.
     """
     one = motion(nominal("firmware", seed), name, HOST_GAINS)
     assert off_m(one) < 0.1 * one.way_m
@@ -85,9 +86,9 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """Backward, too much feed-forward makes the wheels too fast, and no ticks are counted.
+    """Too much feed-forward makes the wheels roll backward at twice their set-points.
 
-    Report 0x20 shows the true speed.
+    No ticks are counted, but report 0x20 shows the speed. The distance is right within 3 %.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
@@ -97,9 +98,9 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM, some ticks follow so soon that the firmware loses their speed.
+    """At 62 RPM, some ticks follow so soon that the firmware does not measure their speed.
 
-    So the filter adds yaw variance, but not at 32 RPM.
+    The filter then adds variance to the yaw. At 32 RPM, it adds none.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

@@ -46,7 +46,7 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """Reads are up to 30 ms late at random. The estimate has a sigma of 5 to 25 ms."""
+    """Reads are up to 30 ms late at random. The delay has a standard deviation of 5 to 25 ms."""
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -57,7 +57,7 @@ def test_its_error_is_that_of_the_reads() -> None:
 def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
     """The estimated delay is 0 until the unit of the board's clock is known.
 
-    After a restart, the delay is 0 and sigma 12 ms.
+    After a restart, the delay is 0 again, and its standard deviation is 12 ms.
     """
     board = BoardTime()
     assert board.late_s(0, None, 0.0) == 0.0
@@ -90,9 +90,9 @@ def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
 def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
     reads: list[tuple[float, int]],
 ) -> None:
-    """For any times of reads and any rate of the board's clock, delays are finite.
+    """Reads come at any times, and the board's clock has any rate.
 
-    Groups stay in order.
+    The estimated delays are finite, and leave the groups in order.
     """
     board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
     for seconds, passed in reads * 3:

@@ -51,7 +51,7 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
 
 @pytest.mark.slow
 def test_a_restarted_board_is_configured_again() -> None:
-    """The board restarts with a low pass of gain 0. The wheels would not turn.
+    """The board restarts with a low-pass gain of 0, with which the wheels do not turn.
 
     The driver configures the board again.
     """
@@ -154,9 +154,9 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 @pytest.mark.slow
 @BOTH
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
-    """The firmware keeps the last measured speed of a wheel at rest. The wheel might not start.
+    """The firmware keeps the last measured speed of a wheel at rest, which may prevent a start.
 
-    The driver clears this speed.
+    The driver clears this speed, so the robot starts again.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -204,9 +204,9 @@ def test_the_button_is_told_and_ends_motion(firmware: Firmware) -> None:
 @pytest.mark.parametrize("kind", RecordKind)
 @BOTH
 def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
-    """The user requests a record while the wheels turn. It arrives complete.
+    """The user requests a record while the wheels turn. The record arrives complete.
 
-    Its time unit depends on the kind of firmware.
+    The unit of the times in the record depends on the kind of firmware.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)

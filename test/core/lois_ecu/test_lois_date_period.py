@@ -13,7 +13,7 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 class DeafBench(Bench):
     """A bench whose board does not receive one copy of the line that sets the date period.
 
-    ``nth``: number of that copy, from 1. 0: none.
+    ``nth``: number of the copy that is lost, from 1. 0: none is lost.
     """
 
     def __init__(self, firmware: str, period_ms: int, nth: int = 0) -> None:
@@ -35,7 +35,7 @@ class DeafBench(Bench):
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """A request for one date replaces the date period, so the driver sends the period again.
 
-    One such line is lost.
+    One of these lines is lost. The period is still set in the end.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):

@@ -75,7 +75,7 @@ def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() 
 
 
 def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -> None:
-    """A group ends with two equal lines, perhaps one line twice.
+    """A group ends with two equal lines. The second one may be a copy of the first.
 
     The decoder waits for the next line or for 50 ms of silence.
     """
@@ -103,7 +103,7 @@ def test_a_group_whose_lines_are_alike_waits_for_what_follows_or_for_silence() -
 def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damage: str) -> None:
     """One line of a group is damaged. The decoder drops that group.
 
-    If the last line comes twice, the group is returned, but not a GPS fix.
+    If only the last line comes twice, the group is returned, unless it is a GPS fix.
     """
     groups = GROUPS[name]
     whole = [encode_report(group) for group in groups]
@@ -202,7 +202,7 @@ def test_a_damaged_record_is_dropped_whole_and_the_next_is_whole(kind: RecordKin
 def test_a_record_that_was_not_asked_for_is_dropped() -> None:
     """A record that was not requested is discarded.
 
-    The decoder cannot tell whether lines of such a record are lost.
+    Without a request, the decoder cannot detect that lines of a record are lost.
     """
     decoder = LoisDecoder()
     assert decoder.feed(encode_report(Record(RecordKind.RPM, (11, 12), (13, 14))), 0.0) == []
@@ -245,7 +245,7 @@ def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> 
 def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
     """A valid line has an unknown kind or a value out of range.
 
-    It is counted and gives no report.
+    The decoder counts the line, and returns no report for it.
     """
     total = 0
     for character in line[:11]:
@@ -259,7 +259,7 @@ def test_a_right_line_that_says_nothing_is_counted(line: bytes) -> None:
 def test_the_unit_of_the_boards_clock_is_learnt(unit: str) -> None:
     """The board's clock counts ns in the manual, but ms in the public firmware.
 
-    The decoder finds out.
+    The decoder infers the unit from the reports.
     """
     said = reports(4.0, firmware=unit == "ms")
     _, decoder = decoded(pieces(said))

@@ -83,9 +83,9 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end of a record. The record goes on.
+    """A torque sample of 0/0 looks like the end of the record. The decoder reads on after it.
 
-    The command number differs between firmware and manual.
+    The command number of a torque record differs between firmware and manual.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

@@ -27,7 +27,7 @@ def told(bench: AnyBench) -> list[str]:
 
 
 def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
-    """The user has set no gains. One notice says so.
+    """The user has set no gains. One notice reports that the board uses its own gains.
 
     The diagnostics name the missing gains until the user has set them.
     """

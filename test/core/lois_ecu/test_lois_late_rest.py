@@ -75,7 +75,8 @@ def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject,
 def test_lines_of_two_groups_never_make_one_group(kind: str, step_s: float) -> None:
     """The end of one burst and the beginning of the next are lost.
 
-    The remaining lines may look like one group. Only their times differ.
+    The remaining lines may look like one group, but their times differ. The decoder makes no report
+    of them.
     """
     groups: list[list[Report]] = []
     for n in range(1, 7):

@@ -120,7 +120,10 @@ def test_a_command_is_its_line_both_ways(line: bytes, command: Command) -> None:
 def test_a_command_without_checksum_is_two_characters_shorter(
     line: bytes, command: Command
 ) -> None:
-    """The board expects lines without checksum after command 0x11 with value 4."""
+    """After command 0x11 with value 4, the board expects lines without a checksum.
+
+    The encoder and the decoder omit these two characters.
+    """
     short = line[:11] + b"\n"
     assert encode_command(command, with_sum=False) == short
     assert type(decode_command(short, with_sum=False)) is type(command)
@@ -171,9 +174,9 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """Zeros end a record of tick times.
+    """A record of tick times ends with zeros. The shorter channel is padded with the value 10.
 
-    The decoder removes the padding (10) from the shorter channel.
+    The decoder removes this padding.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 2, 1)

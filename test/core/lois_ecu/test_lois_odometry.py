@@ -49,9 +49,10 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """The odometry names its source: in a forward drive, the ticks.
+    """In a forward drive, the odometry names ticks as its source.
 
-    Backward, where the public firmware counts no ticks: commands and heading.
+    In a backward drive, the public firmware counts no ticks. The odometry then names commands and
+    heading.
     """
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
@@ -115,7 +116,7 @@ def test_predictions_lead_to_the_next_estimate(firmware: Firmware) -> None:
 def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
     """The displacements of the wheels add up to the driven distance.
 
-    No step is more than 3 cm longer than a step at 1 m/s.
+    From one estimate to the next, the pose moves at most 3 cm farther than at 1 m/s.
     """
     rig = settled(firmware)
     rig.order(30, 30, 5.0)
@@ -130,7 +131,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
     """A restart sets the board's counters to zero and stops the robot.
 
-    The odometry adds at most the 5 cm of the stop.
+    The pose moves less than 5 cm, which is the distance of the stop.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)
@@ -152,7 +153,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 ) -> None:
     """The board restarts while the driver sends set-points.
 
-    Odom moves no further than the robot.
+    The estimated pose moves no farther than the robot.
     """
     rig = settled(firmware)
     rig.order(*pair, 4.0)
@@ -217,9 +218,9 @@ def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """The wheels stop while the board is silent, but the prediction moves on.
+    """The wheels stop while the board is silent, but the predicted pose moves on.
 
-    The next ticks show a short way. The odometry follows.
+    The next ticks show a shorter distance. The odometry is corrected to this distance.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -287,9 +288,9 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the boot gains, a wheel's speed oscillates between two groups of reports.
+    """With the board's own gains, a wheel's speed oscillates between two groups of reports.
 
-    So unexpected ticks increase the variance of a predicted speed.
+    Unexpected ticks therefore increase the variance of a predicted speed.
     """
 
     def variance() -> float:

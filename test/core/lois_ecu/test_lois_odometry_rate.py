@@ -23,7 +23,7 @@ def published(board: LoisEcuBoard, now: float) -> bool:
 def test_odometry_that_is_late_is_not_published_twice_at_once(
     firmware: str, delay_s: float
 ) -> None:
-    """A publication is late. It is not followed at once by the next one."""
+    """Odometry is published late. The next odometry is not published at once."""
     bench = Bench(firmware)
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)

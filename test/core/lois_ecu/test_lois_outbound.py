@@ -90,9 +90,9 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """Exactly one line's length is lost across two set-points. The remainder is a valid line.
+    """As many characters as a line has are lost across two set-points. The rest is a valid line.
 
-    So the driver sends set-points 18 ms apart.
+    Because of this, the driver sends set-points 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -103,9 +103,10 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """If one line's length is lost, the remainder may be a wrong motion.
+    """If as many characters as a line has are lost, the rest may be a wrong motion line.
 
-    So the LED's line waits 15 ms, but only after a motion line.
+    After a motion line, the driver therefore sends the LED's line 15 ms later. After the LED's
+    line, a motion line needs no pause.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

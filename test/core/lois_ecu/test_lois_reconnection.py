@@ -90,7 +90,8 @@ def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
 ) -> None:
     """After a silence of 12 s, the tick counters are at zero.
 
-    After a restart, the board's clock does not fit the length of the silence.
+    If the board's clock does not fit the silence, the board has restarted. Otherwise the wheels
+    have rolled back.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

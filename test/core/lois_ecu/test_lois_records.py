@@ -19,7 +19,10 @@ def read(path: Path, record: Record, count_s: float | None = 1e-4) -> str:
 
 
 def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
-    """At 20 RPM, 60 ticks a turn are 50 ms apart. For an overflow (65535) the cells stay empty."""
+    """The CSV file of an RPM record has times between ticks, and speeds, e.g. 50 ms and 20 RPM.
+
+    The wheel has 60 ticks per turn. For an overflow (65535), the cells stay empty.
+    """
     assert read(tmp_path / "new" / "rpm.csv", RPM).splitlines() == [
         "sample,left_tick_s,right_tick_s,left_rpm,right_rpm,left_counts,right_counts",
         "0,0.0500000,0.0250000,20.00,40.00,500,250",
@@ -32,13 +35,19 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 
 
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
-    """The time unit is unknown. Times and speeds are left empty, and a remark explains why."""
+    """The time unit of a record is unknown. The cells of times and speeds are empty.
+
+    A remark explains why.
+    """
     assert read(tmp_path / "rpm.csv", RPM, None).splitlines()[1] == "0,,,,,500,250"
     assert "unit" in remark(RecordReading(RPM, None, 60))
 
 
 def test_torque_and_headings_have_their_columns(tmp_path: Path) -> None:
-    """Torque is in counts of the ADC, whose scale is unknown. Headings are in degrees."""
+    """The CSV file of a torque record has counts of the ADC, whose scale is unknown.
+
+    The CSV file of a heading record has degrees.
+    """
     torque = Record(RecordKind.TORQUE, (200, 300), (400, 500))
     assert read(tmp_path / "t.csv", torque).splitlines() == [
         "sample,left_adc_counts,right_adc_counts",

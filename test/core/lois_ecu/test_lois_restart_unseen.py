@@ -32,9 +32,9 @@ def error(bench: Bench) -> tuple[float, float]:
 @pytest.mark.parametrize("seconds", [2.9, 3.0, 3.1, 3.4, 3.7, 4.0])
 @pytest.mark.usefixtures("clock_from_zero")
 def test_a_restart_is_not_taken_for_wheels_that_roll_back(seconds: float) -> None:
-    """The board restarts during a drive, and its counts and its clock are small again.
+    """The board restarts during a drive. Its counts and its clock then have small values again.
 
-    The counts alone could have fallen because the wheels rolled back while nothing was heard.
+    The odometry does not regard the smaller counts as wheels that rolled back.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, seconds)

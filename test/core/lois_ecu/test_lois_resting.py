@@ -74,9 +74,9 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """The board reports no speed while both wheels are equally fast.
+    """While both wheels are equally fast, the board reports no speed.
 
-    Estimates then show the fall.
+    The estimated speed before shows that the next reported speed is a fall.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):

@@ -110,9 +110,9 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """Yaw is reset to 0 while the robot's heading is 120°.
+    """Yaw is reset to 0 while the robot's heading is 120°, the same as a false heading near north.
 
-    The firmware's false heading near north is also 120°. The true heading is accepted.
+    Later headings of 120° are still accepted.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

@@ -39,9 +39,9 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
 
 
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
-    """The motion monitor trips and names parameters of the LOIS ECU.
+    """The motion monitor stops the robot, and its notices name parameters of the LOIS ECU.
 
-    The board has no ~/start, so the advice is to release the e-stop.
+    The board has no ~/start, so the advice is to latch and release the e-stop.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=25))
     for _ in range(2):
@@ -82,7 +82,7 @@ def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds:
 def test_a_reset_that_nothing_can_show_says_so(firmware: str) -> None:
     """The user resets the board while its tick counters are zero. No report can prove this reset.
 
-    The answer says that the reset is unconfirmed.
+    The driver's answer is that the reset is unconfirmed.
     """
     bench = Bench(firmware)
     before = len(bench.written)
@@ -166,9 +166,9 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The board loses power within a line. The notice says that no data arrives.
+    """The board loses power within a line. The notice reports that no data arrives.
 
-    It does not blame the baud rate.
+    It does not name the baud rate as the cause.
     """
     bench = Bench("firmware")
     while not bench.board._uart.sending:
@@ -183,9 +183,10 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """The board is deaf for a moment in each group that it sends.
+    """The board receives nothing for a moment in each group that it sends.
 
-    So the five rounds differ in order: a fixed order could lose one setting every time.
+    The driver writes the settings in five rounds, each in another order. In a fixed order, the same
+    setting could be lost every time.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -234,7 +235,7 @@ def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
-    """The board's counters are reset during a drive. This does not move the odometry."""
+    """The board's counters are reset during a drive. The reset does not change the odometry."""
     bench = Bench(firmware)
     bench.drive_on(0.3, 4.0)
     before_m = bench.odometry[-1].pose.x_m - bench.robot.way_m

@@ -54,7 +54,7 @@ def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: 
 
 
 def test_a_twist_is_said_and_understood() -> None:
-    """A speed of 0.2723 m/s is sent as 20 RPM. ``meaning`` gives the twist of the line, rounded."""
+    """A speed of 0.2723 m/s is sent as 20 RPM. ``meaning`` converts a line to its rounded twist."""
     ecu = started()
     assert ecu.velocity(BodyTwist(0.2723, 0.0, 0.0)) == b":020014001438\n"
     meaning = ecu.meaning(ecu.velocity(BodyTwist(0.3, 0.1, 0.5)))
@@ -104,7 +104,7 @@ def test_the_first_set_points_after_a_stop_clear_the_measured_speed() -> None:
 
 
 def test_a_record_that_cannot_complete_is_refused() -> None:
-    """The driver refuses records of over 1024 samples, because the board never ends them."""
+    """The driver refuses records of 0 or over 1024 samples: the board cannot complete them."""
     ecu = started()
     for samples in (0, 1025):
         with pytest.raises(RequestRefused, match="1 to 1024"):

@@ -29,9 +29,10 @@ def variance(settings: LoisEcuSettings, holds_s: float) -> float:
 
 
 def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own_gains() -> None:
-    """The set-points change their sign again while a wheel with the boot gains still oscillates.
+    """The set-points change their sign twice in quick succession.
 
-    The yaw variance is larger than with the user's gains.
+    With the board's own gains, a wheel then still oscillates: the yaw variance is larger than with
+    the user's gains.
     """
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 

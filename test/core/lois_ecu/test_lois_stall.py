@@ -88,18 +88,18 @@ def looks_stalled(
 
 
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
-    """The left wheel's reported speed never changes while the other wheel ticks.
+    """The left wheel's reported speed never changes while the right wheel ticks.
 
-    The firmware computes the pose from the last reported speed.
+    The left wheel looks stalled, although the firmware's pose changes: it follows from old speeds.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
 
 
 def test_a_wheel_that_keeps_too_high_a_speed_looks_stalled_beside_a_steady_one() -> None:
-    """A wheel's reported speed stays above its set-point, so the wheel gets no power.
+    """A wheel's reported speed stays above its set-point, so the controller gives no power.
 
-    It is at rest, because a rolling wheel would become slower.
+    The wheel looks stalled, because a rolling wheel would become slower.
     """
     assert looks_stalled([(-15, 9)] * 14)
     assert looks_stalled([(-12, 9)] * 14)
@@ -153,7 +153,7 @@ def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> Non
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    """Return the velocity in the earth frame, in m/s, for these speeds of the wheel rims."""
+    """Return the earth-frame velocity in m/s. ``left``, ``right``: speeds of the rims in m/s."""
     speed = (left + right) / 2
     return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)
 

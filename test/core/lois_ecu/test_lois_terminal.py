@@ -46,9 +46,10 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The end of a terminal mode is reported once, even if its first lines are lost.
+    """The user ends a terminal mode. The first lines that end the mode may be lost.
 
-    The driver restores the overwritten "short correction".
+    The driver reports the end only once. It restores the "short correction", which the mode
+    overwrote.
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -69,9 +70,9 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 
 
 def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
-    """The board restarts in a terminal mode.
+    """The board restarts in a terminal mode, and is then not in this mode.
 
-    The driver writes the settings, then the terminal mode.
+    The driver writes the settings, and then the terminal mode again.
     """
     bench = Bench("firmware", GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)

@@ -107,9 +107,9 @@ def test_an_unknown_date_is_requested_every_few_seconds_until_it_comes(quirks: Q
 
 @WORKS
 def test_a_request_of_the_date_keeps_away_from_motions(quirks: Quirks) -> None:
-    """The robot drives, and the date is unknown.
+    """The robot drives, and the date is unknown. The driver requests the date.
 
-    Requests follow at least 15 ms after a motion line.
+    Each request is sent at least 15 ms after a motion line.
     """
     rig = GpsRig(quirks)
     rig.run(5.0)

@@ -57,7 +57,7 @@ def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
 
 @FIRMWARE
 def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> None:
-    """The user switches the LED, and settings change before all copies of its line are sent.
+    """The user switches the LED. Settings change before all copies of the LED's line are sent.
 
     The other copies are still sent.
     """
@@ -73,8 +73,8 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
     """The LED's line follows a motion line after at least 14.5 ms.
 
-    The board can lose 13 ms of bytes. If these were the end of the motion line and the beginning
-    of the LED's line, the rest could be a wrong motion line.
+    The board can lose 13 ms of bytes: the end of the motion line and the beginning of the LED's
+    line. The rest of both lines could then be a wrong motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)
