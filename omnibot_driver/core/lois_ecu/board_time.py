@@ -30,8 +30,8 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Groups that arrive within this time in s were probably read together after a pause. Only the last
-of them is stored, because its delay is the smallest."""
+"""Groups that arrive within this time in s were probably read together after a pause. Only the
+last, with the smallest delay, is stored."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -102,7 +102,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height in s of each point above a straight line that no point is below."""
+    """Return the height of each point above a straight line that touches the points from below."""
     half = len(kept) // 2
     points = list(kept)
     # A read may be late but never early, so the line lies below all arrivals. Its slope is that

@@ -41,11 +41,11 @@ ALONG_VARIANCE: Final = 0.15
 heading and distance in 0x20 (odometry), in squared ticks."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual of a count (reported minus expected), in ticks, above which the wheel's speed is assumed
-to have changed without a new set-point."""
+"""Residual of a count, in ticks, above which the wheel's speed has changed without a new
+set-point."""
 SAME_TICKS: Final = 0.6
-"""Smallest residual (reported minus expected count), in ticks, at which an unchanged count corrects
-the filter. At a smaller residual, the next tick may not be due yet."""
+"""Smallest residual, in ticks, at which an unchanged count is used. At a smaller residual, the next
+tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
 """``LEAP``, ``LEAP_M``: limits of the reported minus the expected heading, in standard deviations

@@ -82,7 +82,7 @@ class SetPoints:
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now. A call that returns True records it as sent."""
+        """Return whether to send RPM 0/0 now. If it is due, also record it as sent."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S

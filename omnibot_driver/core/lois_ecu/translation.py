@@ -47,8 +47,8 @@ STARTING_TICKS_PER_S: Final = 20.0
 """``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count after a restart, while a
 wheel rolls out and starts again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest assumed time in s of rolling back while the unit of the board's clock is unknown again.
-The clock then cannot confirm how long ago the last ticks were sent."""
+"""Wheels that roll back are assumed to do it for at most this time in s, if the clock's unit is
+unknown again. The clock then cannot confirm how long ago the last ticks were sent."""
 
 
 class Translation:

@@ -122,7 +122,8 @@ def test_a_command_without_checksum_is_two_characters_shorter(
 ) -> None:
     """After command 0x11 with value 4, the board expects lines without a checksum.
 
-    The encoder and the decoder omit these two characters.
+    The encoder then omits the checksum, which has two characters, and the decoder does not expect
+    it.
     """
     short = line[:11] + b"\n"
     assert encode_command(command, with_sum=False) == short
