@@ -2,7 +2,7 @@
 
 """Launch file that publishes the robot's description and fixed frames; it can also start RViz.
 
-``frame_prefix`` precedes the names of frames, but not those of joints.
+The launch argument ``frame_prefix`` is put before the names of frames, but not of joints.
 """
 
 from launch import LaunchDescription
@@ -21,7 +21,7 @@ from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return robot_state_publisher, RViz, and the launch arguments."""
+    """Return the launch description: robot_state_publisher, RViz, and the launch arguments."""
     board = PythonExpression(["'", LaunchConfiguration("board"), "' or 'omnibot'"])
     description = Command(
         [
@@ -37,7 +37,7 @@ def generate_launch_description() -> LaunchDescription:
             DeclareLaunchArgument(
                 "board",
                 default_value="",
-                description="Motor board of the robot to describe. If empty, it is omnibot.",
+                description="Motor board of the robot to describe. If empty, the board is omnibot.",
             ),
             DeclareLaunchArgument(
                 "namespace",

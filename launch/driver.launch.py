@@ -17,14 +17,17 @@ from omnibot_driver.boards import PROFILES
 OVERRIDES = {
     "board": (str, "Motor board of the robot"),
     "port": (str, "Serial device or pyserial URL of the board"),
-    "front_port": (str, "Serial device of the front board, for a robot that has one (fejemis)"),
+    "front_port": (str, "Serial device of the front board, if the robot has one (fejemis)"),
     "publish_tf": (bool, "Whether the driver publishes the transform from odom to base_link"),
     "frame_prefix": (str, "Prefix of every frame name, with its slash, such as robot1/"),
 }
 
 
 def driver_node(context: LaunchContext) -> list[Node]:
-    """Return the driver's node. Empty launch arguments leave the values in the parameter file."""
+    """Return a list with the driver's node.
+
+    If a launch argument is empty, the node uses the value in the parameter file.
+    """
     file = LaunchConfiguration("params_file").perform(context)
     if not file:
         board = LaunchConfiguration("board").perform(context) or "omnibot"
@@ -48,7 +51,7 @@ def driver_node(context: LaunchContext) -> list[Node]:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the driver and the launch arguments."""
+    """Return the launch description: the driver and the launch arguments."""
     return LaunchDescription(
         [
             *(
@@ -64,7 +67,7 @@ def generate_launch_description() -> LaunchDescription:
                 "params_file",
                 default_value="",
                 description="YAML file with the driver's parameters. If empty, the board's file in"
-                " this package's config/ is used. If board is empty too, it is omnibot.yaml.",
+                " this package's config/ is used. If board is empty too, omnibot.yaml is used.",
             ),
             DeclareLaunchArgument(
                 "namespace",

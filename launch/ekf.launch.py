@@ -30,7 +30,10 @@ FRAMES = {
 
 
 def include(name: str, arguments: dict[str, Any]) -> IncludeLaunchDescription:
-    """Return an action that includes another launch file of this package."""
+    """Return an action that includes the launch file ``name`` of this package.
+
+    ``arguments``: values of launch arguments, by name.
+    """
     path = PathJoinSubstitution([FindPackageShare("omnibot_driver"), "launch", name])
     return IncludeLaunchDescription(
         PythonLaunchDescriptionSource(path), launch_arguments=arguments.items()
@@ -38,7 +41,7 @@ def include(name: str, arguments: dict[str, Any]) -> IncludeLaunchDescription:
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return driver, description, filter, and the launch arguments."""
+    """Return the launch description: driver, description, filter, and the launch arguments."""
     prefix = LaunchConfiguration("frame_prefix")
     frames = {
         parameter: ParameterValue([prefix, frame], value_type=str)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Launch file that starts the driver with a simulated board inside it.
+"""Launch file that starts the driver with a simulated board in the same process.
 
 The launch arguments are those of driver.launch.py.
 """
@@ -13,7 +13,7 @@ from launch_ros.substitutions import FindPackageShare
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the driver with a simulated board, and the launch argument ``port``."""
+    """Return the launch description: a driver with a simulated board, and the argument ``port``."""
     return LaunchDescription(
         [
             DeclareLaunchArgument(

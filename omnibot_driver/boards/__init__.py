@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The boards that the driver supports. Each has a profile, which is imported only if it is chosen.
+"""The boards that the driver supports.
 
-A profile makes its board's objects. Outside the core, only the profile knows its board.
+Each board has a profile: a module that makes the objects for this board. A profile is imported only
+if the parameter ``board`` selects it. Outside the core, only the profile knows its board.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,19 +23,19 @@ PROFILES: Final = {
     "mart": "omnibot_driver.boards.mart",
     "fejemis": "omnibot_driver.boards.fejemis",
 }
-"""Modules of the profiles, by the value of the parameter ``board``."""
+"""Names of the boards' profile modules, by the value of the parameter ``board``."""
 DEFAULT: Final = "omnibot"
 
 Publish = Callable[[Any, int], None]
-"""Function that publishes one value, of a type that only one board has. The second argument is the
-stamp in ns of ROS time."""
+"""Function that publishes one reading of a type that only one board has. Its arguments are the
+reading and the reading's stamp, in ns of ROS time."""
 
 
 class Profile(Protocol):
     """The functions and values of a board's profile, which is a module and not a class."""
 
     SIMULATOR: str
-    """Package of the simulated board, to be imported where it is used."""
+    """Name of the package with the simulated board. It is imported only when it is used."""
 
     PARAMETERS: Table
     """All parameters of the board."""
@@ -43,33 +44,34 @@ class Profile(Protocol):
         """Return a board object, made from checked parameter values."""
 
     def settings(self, values: Mapping[str, Any]) -> object:
-        """Return these parameter values in the form that ``Board.settings`` expects."""
+        """Return the settings for ``Board.settings``, made from checked parameter values."""
 
     def opener(self, values: Mapping[str, Any]) -> Callable[[], Transport]:
         """Return a function that opens the connection to the real board.
 
-        Raises ParameterError if no attempt can succeed, however often it is repeated.
+        Raises ParameterError if the parameters name a port that can never be opened.
         """
 
     def kinematics(self, values: Mapping[str, Any]) -> Kinematics:
-        """Return the kinematics of the wheels, from checked values."""
+        """Return the kinematics of the wheels, from checked parameter values."""
 
     def extras(self, node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Publish]:
-        """Create the board's own ROS interfaces; return how to publish ``Extra`` values, by type.
+        """Create the board's own topics and services, and return its publishing functions.
 
-        The driver calls this once, on the executor's thread, before bytes come.
+        The result has a function for each type of reading that only this board has. The driver
+        calls this function once, on the executor's thread, before any bytes arrive.
         """
 
 
 def load(name: str) -> Profile:
-    """Return the profile with this name in ``PROFILES``."""
+    """Import and return the profile of the board with this name."""
     return cast(Profile, import_module(PROFILES[name]))
 
 
 def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transport]:
     """Return a function that opens the board's port, or a simulated board for ``sim://``.
 
-    Raises ParameterError if no attempt can succeed, however often it is repeated.
+    Raises ParameterError if the parameters name a port that can never be opened.
     """
     port = str(values["port"])
     if not port.lower().startswith("sim://"):
@@ -80,9 +82,9 @@ def opener(profile: Profile, values: Mapping[str, Any]) -> Callable[[], Transpor
 
 
 def table_for(given: Mapping[str, object]) -> Table:
-    """Return the parameters of the board that ``given`` names, or else of the default board.
+    """Return the parameter table of the board that ``given`` names, or of the default board.
 
-    Raises ParameterError if there is no such board.
+    ``given``: parameter values, by name. Raises ParameterError for an unknown board.
     """
     name = given.get("board", DEFAULT)
     chosen = Parameter("board", DEFAULT, "", "", choices=tuple(PROFILES)).check(name)
@@ -90,9 +92,10 @@ def table_for(given: Mapping[str, object]) -> Table:
 
 
 def check_all(given: Mapping[str, object]) -> dict[str, Value]:
-    """Return the values of all parameters of the given board.
+    """Return the values of all parameters of one board: the given values, otherwise the defaults.
 
-    Raises ParameterError if a value is wrong, or if the board lacks a given parameter.
+    ``given`` also names the board. Raises ParameterError if a value is wrong, or if the board does
+    not have a given parameter.
     """
     table = table_for(given)
     for name in given:

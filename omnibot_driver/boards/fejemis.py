@@ -56,7 +56,7 @@ def make(values: Mapping[str, Any]) -> FejemisBoard:
 
 
 def settings(values: Mapping[str, Any]) -> FejemisSettings:
-    """Make the settings that the boards do not report, from checked parameter values."""
+    """Return the settings of the board, made from checked parameter values."""
     wheels = kinematics(values)
     return FejemisSettings(
         track_m=wheels.track_m,
@@ -80,7 +80,7 @@ def opener(values: Mapping[str, Any]) -> Callable[[], Several]:
 
 
 def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
-    """Return the kinematics of the robot's wheels, with default sizes where they are unset."""
+    """Return the kinematics of the robot's wheels, with default sizes for unset parameters."""
     radii_m = values["wheel_radii"] or [WHEEL_RADIUS_M]
     return SteeredKinematics(
         wheel_radius_m=sum(radii_m) / len(radii_m),
@@ -90,7 +90,7 @@ def kinematics(values: Mapping[str, Any]) -> SteeredKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's own topics and services, and return its publishing functions."""
+    """Create this board's topics and services; return a publishing function per reading type."""
     from omnibot_driver.boards.fejemis_topics import FejemisTopics  # needs ROS
 
     publish: Mapping[type, Any] = FejemisTopics(node, link, values).publish

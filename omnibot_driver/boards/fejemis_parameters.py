@@ -2,8 +2,8 @@
 
 """The parameters that only a Fejemis has. This module must not use ROS.
 
-Values that the Teensys store are unset by default. The driver writes only set values
-(`fejemis_values.py`).
+The robot's two boards, the Teensys, store some of these values. Such a parameter is unset by
+default, and the driver then writes no value to the boards (`fejemis_values.py`).
 """
 
 import math
@@ -12,7 +12,8 @@ from typing import Final
 from omnibot_driver.parameters import RANGE_TYPES, Parameter
 
 MOST_GAINS: Final = 17
-"""Number of gains that ``cpsteer`` lists."""
+"""Largest number of values in ``steering_gains``: the board's answer to its command ``cpsteer`` has
+17."""
 
 FRONT_PORT: Final = (
     Parameter(
@@ -31,9 +32,9 @@ WHEELS: Final = (
         "wheel_radii",
         [0.0775, 0.0775],
         "m",
-        "Radius of the left and the right driving wheel. The driver writes it, `gear`,"
-        " encoder_ticks and `track` to the drive board, with the command `confw`. Unset: the"
-        " board keeps its own values.",
+        "Radius of the left and the right driving wheel. The driver writes the radii,"
+        " `gear`, encoder_ticks and `track` to the drive board, with the command `confw`. Unset:"
+        " the board keeps its own values.",
         low=0.001,
         high=1.0,
         unset=True,
@@ -127,8 +128,8 @@ DRIVING: Final = (
         "line_sums",
         "auto",
         "",
-        "Whether each line begins with a checksum (;NN). auto: if the Teensy's heartbeats begin"
-        " with one; on: always; off: never.",
+        "Whether each line to and from the Teensys begins with a checksum (;NN). auto: if the"
+        " Teensy's heartbeats begin with one; on: always; off: never.",
         choices=("auto", "on", "off"),
         fixed=True,
     ),
@@ -138,9 +139,9 @@ DRIVING: Final = (
         "s",
         "Time from ~/power_off until the board cuts the power. This computer loses power too if"
         " the board supplies it. The driver sends whole seconds. On a bad line, some numbers"
-        " could lose two digits and still have a correct checksum. The driver sends a larger"
-        " number instead: for example, 131 instead of 120. The answer of ~/power_off states the"
-        " time in use.",
+        " could lose two digits and still have a correct checksum. In place of such a number,"
+        " the driver sends a larger one: for example, 131 instead of 120. The answer of"
+        " ~/power_off states the time in use.",
         low=1.0,
         high=3600.0,
     ),

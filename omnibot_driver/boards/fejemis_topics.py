@@ -245,7 +245,8 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``off``: whether the action switches something off. This needs no connection.
+        ``what``: name of the topic or device in the reason. ``off``: whether the action switches
+        something off. Switching off is allowed without a connection.
         """
 
         def say(session: Session, now: float) -> str:
@@ -265,14 +266,14 @@ class FejemisTopics:
 
 
 def _why_not_connected(what: str, session: Session) -> str:
-    """Return why ``what`` is refused without a connection; empty if the boards are connected."""
+    """Return why ``what``, a topic or device, is refused; empty if the boards are connected."""
     if session.state in ("disconnected", "connecting"):
         return f"{what} refused: {session.board.refusal or NOT_CONNECTED}"
     return ""
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
-    """Return the node's publisher of this topic, which the driver creates for any board."""
+    """Return the publisher of this topic that the driver has already created for every board."""
     name = node.resolve_topic_name(topic)
     return next(one for one in node.publishers if one.topic_name == name)
 

@@ -15,7 +15,7 @@ from omnibot_driver.core.fejemis import Written
 
 
 def written(values: Mapping[str, Any]) -> dict[Written, tuple[float, ...]]:
-    """Return the settings that the user wants written to the boards, in the boards' units."""
+    """Return the settings that the driver must write to the boards, in the boards' units."""
     found: dict[Written, tuple[float, ...]] = {}
     radii_m, track_m = values["wheel_radii"], values["track"]
     if radii_m is not None:
@@ -55,9 +55,9 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
 
 
 def require_whole_settings(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if only a part of the parameters of one command is set.
+    """Raise ParameterError if only some of the parameters of one board command are set.
 
-    The driver writes these parameters together, with one command.
+    The driver writes all parameters of a command together.
     """
     _require_together(values, (*_WHEELS, "track"), _WHEELS, "confw")
     _require_together(values, ("steering_distance", "track"), ("steering_distance",), "confs")

@@ -100,7 +100,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's own topics and services, and return its publishing functions."""
+    """Create this board's topics and services; return a publishing function per reading type."""
     from omnibot_driver.boards.lois_ecu_topics import LoisEcuTopics  # needs ROS
 
     publish: Mapping[type, Any] = LoisEcuTopics(node, link, values).publish

@@ -2,7 +2,8 @@
 
 """The LOIS ECU's own parameters, in addition to those of every board. This module does not use ROS.
 
-Values that the board stores are unset by default. The driver writes only set values.
+The board stores some of these values. Such a parameter is unset by default, and the driver then
+writes no value to the board.
 """
 
 from collections.abc import Mapping
@@ -16,8 +17,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz. The board can forward 34 commands of 14
-characters per second to the compass."""
+"""Largest rate of commands in a terminal mode, in Hz. In this mode, the board forwards each command
+to its compass over a slow line: at most 34 commands per second."""
 
 WHEELS: Final = (
     Parameter(
@@ -163,7 +164,8 @@ _RANGES: Final = {
     "long_correction": (0.1, 10.0),
     "feed_forward": (0.0, 1000.0),
 }
-"""Limits for each kind of setting. A negative gain would be unstable. The board divides by Tn."""
+"""Lower and upper limit of each kind of setting. A negative gain would make the control unstable.
+The board divides by Tn, so Tn must not be 0."""
 
 
 _UNITS: Final = {"tn": "s", "td": "s"}
@@ -256,7 +258,7 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the command rate would delay Stop in a terminal mode.
 
-    The board then forwards each Stop to a sensor at 4800 baud.
+    In such a mode, the board forwards each Stop to a sensor over a line with 4800 baud.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(
@@ -267,9 +269,9 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if the board cannot work with a period.
+    """Raise ParameterError if the period of a message is too short or too long for the board.
 
-    With a period near 0, the public firmware always sends and misses all commands.
+    With a period near 0, the public firmware sends all the time and misses all commands.
     """
     for name in PERIODS:
         period_s = values[name]

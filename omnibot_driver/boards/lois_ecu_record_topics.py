@@ -2,7 +2,7 @@
 
 """Services that start a record of the LOIS ECU, and answer when the record's file is written.
 
-This module only connects ROS to the session.
+A record is a series of readings that the board takes. This module only connects ROS to the session.
 """
 
 import threading
@@ -35,10 +35,9 @@ NAMES: Final = {
 
 
 class Recorder:
-    """The record services of one node.
+    """The services of one node that start records.
 
     ``values``: function that returns the present parameter values.
-
     ``publish``: for each type of result, the function that receives it.
     """
 
@@ -86,7 +85,7 @@ class Recorder:
         self._end(self._token, False, f"the record failed: {failed.reason}")
 
     def _on_record(self, reading: RecordReading, _stamp_ns: int) -> None:
-        """Write the file on a thread of its own, so that a slow disk does not delay the reader."""
+        """Write the record on a separate thread, so that a slow disk does not delay the reader."""
         save = partial(self._save, self._token, reading)
         threading.Thread(target=save, name="omnibot-record", daemon=True).start()
 

@@ -27,7 +27,7 @@ Row = tuple[object, ...]
 def table(reading: RecordReading) -> Iterator[Row]:
     """Yield the header of the file, then one row for each sample; an unknown value is empty.
 
-    Headings are clockwise from magnetic north. The torques' scale is unknown.
+    Headings are in degrees, clockwise from magnetic north. The scale of the torques is unknown.
     """
     record = reading.record
     if record.kind is RecordKind.HEADING:
@@ -82,7 +82,7 @@ def file_name(kind: RecordKind, at_s: float) -> str:
 def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda: True) -> bool:
     """Write the record to ``path``; return whether the file exists afterwards. Raises OSError.
 
-    ``wanted`` is called after writing; False discards the data.
+    ``wanted``: called after writing; if it returns False, the written data are discarded.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)

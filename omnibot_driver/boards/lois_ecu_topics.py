@@ -29,8 +29,8 @@ from omnibot_driver.core.session import Session
 from omnibot_driver.qos import DEEP, LATCHED
 
 FIX_VARIANCE_M2: Final = 0.4**2
-"""Variance in m² that comes from the rounding of a longitude to float32. The GPS adds a larger
-error, which the board does not report."""
+"""Variance in m² that comes from the rounding of a longitude to float32. The error of the GPS
+itself is larger; the board does not report it."""
 GPS_VARIANCE_M2: Final = 5.0**2
 ABSENT: Final = [-1.0] + [0.0] * 8
 TERMINAL_DEPTH: Final = 100
@@ -78,9 +78,10 @@ class LoisEcuTopics:
         self._make_what_the_modes_need()
 
     def _make_what_the_modes_need(self) -> None:
-        """Create the topics of the present modes; remove ``duty_cmd`` outside of duty mode.
+        """Create the topics that the present modes need; remove ``duty_cmd`` outside of duty mode.
 
-        This must be called on the executor's thread.
+        The modes are the parameters ``drive_mode`` and ``terminal_mode``. This method must be
+        called on the executor's thread.
         """
         duty, terminal = (
             self._values["drive_mode"] == "duty",

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Profile of the MART motion controller: its parameters, and what is made from their values."""
+"""Profile of the MART motion controller: its parameters, and the objects made from their values."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -51,7 +51,7 @@ def make(values: Mapping[str, Any]) -> MartBoard:
 
 
 def settings(values: Mapping[str, Any]) -> MartSettings:
-    """Make the settings that the board does not report, from checked parameter values."""
+    """Return the settings of the board, made from checked parameter values."""
     wheels = kinematics(values)
     sign = -1 if values["encoder_inverted"] else 1
     return MartSettings(
@@ -88,7 +88,7 @@ def kinematics(values: Mapping[str, Any]) -> DifferentialKinematics:
 
 
 def extras(node: Any, link: Any, values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Create this board's own topics and services, and return its publishing functions."""
+    """Create this board's topics and services; return a publishing function per reading type."""
     from omnibot_driver.boards.mart_topics import MartTopics  # needs ROS
 
     publish: Mapping[type, Any] = MartTopics(node, link, values).publish

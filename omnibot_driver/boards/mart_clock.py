@@ -1,23 +1,24 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The numbers of the command TIME, and when they may be sent.
+"""The arguments of the controller's command TIME, which sets its clock, and when it may be sent.
 
-TIME sets the server's clock to a full minute. A clock that is set back between two motions makes
-the heading wrong. This module knows times only.
+TIME sets the clock to a full minute. If the clock is set back between two motions, the controller
+computes a wrong heading. This module knows times only.
 """
 
 import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of a minute in which the driver sends TIME with the next minute. So the server's clock is
-at most 4 s fast."""
+"""Seconds of each minute in which the driver sends the command TIME with the next full minute. The
+controller's clock is then at most 4 s fast."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:
     """Return month, day, year, hour, minute and second (UTC) for TIME, or None if TIME must wait.
 
-    ``now_s``: s since 1970. ``may_set_back``: whether TIME may set back the server's clock.
+    TIME is the command that sets the controller's clock. ``now_s``: present time in s since 1970.
+    ``may_set_back``: whether TIME may set the clock back.
     """
     ends = time.gmtime(now_s).tm_sec in ENDS_S
     if not (ends or may_set_back):

@@ -163,9 +163,9 @@ class MartTopics:
         return done
 
     async def _save(self, done: JobDone) -> tuple[bool, str]:
-        """Write the file in a separate thread, because the disk may be slow.
+        """Write a downloaded file in a separate thread, because the disk may be slow.
 
-        Returns whether the file was written, and the message for the caller.
+        Returns whether the file was written, and the message for the caller of the service.
         """
         answer = Future()
 

@@ -29,7 +29,7 @@ def make(values: Mapping[str, Any]) -> OmniBot:
 
 
 def settings(values: Mapping[str, Any]) -> OmniBotSettings:
-    """Make the settings that the board does not report, from checked parameter values."""
+    """Return the settings of the board, made from checked parameter values."""
     return OmniBotSettings(
         baudrate=values["baudrate"],
         linear_scale=values["linear_scale"],
@@ -47,7 +47,7 @@ def settings(values: Mapping[str, Any]) -> OmniBotSettings:
 
 
 def opener(values: Mapping[str, Any]) -> Callable[[], SerialPort]:
-    """Return a function that opens a device, or any URL that pyserial knows."""
+    """Return a function that opens the port: a device, or a URL that pyserial supports."""
     check_address(values["port"])
     return partial(SerialPort, values["port"], values["baudrate"])
 
@@ -58,5 +58,5 @@ def kinematics(values: Mapping[str, Any]) -> OmniKinematics:
 
 
 def extras(_node: Any, _link: Any, _values: Mapping[str, Any]) -> Mapping[type, Any]:
-    """Return nothing, since this board has no topics or services of its own."""
+    """Return an empty mapping, because this board has no topics or services of its own."""
     return {}

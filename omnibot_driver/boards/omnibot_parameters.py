@@ -26,8 +26,8 @@ OMNIBOT: Final = (
         "linear_scale",
         70.0,
         "LSB/(m/s)",
-        "Board units (LSB) for a linear speed of 1 m/s. For cmd_vel it is the speed of the robot,"
-        " for wheel_cmd that of a wheel's rim.",
+        "Number, in units of the board (LSB), that commands a linear speed of 1 m/s: the robot's"
+        " speed for cmd_vel, and the speed of a wheel's rim for wheel_cmd.",
         low=1.0,
         high=10_000.0,
         calibrated=True,
@@ -139,9 +139,9 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if a goal pose has no consistent meaning with these axis signs.
+    """Raise ParameterError if the axis signs give a goal pose no consistent meaning.
 
-    Reversing x or y alone also reverses yaw.
+    If exactly one of x and y is reversed, yaw must be reversed too.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Parameters: the rows that are common to boards, and the table of one board.
+"""Parameters: the table of one board, and the rows that boards share. Each parameter is a row.
 
 ``make docs`` writes config/<board>.yaml and docs/parameters.md from the tables. New common rows
-belong in ``operating`` or ``robot``, a board's own rows beside the board's profile. This package
-knows neither ROS nor a board.
+belong in ``operating`` or ``robot``; rows of one board belong beside the board's profile. This
+package knows neither ROS nor a board.
 """
 
 from omnibot_driver.parameters.parameter import RANGE_TYPES, Parameter, Value

@@ -2,7 +2,7 @@
 
 """Common parameters of the driver's operation: the line, commands, frames.
 
-``table`` decides which of them a board has. This module does not use ROS.
+The module ``table`` selects the parameters that a board has. This module does not use ROS.
 """
 
 from typing import Final

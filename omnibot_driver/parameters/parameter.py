@@ -9,10 +9,10 @@ from typing import Any, Final
 from omnibot_driver.core.errors import ParameterError
 
 TYPES: Final = {bool: "a bool", int: "an integer", float: "a double", str: "a string"}
-"""Names of the types in ROS."""
+"""Names of Python's types in ROS, for error messages."""
 QUOTE: Final = "YAML reads on, off, yes and no as true or false; put the word in quotes"
 RANGE_TYPES: Final = ("ultrasound", "infrared")
-"""Values of a parameter for the type of a range sensor."""
+"""Allowed values of a parameter that gives the type of a range sensor."""
 DUMPED_UNSET: Final = "null"
 """Value of an unset parameter in the file of ``ros2 param dump``, as the driver reads it."""
 NUMBERS: Final = ("no", "one", "two", "three", "four", "five", "six")
@@ -22,19 +22,15 @@ Value = bool | Item | list[int] | list[float] | list[str] | None
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One row of the table.
+    """One parameter: a row in the parameter table of a board.
 
     ``default``: its type is the parameter's type. A list has at least one item.
-
     ``low``, ``high``, ``choices``: limits and allowed values; for a list, those of each item.
-
     ``fixed``: whether the value is read-only after the start.
-
     ``calibrated``: whether a calibration file may contain the value.
-
-    ``length``: limits of a list's length; None: as long as the default.
-
-    ``unset``: whether the value is None unless given; the default then only defines the type.
+    ``length``: smallest and largest length of a list; None: the length of the default.
+    ``unset``: whether the value is None until the user sets it. ``default`` then only defines the
+    type.
     """
 
     name: str
@@ -66,7 +62,7 @@ class Parameter:
 
     @property
     def lengths(self) -> tuple[int, int]:
-        """Least and largest number of items of a list."""
+        """Smallest and largest number of items of a list."""
         assert isinstance(self.default, list)
         return self.length or (len(self.default),) * 2
 
@@ -84,7 +80,7 @@ class Parameter:
         return ""
 
     def check(self, value: object) -> Value:
-        """Return the value in the parameter's own type.
+        """Return the value in the parameter's own type, such as 1.0 for the integer 1.
 
         Raises ParameterError if the value is wrong.
         """
@@ -142,7 +138,10 @@ class Parameter:
 
 
 def _converted(value: object, kind: type) -> object:
-    """Return 1 as 1.0 for a double, or 1.0 as 1 for an integer; return other values unchanged."""
+    """Return an integer as a float, or a whole float as an integer, if ``kind`` requires it.
+
+    Other values are returned unchanged.
+    """
     if kind is float and type(value) is int:
         return float(value)
     if kind is int and isinstance(value, float) and value.is_integer():

@@ -2,7 +2,7 @@
 
 """Common parameters of the robot, of its IMU, and of the noise of its measurements.
 
-``table`` decides which of them a board has. This module does not use ROS.
+The module ``table`` selects the parameters that a board has. This module does not use ROS.
 """
 
 from typing import Final

@@ -2,7 +2,7 @@
 
 """Settings of the core's session, made from checked parameter values.
 
-If a board lacks a parameter, its setting has a default.
+If a board does not have a parameter, the setting has a default value.
 """
 
 import math

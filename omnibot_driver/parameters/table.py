@@ -17,7 +17,7 @@ from omnibot_driver.parameters import operating, robot
 from omnibot_driver.parameters.parameter import Parameter, Value
 
 Check = Callable[[Mapping[str, Any]], None]
-"""A check of all values together, which raises ParameterError."""
+"""Function that checks the values of all parameters together. It raises ParameterError."""
 
 COMMON: Final = {
     "The line": operating.LINE,
@@ -60,8 +60,8 @@ NEEDS: Final[Mapping[str, Callable[[Traits], bool]]] = {
     "linear_acceleration_stddev": _has_imu,
     "angular_velocity_stddev": _has_imu,
 }
-"""For a common parameter: whether a board with given traits has it. Other common parameters do not
-depend on the traits."""
+"""For some common parameters: the function that returns whether a board with given traits has the
+parameter. Other common parameters do not depend on the traits."""
 DISPENSABLE: Final = frozenset(
     {
         "baudrate",
@@ -80,15 +80,15 @@ DISPENSABLE: Final = frozenset(
 """Common parameters that a board may omit. A board must have all other common parameters that fit
 its traits, because the driver reads them."""
 LAST_WORDS: Final = {"pause": Request.PAUSE, "reset": Request.RESET}
-"""Values of ``on_exit`` besides stop, each with the request that a board must support for it."""
+"""Values of the parameter ``on_exit`` except stop. A board offers such a value only if it supports
+the request that belongs to the value."""
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
     """All parameters of one board, by section.
 
-    ``checks``: checks that need the values of several parameters.
-
+    ``checks``: functions that check the values of several parameters together.
     ``by_name``: all parameters by name.
     """
 
@@ -103,12 +103,12 @@ class Table:
 
     @property
     def rows(self) -> tuple[Parameter, ...]:
-        """All rows in order."""
+        """All parameters, in the order of the sections."""
         return tuple(self.by_name.values())
 
     @property
     def calibrated(self) -> tuple[str, ...]:
-        """Names of the parameters that a calibration file may hold."""
+        """Names of the parameters that a calibration file may contain."""
         return tuple(row.name for row in self.rows if row.calibrated)
 
     def check_all(self, given: Mapping[str, object]) -> dict[str, Value]:
@@ -141,10 +141,9 @@ def table(
     """Return the table of a board with these traits.
 
     ``own``: rows that only this board has, by section.
-
     ``without``: names in ``DISPENSABLE`` that have no meaning for this board.
-
-    ``changed``: fields of common rows, e.g. ``{"port": {"default": "udp://"}}``.
+    ``changed``: changed fields of common rows, such as ``{"port": {"default": "udp://"}}``.
+    ``checks``: functions that check several values of this board together.
     """
     changes = {
         "on_exit": {

@@ -105,7 +105,7 @@ def _no_terminal(url: str, parameter: str) -> str:
 
 
 def _owner(path: str) -> str:
-    """Return the process that has locked this file, in brackets; empty if it is unknown."""
+    """Return number and name of the process that has locked this file, in brackets; else empty."""
     with contextlib.suppress(OSError, ValueError):
         status = os.stat(path)
         device = f"{os.major(status.st_dev):02x}:{os.minor(status.st_dev):02x}"

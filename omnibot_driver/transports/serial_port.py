@@ -29,7 +29,8 @@ PEER_OPTIONS: Final = {
     socket.TCP_KEEPINTVL: 1,
     socket.TCP_USER_TIMEOUT: 5000,
 }
-"""Options of a network socket. A peer that acknowledges nothing for five seconds is lost."""
+"""Options of a network socket. A peer that acknowledges nothing for five seconds is regarded as
+lost."""
 PSEUDO_TERMINALS: Final = range(136, 144)
 """Major device numbers of pseudo-terminals in Linux."""
 
@@ -180,9 +181,9 @@ def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
 
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    """Write all bytes, and sleep while the port has no room. Pyserial would not sleep.
+    """Write all bytes, and sleep while the port has no room. pyserial would not sleep.
 
-    Raises TimeoutError if the port has no room for ``WRITE_TIMEOUT_S``.
+    Raises TimeoutError if the port has no room for 0.2 s (``WRITE_TIMEOUT_S``).
     """
     until = time.monotonic() + WRITE_TIMEOUT_S
     while True:

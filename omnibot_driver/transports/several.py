@@ -73,7 +73,8 @@ class Several:
     def descriptors(self) -> tuple[int | None, ...] | None:
         """Descriptors of all lines, by channel; None for a missing line.
 
-        With a copy in the guard, the driver could not open the line again.
+        If the guard process had a copy of a missing line's descriptor, the driver could not open
+        this line again.
         """
         return tuple(None if line.trouble else line.descriptor for line in self._lines)
 
@@ -191,9 +192,9 @@ class Several:
             self._changed = True
 
     def _write_what_waits(self, now: float) -> None:
-        """Write waiting bytes to lines with room. Let ``poll`` watch the lines without room.
+        """Write waiting bytes to each line with room; let ``poll`` report room on the others.
 
-        After ``WRITE_TIMEOUT_S`` without room, a line is missing.
+        A line that has no room for 0.2 s (``WRITE_TIMEOUT_S``) is regarded as missing.
         """
         with self._writing:
             for line in self._lines:
@@ -273,9 +274,9 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if some of them have waited for ``WRITE_TIMEOUT_S``.
+        """Write waiting bytes; return False if some of them have waited for 0.2 s or more.
 
-        After False, all unsent bytes are discarded.
+        Before it returns False, the method discards all unsent bytes.
         """
         assert self.port is not None
         if self.waits and not self.trouble:

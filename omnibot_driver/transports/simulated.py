@@ -80,7 +80,7 @@ class SimulatedTransport:
 
 
 def check_address(url: str, simulator: str) -> None:
-    """Raise ParameterError if the URL has an option that this simulated board does not know."""
+    """Raise ParameterError if the URL has an option that this simulated board does not have."""
     _board_and_lines(url, simulator)
 
 

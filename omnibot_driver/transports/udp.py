@@ -64,7 +64,7 @@ class UdpPorts:
         return tuple(ours.fileno() for ours in self._sockets)
 
     def read(self) -> Packet:
-        """Return one datagram and its channel, or ``(0, b"")`` if none arrives in time."""
+        """Return one datagram and its channel, or ``(0, b"")`` if none arrives within 0.2 s."""
         if not self._ready:
             self._ready = [ready for ready, _ in self._arrivals.poll(1e3 * READ_TIMEOUT_S)]
         if not self._ready:
@@ -155,7 +155,7 @@ class UdpPorts:
 def check_address(url: str, channels: int = 1) -> None:
     """Raise ParameterError if this is not the address of a host.
 
-    It accepts a host that is unknown at present, because the host may appear later.
+    A host that is unknown at present is accepted, because the host may appear later.
     """
     _place(url, channels)
 
