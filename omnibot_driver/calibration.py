@@ -14,7 +14,8 @@ from omnibot_driver.core.errors import ParameterError
 from omnibot_driver.parameters import Table, Value
 
 RECORDED: Final = ("imu_rpy", "step")
-"""Names that ``calibrate`` writes for people who read the file. The driver ignores them."""
+"""Names in the calibration file that the tool ``calibrate`` writes only for people who read the
+file. The driver ignores them."""
 
 
 def locate(file: str) -> Path:
@@ -34,7 +35,7 @@ def locate(file: str) -> Path:
 def load(path: Path, table: Table) -> dict[str, Value]:
     """Return the file's values of this board's calibrated parameters; empty without a file.
 
-    Raises ParameterError, with a remedy, for an unreadable file or a wrong value.
+    Raises ParameterError for an unreadable file or a wrong value; the message names a remedy.
     """
     content = _read(path)
     try:
@@ -59,7 +60,7 @@ def save(path: Path, values: Mapping[str, Any]) -> None:
     """Write these values into the file, completely or not at all, and keep its other values.
 
     Comments are lost. A symbolic link is kept. Raises ParameterError if the old file is unreadable,
-    and OSError.
+    and OSError if the new file cannot be written.
     """
     import tempfile  # takes 1 MB, and few drivers ever save
 

@@ -2,8 +2,8 @@
 
 """Serialise measurements to CDR, the format of DDS messages, and parse velocity commands from CDR.
 
-CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write CDR quickly.
-``difference`` checks this on each machine.
+CDR aligns numbers like a C struct on a 64-bit machine, so ``struct`` can write CDR quickly. At each
+start, ``difference`` compares the result with that of rclpy on this machine.
 """
 
 import itertools
@@ -36,9 +36,9 @@ AT_REST: Final = (0.0,) * 6
 
 
 class Serializer:
-    """Makes the bytes of IMU, odometry and joint state messages, with fixed settings.
+    """A fast serialiser of IMU, odometry and joint state messages, with fixed settings.
 
-    ``stamp_ns``: stamp of a message, in ns since the epoch of the clock.
+    In each method, ``stamp_ns`` is the stamp of the message, in ns since the epoch of the clock.
     """
 
     def __init__(self, settings: MessageSettings) -> None:
@@ -65,7 +65,7 @@ class Serializer:
         self._joints_head = (*no_values, count, *itertools.chain(*name_values), count)
 
     def imu(self, estimate: ImuEstimate, stamp_ns: int) -> bytes:
-        """Return the bytes of the message that ``messages.imu_message`` makes."""
+        """Return the CDR bytes of an ``imu/data_raw`` message with this estimate and stamp."""
         return LITTLE_ENDIAN + self._imu.pack(
             *divmod(stamp_ns, 10**9),
             *self._imu_head,
@@ -76,7 +76,7 @@ class Serializer:
         )
 
     def odometry(self, estimate: OdometryEstimate, stamp_ns: int) -> bytes:
-        """Return the bytes of the message that ``messages.odometry_message`` makes."""
+        """Return the CDR bytes of an ``odom`` message with this estimate and stamp."""
         pose, twist, noise = estimate.pose, estimate.twist, estimate.covariance
         half_rad = pose.yaw_rad / 2
         moving, twist_noise = AT_REST, messages.TWIST_NOT_KNOWN
@@ -97,7 +97,7 @@ class Serializer:
         )
 
     def joint_state(self, wheels: Wheels, stamp_ns: int) -> bytes:
-        """Return the bytes of the message that ``messages.joint_state_message`` makes."""
+        """Return the CDR bytes of a ``joint_states`` message with this wheel state and stamp."""
         _, angles, rates = wheels
         head = (*divmod(stamp_ns, 10**9), *self._joints_head, *angles)
         if rates:
@@ -124,9 +124,9 @@ def twist(data: bytes) -> tuple[BodyTwist, bool]:
 
 
 class Messages:
-    """A replacement for Serializer that returns rclpy messages instead of bytes.
+    """A replacement for Serializer that returns rclpy messages instead of CDR bytes.
 
-    The driver uses it if the bytes of Serializer differ from rclpy's own.
+    The driver uses it if the bytes from Serializer differ from those from rclpy.
     """
 
     def __init__(self, settings: MessageSettings) -> None:
@@ -187,6 +187,6 @@ def _same(ours: bytes, theirs: bytes, kind: type) -> bool:
 
 
 def _text(text: str) -> tuple[str, tuple[int, bytes]]:
-    """Return the struct format and the values of a string."""
+    """Return the ``struct`` format of a CDR string, and the values to pack: length and bytes."""
     data = text.encode() + b"\0"
     return f"I{len(data)}s", (len(data), data)

@@ -28,9 +28,12 @@ def obeying(
 ) -> Callable[[Any, MessageInfo], None]:
     """Return a callback that passes each message to ``action``, with the session of the link.
 
+    An old message is refused instead.
+
     * ``expires_s``: returns the age, in s, at which a command expires.
-    * ``may_be_old``: whether the message's time in transit does not matter.
-    * ``is_stop``: whether the message stops the robot, even if it is old.
+    * ``may_be_old``: returns True for a message whose time in transit does not matter.
+    * ``is_stop``: returns True for a message that stops the robot. It is obeyed even if it is old.
+    * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()
 

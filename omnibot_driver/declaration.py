@@ -29,7 +29,8 @@ NOT_OURS: Final = re.compile(
 def declare(node: Node) -> dict[str, Any]:
     """Declare all parameters on the node, and return their values at start.
 
-    The calibration file takes precedence. Raises ParameterError for a wrong value.
+    Values in the calibration file replace those that the user gives. Raises ParameterError for a
+    wrong value.
     """
     given = {
         name: override.value
@@ -49,9 +50,9 @@ def declare(node: Node) -> dict[str, Any]:
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:
-    """Return all values after a change; ``values`` are those before it.
+    """Return all parameter values after a change; ``values`` are those before the change.
 
-    A 1 becomes 1.0 for a real parameter, because messages need this type.
+    For a floating-point parameter, an integer becomes a float, because messages need this type.
     """
     table = boards.table_for(values)
     return table.check_all({**values, **_ours(changed, table)})

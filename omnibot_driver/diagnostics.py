@@ -2,8 +2,8 @@
 
 """Diagnostics: a report on the link, the board and the commands, once a second on ``/diagnostics``.
 
-Without diagnostic_updater, this module publishes an equal message. The timer must use the steady
-clock, not simulated time.
+If the package diagnostic_updater is missing, this module publishes the same message itself. The
+timer must use the steady clock, not simulated time.
 """
 
 import time

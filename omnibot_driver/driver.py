@@ -40,14 +40,14 @@ HINTS: Final = {
     "remap rule": "write -r NAME:=VALUE, such as -r __ns:=/robot1",
     "params file": "check that the file exists and is valid YAML",
 }
-"""What to do about an argument that ROS rejects, by words in the text of ROS."""
+"""Advice about an argument that ROS rejects. The keys are words in the error text of ROS."""
 
 
 class Ending:
-    """Lets the main thread wait until the driver must end: at a signal or a call of ``begin``.
+    """The event that ends the driver: a signal, or a call of ``begin``.
 
-    Signals write to a pipe, because signal handlers must not use locks.
-
+    The main thread waits for it. Signals write to a pipe, because signal handlers must not use
+    locks.
     ``defect``: the exception that ended the driver, or None.
     """
 
@@ -70,7 +70,7 @@ class Ending:
 
     @property
     def begun(self) -> bool:
-        """Whether ``wait`` would return at once."""
+        """Whether the driver must already end: a signal came, or ``begin`` was called."""
         return bool(select.select([self._wakes], [], [], 0)[0])
 
     def wait(self) -> None:
@@ -100,7 +100,7 @@ def _refuse(why: str) -> int:
 
 
 def in_plain_words(text: str) -> str:
-    """Return an error text of ROS without places in its source code, and say what to do."""
+    """Return an error text of ROS without positions in the source code of ROS, and add advice."""
     text = re.sub(r", at \S+:\d+", "", text).removeprefix("Failed to parse ROS arguments: ")
     text = re.sub(r"\. Error: (error not set|Unknown YAML event|.*lexeme.*)$", "", text)
     return "; ".join([text, *(hint for words, hint in HINTS.items() if words in text)])
@@ -179,9 +179,9 @@ def _run(ending: Ending, args: list[str]) -> None:
 
 
 def _set_deadline() -> None:
-    """End the process if the shutdown takes longer than ``LONGEST_END_S``.
+    """End the process if the shutdown takes longer than 4 s (``LONGEST_END_S``).
 
-    In this case the guard stops the robot.
+    The guard process then stops the robot.
     """
 
     def give_up() -> None:

@@ -22,7 +22,7 @@ LATCHED_BEAT = b"e"
 """Heartbeat of a driver whose e-stop is latched."""
 WORDS = b"="
 END = b"\n"
-"""End of a message that begins with ``WORDS``. Such a message replaces both stop commands."""
+"""End of a message that begins with ``=``. Such a message replaces both stop commands."""
 BYE = b"!"
 """Message that ends the guard. The driver sends it after it has stopped the robot itself."""
 LIMIT_S = 0.5
@@ -43,7 +43,8 @@ Words = list[tuple[int, bytes]]
 def watch(stop: Words, emergency_stop: Words) -> None:
     """Watch the driver until it ends, and stop the robot if necessary.
 
-    This is necessary if the driver hangs, or if it ends without ``BYE``.
+    This is necessary if the driver hangs, or if it ends without sending ``BYE``. ``BYE`` means that
+    the driver has stopped the robot itself.
     """
     patience_s: float | None = LIMIT_S
     latched, rest = False, b""
@@ -69,7 +70,7 @@ def watch(stop: Words, emergency_stop: Words) -> None:
 
 
 def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
-    """Split the input into heartbeats, the newest stop commands and an incomplete rest."""
+    """Split the received bytes into heartbeats, the newest stop commands and an incomplete rest."""
     beats = given = b""
     while WORDS in heard:
         before, _, after = heard.partition(WORDS)
@@ -82,7 +83,7 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int]) -> None:
-    """Write ``last_words`` ``TIMES`` times, or until a descriptor in ``until`` has input."""
+    """Write the stop command 20 times, or until a descriptor in ``until`` has input."""
     lines = {line for line, _ in last_words}
     for line in lines:
         drop_what_waits(line)

@@ -41,8 +41,8 @@ guard process needs to start."""
 class Keeper:
     """The guard process for a set of open lines, from construction until ``end``.
 
-    * ``descriptors``: of each line, by channel. None if the line is not open.
-    * ``stop``, ``emergency_stop``: packets to send without and with a latched e-stop.
+    * ``descriptors``: file descriptor of each line, by channel. None if the line is not open.
+    * ``stop``, ``emergency_stop``: packets that the guard sends without and with a latched e-stop.
     """
 
     def __init__(
@@ -62,9 +62,9 @@ class Keeper:
         self._start()
 
     def beat(self, now: float, *, latched: bool = False) -> str:
-        """Send the guard a heartbeat. Call this every ``BEAT_S``, neither more nor less often.
+        """Send the guard a heartbeat. Call this method every 0.1 s, neither more nor less often.
 
-        Returns a sentence for the user at the guard's first failure.
+        Returns a sentence for the user at the guard's first failure, otherwise an empty text.
         """
         self._dying = [process for process in self._dying if process.poll() is None]
         word = guard.LATCHED_BEAT if latched else guard.BEAT
@@ -77,7 +77,7 @@ class Keeper:
         return trouble
 
     def change(self, stop: Packets, emergency_stop: Packets) -> None:
-        """Give the guard new stop commands, without waiting for any process."""
+        """Send the guard new stop commands, without waiting for any process."""
         self.last_words = stop, emergency_stop
         if (process := self._process) is None:
             return
@@ -92,7 +92,8 @@ class Keeper:
     def end(self, *, stopped: bool) -> None:
         """End the guard, so that only this process holds the port. A second call does nothing.
 
-        Unless ``stopped``, the guard first sends its stop command.
+        ``stopped``: whether the robot is already stopped. If not, the guard first sends its stop
+        command.
         """
         self._restart_at = math.inf
         if stopped:
@@ -124,9 +125,9 @@ class Keeper:
         return "the guard process hung"
 
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill the guard without waiting for its end. Later heartbeats check whether it has ended.
+        """Kill the guard without waiting for its end; later heartbeats check whether it has ended.
 
-        The caller holds the lock, so waiting would delay the e-stop.
+        The caller holds the lock of the session, so waiting would delay the e-stop.
         """
         assert process.stdin is not None
         process.stdin.close()
@@ -135,7 +136,7 @@ class Keeper:
         self._process, self._broken = None, False
 
     def _addressed(self, packets: Packets) -> str:
-        """Encode packets for the guard, without those for missing lines."""
+        """Return the packets as text for the guard, without packets for lines that are not open."""
         return ",".join(
             f"{line}:{data.hex()}"
             for channel, data in packets

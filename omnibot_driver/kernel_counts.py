@@ -12,8 +12,8 @@ TIOCGICOUNT: Final = 0x545D
 ``termios`` does not have it on every platform."""
 _COUNTS: Final = struct.Struct("20i")
 _OVERRUN, _BUFFER_OVERRUN = 7, 10
-"""``_OVERRUN``, ``_BUFFER_OVERRUN``: positions in ``serial_icounter_struct`` of two counts:
-overruns of the receiver, and of the tty's buffer."""
+"""Positions of two counts in the kernel's struct ``serial_icounter_struct``: overruns of the
+receiver, and of the tty's buffer."""
 
 
 def overruns(descriptor: int) -> int | None:

@@ -6,7 +6,8 @@
 * The *pacer* sleeps until a command, a timeout, a retry or the guard's heartbeat is due.
 * The *teller* delivers all other events.
 
-All threads and callers use one lock. Events are delivered in their order under this lock.
+All threads and callers use one lock. Events are delivered in the order in which they occurred under
+this lock.
 """
 
 import threading
@@ -25,14 +26,14 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longest wait for a thread to end, in s. The reader may wait for the guard, which takes less
-time."""
+"""Longest wait for a thread to end, in s. The reader thread may itself wait for the guard to end,
+which takes less time."""
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest; longer for a slow
 board."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, if no guard process can repeat Stop. In this case ``UNGUARDED_S``
-replaces ``STANDS_WITHIN_S``."""
+"""Longest wait at shutdown, in s, if no guard process can repeat Stop. It then replaces the usual
+wait, ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
 """Longest wait, in s, for a second proof of rest; longer for a slow board. Meanwhile nothing is
 sent, so the proof shows that the last Stop arrived undamaged."""
@@ -46,10 +47,10 @@ class Link:
     * ``port``: name of the port in messages to the user.
     * ``guard``: whether a separate process stops the robot when this process cannot.
     * ``report``: receives a sentence when a line is missing, and None when all are open.
-    * ``failed``: receives the exception, always a defect, that ended a thread.
+    * ``failed``: receives the exception that ended a thread. Such an exception is always a defect.
 
-    The functions except ``opener`` and ``failed`` are called one at a time, on any thread, in the
-    order of the events.
+    All function arguments except ``opener`` and ``failed`` are called one at a time, on any thread,
+    in the order of the events.
     """
 
     def __init__(
@@ -96,7 +97,10 @@ class Link:
             thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
-        """Call ``action`` with the session; see ``SharedSession.call``."""
+        """Call ``action`` with the session and the time in s, and return its result.
+
+        ``SharedSession.call`` has the details.
+        """
         return self._shared.call(action)
 
     def command(
@@ -107,7 +111,10 @@ class Link:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass a command to the session; see ``SharedSession.command``."""
+        """Pass the command ``wish`` to the session by a call of ``action``.
+
+        ``SharedSession.command`` has the details.
+        """
         self._shared.command(action, wish, sent_ns, moves_base=moves_base)
 
     @property
@@ -121,7 +128,7 @@ class Link:
 
     @property
     def blocked(self) -> bool:
-        """Whether the port did not accept the last packets; see ``SharedSession.blocked``."""
+        """Whether the port did not accept the last packets. The reader then opens it again."""
         return self._shared.blocked
 
     def figures(self) -> tuple[LinkFigures, SessionFigures]:
@@ -141,8 +148,8 @@ class Link:
     def close(self, on_exit: OnExit) -> bool:
         """Stop the robot, end the threads and close the port. A second call is allowed.
 
-        Returns whether this call sent Stop and ended the threads. After a lost port, the reader
-        tries Stop again.
+        Returns whether this call sent Stop and ended the threads. If the port was lost before, the
+        reader thread opens it once more to send Stop.
         """
         with self._shared.lock:
             if ends := not self._shared.leaving:

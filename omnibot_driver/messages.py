@@ -59,7 +59,8 @@ Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 class MessageSettings:
     """What messages contain besides measurements: frames, standard deviations and wheels.
 
-    Frames include the prefix. Standard deviations are in SI units, 0 without an IMU.
+    Names of frames include the prefix. Standard deviations are in SI units, and 0 if the board has
+    no parameter for them.
     """
 
     odom_frame: str
@@ -73,7 +74,7 @@ class MessageSettings:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], wheels: Kinematics) -> "MessageSettings":
-        """Make the settings from checked parameter values and the wheels of the board."""
+        """Make the settings from checked parameter values and the kinematics of the wheels."""
         prefix = values["frame_prefix"]
         return cls(
             odom_frame=prefix + values["odom_frame"],
@@ -173,7 +174,7 @@ def diagnostic_message(
 ) -> DiagnosticArray:
     """Return a ``/diagnostics`` message.
 
-    The names of its statuses have the form that diagnostic_updater gives them.
+    Each status is named "node: status", as by diagnostic_updater.
     """
     return DiagnosticArray(
         header=Header(stamp=stamp),
@@ -208,7 +209,8 @@ def is_planar(twist: Any) -> bool:
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
     """Return the planar pose of a geometry_msgs/PoseStamped; z is ignored.
 
-    Raises CommandRefused for another frame, NaN or infinity, a tilt, or no unit quaternion.
+    Raises CommandRefused for another frame, NaN or infinity, a tilt, or a quaternion of a wrong
+    length.
     """
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):
@@ -260,9 +262,10 @@ def time_message(nanoseconds: int) -> Time:
 
 
 def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> int:
-    """Return wall clock minus steady clock, in ns; ``known_ns`` if the readings allow this value.
+    """Return wall clock minus steady clock, in ns.
 
-    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``.
+    ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. ``known_ns`` is
+    the previous result. It is returned again if these readings allow it.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -39,7 +39,8 @@ LOOK_EVERY_S = WARN_EVERY_S = 2.0
 class OmniBotDriver(Node):
     """The driver node. Raises ParameterError if it cannot start with the given parameters.
 
-    ``end`` is called when the driver has to end. Its argument is the defect, or None.
+    ``end`` is called when the driver has to end. Its argument is the exception of a defect, or
+    None.
     """
 
     def __init__(
@@ -94,7 +95,8 @@ class OmniBotDriver(Node):
     def create_publisher(self, kind: type, topic: str, qos: Any, **options: Any) -> Publisher:
         """Create a publisher without callbacks for quality-of-service events.
 
-        The executor would check each callback before each command.
+        With these callbacks, the executor would handle each command later, because it checks all of
+        them first.
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
@@ -215,7 +217,7 @@ class OmniBotDriver(Node):
         session.command_pose(messages.goal_pose(goal, frame), now)
 
     def _look_around(self) -> None:
-        """Warn once of each mistake that ROS does not report, such as two nodes of one name."""
+        """Warn once of each mistake that ROS does not report, such as two nodes with one name."""
         for look in list(self._looks):
             if warning := look():
                 self.get_logger().warning(warning)
@@ -234,7 +236,7 @@ class OmniBotDriver(Node):
         return selfcheck.waiting_advice(self._values["port"], self.get_clock().now().nanoseconds)
 
     def _refuse(self, text: str) -> None:
-        """Count each refusal, and log each kind of refusal at most once every ``WARN_EVERY_S``."""
+        """Count each refusal; log each kind of refusal at most once in 2 s (``WARN_EVERY_S``)."""
         self._refusals = Refusals(count=self._refusals.count + 1, last=text)
         kind, now_s = text.partition(":")[0], time.monotonic()
         if now_s - self._refused_at_s.get(kind, -math.inf) >= WARN_EVERY_S:

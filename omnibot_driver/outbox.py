@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A queue of calls to listeners, in the order of the events; several threads fill and empty it.
+"""A queue of calls that deliver events to listeners, in the order of the events.
 
-A thread queues calls under the event's lock, and makes them after releasing this lock. So a slow
-listener does not delay commands. Only one thread makes calls at a time. This module knows threads;
-it does not know what is delivered.
+Several threads fill and empty the queue. A thread appends a call while it holds the lock under
+which the event occurred. The call is made after this lock is released, so a slow listener does not
+delay commands. Only one thread makes calls at a time. This module knows threads; it does not know
+what is delivered.
 """
 
 import threading
@@ -13,7 +14,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls from which ``deliver`` waits for another thread that makes calls."""
+"""Number of queued calls at which the queue is full. ``deliver`` then waits until another thread
+has made these calls."""
 
 Delivery = Callable[[], object]
 
@@ -37,25 +39,26 @@ class Outbox:
     def claim(self) -> bool:
         """Return whether the caller may bypass the queue and call the listener directly.
 
-        The caller holds the event's lock. After True, call ``release``.
+        The caller must hold the lock under which the event occurred. After the result True, the
+        caller must call ``release``.
         """
         return not self._waiting and self._delivering.acquire(blocking=False)
 
     def release(self) -> None:
-        """End a claim. Call this whether the delivery has succeeded or failed."""
+        """End a successful ``claim``. Call this whether the delivery has succeeded or failed."""
         self._delivering.release()
         if self._waiting:
             self.deliver()
 
     @property
     def full(self) -> bool:
-        """Whether ``MOST_WAITING`` calls wait. If so, do not queue calls that can be omitted."""
+        """Whether the queue is full. While it is full, do not queue calls that can be omitted."""
         return len(self._waiting) >= MOST_WAITING
 
     def deliver(self) -> None:
-        """Make the queued calls, or leave them to a thread that is making calls.
+        """Make the queued calls, or leave them to another thread that is already making calls.
 
-        If the outbox is full, wait for that thread. Raises what the calls raise.
+        If the queue is full, wait for that thread. Raises what the calls raise.
         """
         waiting, delivering = self._waiting, self._delivering
         while waiting:  # checked again after the release, for calls that were put meanwhile

@@ -2,9 +2,9 @@
 
 """Standard output and standard error that never block the process.
 
-rclpy logs under the interpreter's lock. After ctrl-S, a log line would block even the watchdog. So
-output passes through a pipe. A full pipe loses lines. This module knows descriptors; it does not
-know what is printed.
+rclpy holds Python's global lock while it logs. After ctrl-S on the terminal, a log line would
+therefore block all threads, even the watchdog. To prevent this, output passes through a pipe. If
+the pipe is full, lines are lost. This module knows descriptors; it does not know what is printed.
 """
 
 import contextlib
@@ -63,7 +63,7 @@ class UnblockedOutput:
 def _fill_gaps() -> None:
     """Open /dev/null on each of the descriptors 0 to 2 that is closed.
 
-    Otherwise the port might become standard output and receive the log.
+    Otherwise the serial port might get the descriptor of standard output, and receive the log.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= max(STANDARD):
         pass

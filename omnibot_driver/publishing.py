@@ -38,7 +38,10 @@ UNHEARD: Final = ("disconnected", "connecting")
 
 
 class Publishing:
-    """The publisher of measurements and states. ``settings`` may be replaced at any time."""
+    """The publisher of measurements, states and notices of one driver.
+
+    ``settings``, which all messages are made with, may be replaced at any time.
+    """
 
     def __init__(
         self,
@@ -89,8 +92,8 @@ class Publishing:
             Extra: self._publish_extra,
         }
         self.extras: Mapping[type, Callable[[Any, int], None]] = {}
-        """For each type of value that only this board has: the function that publishes it. The
-        function gets the value and its stamp in ns."""
+        """For each type of reading that only this board has: the function that publishes it. The
+        function receives the reading and its stamp in ns of ROS time."""
 
     @property
     def settings(self) -> messages.MessageSettings:
@@ -102,7 +105,7 @@ class Publishing:
         self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[Packet], None]]:
-        """Return the functions that publish raw bytes, keyed by the argument names of ``Link``."""
+        """Return functions that publish raw bytes, by the ``Link`` argument that receives them."""
         return {
             "on_read": self._raw_publisher("~/raw_rx"),
             "on_write": self._raw_publisher("~/raw_tx"),
@@ -169,11 +172,11 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """Record that ROS is shutting down. Asking ROS at each event would take too much time."""
+        """Record that ROS is shutting down. A query at each event would take too much time."""
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Record whether time is simulated. Asking ROS at each event would take a microsecond."""
+        """Record whether time is simulated. A query at each event would take a microsecond."""
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:
@@ -230,9 +233,9 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text was not logged since valid data last came from the board.
+        """Return whether this text was not logged since the board last sent valid data.
 
-        So repeated losses of a port are reported only once.
+        Repeated losses of a port are therefore logged only once.
         """
         told, self._told = self._told, self._told | {text}
         return text not in told

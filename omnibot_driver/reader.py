@@ -3,7 +3,7 @@
 """The work of the reader thread: it reads the port, and passes the bytes to the session.
 
 The reader delivers measurements itself, so that nothing delays them. The reader must stop the robot
-before it ends the use of a port.
+before it releases a port.
 """
 
 import math
@@ -22,7 +22,7 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import LinesChanged, Transport
 
 COUNT_EVERY_S: Final = 1.0
-"""Interval, in s, at which the reader reads the kernel's count of losses."""
+"""Interval, in s, at which the reader reads the kernel's count of lost bytes."""
 BACK_OFF: Final = 1.5
 LONGEST_WAIT_S: Final = 2.0
 
@@ -31,7 +31,8 @@ class Reader:
     """The work of the reader thread, which runs ``serve``, and its counts.
 
     * ``trouble``: the reason why a port of the board is not open. Empty if all are open.
-    * ``overruns``: the kernel's losses since the last opening. None if unknown.
+    * ``opened``: how often the port was opened.
+    * ``overruns``: how often the kernel has lost bytes since the last opening. None if unknown.
     """
 
     def __init__(
@@ -159,9 +160,9 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Let the session act on received bytes. The caller holds the lock.
+        """Let the session act on received bytes, whose measurements were already delivered.
 
-        The measurements in these bytes were already delivered.
+        The caller holds the lock.
         """
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:
@@ -170,7 +171,7 @@ class Reader:
             self._shared.tell_guard()
 
     def _count(self, port: Transport, now: float) -> None:
-        """Read the kernel's count of losses every COUNT_EVERY_S. The caller holds the lock."""
+        """Read the kernel's count of lost bytes once a second. The caller holds the lock."""
         if now < self._count_at:
             return
         self._count_at = now + COUNT_EVERY_S

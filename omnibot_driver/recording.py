@@ -27,6 +27,7 @@ class Recording:
     * ``path``: the bag, which is a folder or a single file.
     * ``topics``: the topic of each channel.
     * ``speed``: factor of the playback speed. Infinity: as fast as possible.
+    * ``delay_s``: time from the start of the driver to the start of the playback.
     """
 
     path: Path
@@ -35,7 +36,7 @@ class Recording:
     delay_s: float = 5.0
 
     def chunks(self) -> Iterator[tuple[int, Packet]]:
-        """Yield packets, each with the time of the recorder's clock, in ns.
+        """Yield each recorded packet, with the time in ns at which it was recorded.
 
         Raises LinkError if the bag cannot be read to its end.
         """

@@ -2,8 +2,8 @@
 
 """A session that is fed from a recording: the counterpart of `Link` for recorded bytes.
 
-The session's time is that of the recording. So the session's output is the same at every speed.
-Packets to the board are discarded.
+The session's time is that of the recording, so the session's output is the same at every playback
+speed. Packets to the board are discarded.
 """
 
 import threading
@@ -30,10 +30,11 @@ T = TypeVar("T")
 class Replay:
     """One session on one recording, which is played once.
 
-    * ``deliver``: also receives the time of day, in ns, of the session's time zero.
-    * ``failed``: receives the exception, always a defect, that ended the thread.
+    * ``deliver``: receives events, and the time of day, in ns, at which the session's time was 0.
+    * ``failed``: receives the exception that ended the thread. Such an exception is always a
+      defect.
 
-    The functions except ``failed`` are called one at a time, in the order of the events.
+    All function arguments except ``failed`` are called one at a time, in the order of the events.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Replay:
         self._thread = threading.Thread(target=self._guard, name="omnibot-replay", daemon=True)
 
     def start(self) -> None:
-        """Start the thread, which begins to play after the recording's delay."""
+        """Start the thread, which begins the playback after the delay in the recording's URL."""
         self._thread.start()
 
     def call(self, action: Callable[[Session, float], T]) -> T:
@@ -132,7 +133,10 @@ class Replay:
         self._tell(partial(self._deliver, [Notice(end)], self._epoch_ns))
 
     def _run_until(self, end_s: float) -> bool:
-        """Call ``Session.tick`` as needed until ``end_s``. Return False if ``close`` interrupts."""
+        """Call ``Session.tick`` at each due time until ``end_s``.
+
+        Returns False if ``close`` interrupts this.
+        """
         while (due_s := self._due()) < end_s:
             if not self._pass(due_s):
                 return False

@@ -13,8 +13,8 @@ from omnibot_driver.core.timing import clock_fit
 
 SYSFS: Final = Path("/sys")
 LONGEST_LATENCY_MS: Final = 5
-"""Longest acceptable latency timer, in ms: half a tick of the board. FTDI's default is 16 ms, its
-minimum 1 ms."""
+"""Longest acceptable latency timer, in ms: half the sampling period of an OmniBot. FTDI's default
+is 16 ms, its minimum 1 ms."""
 RECORDING: Final = "replay://"
 WITHOUT_CLOCK: Final = ("sim://", RECORDING)
 """URL schemes of ports without a real robot. With them, the driver accepts simulated time."""
@@ -43,7 +43,7 @@ def latency_advice(port: str, sysfs: Path = SYSFS) -> str:
 
 
 def clock_advice(port: str, use_sim_time: bool) -> str:
-    """Return a warning if the board runs in real time but the node does not; otherwise empty."""
+    """Return a warning if the node uses simulated time although the board is real; else empty."""
     if not use_sim_time or port.lower().startswith(WITHOUT_CLOCK):
         return ""
     return (
@@ -66,7 +66,7 @@ def waiting_advice(port: str, now_ns: int) -> str:
 
 
 def prefix_advice(prefix: str) -> str:
-    """Return a warning if nothing separates the prefix from the names of frames; else empty."""
+    """Return a warning if the prefix of frame names ends with a letter or digit; else empty."""
     if not prefix[-1:].isalnum():
         return ""
     return (
@@ -78,7 +78,8 @@ def prefix_advice(prefix: str) -> str:
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:
     """Return a warning if another node has this full name; otherwise empty.
 
-    ``publishers``: of a topic that every driver with this name publishes, such as ``~/state``.
+    ``publishers``: the publishers of a topic that every driver with this name publishes, such as
+    ``~/state``.
     """
     names = [f"{each.node_namespace.rstrip('/')}/{each.node_name}" for each in publishers]
     if names.count(name) < 2:

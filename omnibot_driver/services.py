@@ -30,7 +30,7 @@ from omnibot_driver.replay import Replay
 class Services:
     """The services of one node, except those that only one kind of board has.
 
-    ``calibration_file``: where a measured gyro bias is saved, unless empty.
+    ``calibration_file``: path of the file in which a measured gyro bias is saved. Empty: not saved.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Services:
         return response
 
     async def _save(self, file: Path, bias: list[float], response: Trigger.Response) -> None:
-        """Save the bias on a thread of its own: a slow disk must not delay other callbacks."""
+        """Save the gyro bias on a separate thread, because a slow disk must not delay callbacks."""
         answer = Future()
 
         def save() -> None:

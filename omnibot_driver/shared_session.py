@@ -34,7 +34,7 @@ class SharedSession:
     Only ``call``, ``command`` and ``blocked`` may be used without holding ``lock``.
 
     * ``changed``: condition of this lock, on which the pacer and the shutdown wait.
-    * ``keeper``: None without a guard.
+    * ``keeper``: the object that runs the guard process. None without a guard.
     * ``write_error``: the error after which nothing more is written, or None.
     """
 
@@ -56,12 +56,12 @@ class SharedSession:
         self.leaving = False
         """Whether the link is about to end."""
         self.on_exit: OnExit = "stop"
-        """What the board is sent when the link ends, in addition to Stop."""
+        """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop was written to every line: at the link's end, or when a lost port
-        is open again."""
+        """Whether the last Stop was written to every line. It is written when the link ends, or
+        later, when a lost port is open again."""
         self.stood = False
-        """Whether the robot was seen at rest when the link ended."""
+        """Whether measurements showed the robot at rest when the link ended."""
         self.closing = threading.Event()
         """Set when all threads must end."""
         self._deliver, self._refused, self._on_write = deliver, refused, on_write
@@ -97,8 +97,9 @@ class SharedSession:
         * ``sent_ns``: possible times of sending, time of day in ns.
         * ``moves_base``: whether a refusal affects the motion interlock.
 
-        Raises CommandRefused for a command from a stall. ``refused`` receives each refusal, unless
-        the outbox is full.
+        Raises CommandRefused for a command that was sent while this process was stalled. The
+        function ``refused`` receives the reason of each refusal, unless too many events wait for
+        delivery.
         """
         try:
             with self.lock:
@@ -128,7 +129,7 @@ class SharedSession:
             return self.write_error is not None
 
     def settle(self) -> None:
-        """Write due packets, queue the events, and wake the pacer if it would sleep too long."""
+        """Write due packets, queue events, and wake the pacer thread if it would sleep too long."""
         packets = self.session.take_output(time.monotonic())
         self.tell_guard()
         if packets:
@@ -154,14 +155,14 @@ class SharedSession:
                     self.outbox.put(partial(self._on_write, packet))
 
     def tell_guard(self) -> None:
-        """Send the guard the present stop commands of the board if they have changed."""
+        """Send the guard the board's stop commands if they have changed."""
         if (keeper := self.keeper) is None:
             return
         if (words := self.session.board.last_words()) != keeper.last_words:
             keeper.change(*words)
 
     def pace(self) -> None:
-        """Run the pacer once: do what is due, or sleep until something is due."""
+        """Run one step of the pacer thread: do what is due, or sleep until something is due."""
         now = time.monotonic()
         self._pacing_until = min(self.session.wake_at, self._beat_at)
         if now < self._pacing_until:
@@ -173,7 +174,7 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Stop the robot if this process was stalled, and return whether it was."""
+        """Stop the robot if this process was stalled; return whether it was stalled."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:
@@ -183,7 +184,10 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer, and so the watchdog, runs. Send a heartbeat if one is due."""
+        """Record that the pacer thread runs, and send the guard a heartbeat if one is due.
+
+        The pacer is the driver's watchdog.
+        """
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)
         self._stall_detector.passed(boot_s, time.time_ns())

@@ -2,8 +2,8 @@
 
 """Detection of stalls: times in which this process, or its watchdog, did not run.
 
-Commands from a stall must not be obeyed. Every ``now`` is a time of ``boot_time_s``. This module
-knows times; it does not know threads or commands.
+Commands that were sent during a stall must not be obeyed. Every ``now`` is a time of
+``boot_time_s``. This module knows times; it does not know threads or commands.
 """
 
 import math
@@ -14,8 +14,8 @@ STANDSTILL_S: Final = 0.4
 """Time without a call of ``passed``, in s, from which the process is regarded as stalled. It must
 be shorter than the guard's limit."""
 SETTLE_S: Final = 0.25
-"""Time in s after a stall. Commands that are sent or arrive meanwhile are refused, because a
-sender's clock is known only roughly."""
+"""Time in s after the end of a stall in which commands are still refused, because a sender's clock
+is known only roughly."""
 LATEST_S: Final = 10.0
 """Longest assumed time in transit, in s, retransmissions included. A command that seems to be older
 comes from a sender whose clock is wrong."""
@@ -27,12 +27,12 @@ def boot_time_s() -> float:
 
 
 def boot_time_ns() -> int:
-    """Return the time of ``boot_time_s`` in ns."""
+    """Return a steady time in ns that includes the time for which the host was suspended."""
     return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 class StallDetector:
-    """Knows whether this process is stalled now, and when the last stall ended.
+    """A detector of stalls: whether this process is stalled now, and when the last stall ended.
 
     The watchdog's thread calls ``passed`` ten times a second. Other threads call ``begun`` before
     they act. A step of the time of day does not matter.
@@ -71,7 +71,8 @@ class StallDetector:
     def outlived_by(self, sent_ns: int, now: float) -> bool:
         """Return False if a command may have been sent before or during a recent stall, else True.
 
-        ``sent_ns``: time of day, in ns.
+        ``sent_ns``: the command's time of sending, as time of day in ns. ``now``: time of
+        ``boot_time_s``.
         """
         if self._begun or now - self._passed_at >= STANDSTILL_S or now < self._over_at + SETTLE_S:
             return False

@@ -1,10 +1,14 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Transit time of a command without a stamp, from the time at which the middleware sent it.
+"""Estimates how long a command without a stamp was in transit, from its time of sending.
 
-difference = arrival by our clock - sending by the sender's clock; offset = the sender's smallest
-difference; delay = difference - offset. docs/internals/stopping.md explains why. This module does
-not read a clock, and does not use ROS.
+The middleware reports this time by the sender's clock.
+
+difference = arrival by our clock - sending by the sender's clock;
+offset = the sender's smallest difference;
+delay = difference - offset.
+
+docs/internals/stopping.md explains why. This module does not read a clock, and does not use ROS.
 """
 
 import math
@@ -21,24 +25,25 @@ LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
 rate."""
 CLOCK_RETREATS: Final = 10.0
-"""A message that is 1 s too early for a sender fits as badly as a message that is
-``CLOCK_RETREATS`` seconds too late."""
+"""Factor by which earliness counts more than lateness when a message is assigned to a sender: 1 s
+too early fits as badly as 10 s too late."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender is regarded as known. Before that, perhaps
 all messages were delayed."""
 
 Differences = tuple[float, float]
-"""Arrival by our clock minus sending by the sender's clock, in s: by our time of day, and by our
-steady clock."""
+"""Arrival by our clock minus sending by the sender's clock, in s. The first value is by our time of
+day, the second by our steady clock."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrival:
-    """One message and its times, in ns.
+    """The times of one message, in ns.
 
     * ``sent_ns``: time of day by the sender's clock.
-    * ``received_ns``, ``now_ns``: time of day by our clock.
+    * ``received_ns``, ``now_ns``: times of day by our clock.
+    * ``steady_ns``: present time by our steady clock.
     * ``number``: the message's number at its sender. None if the middleware does not count.
     """
 
@@ -55,7 +60,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: time by our clock; two values until the sender's offset is known.
+    * ``sent_ns``: time of sending by our clock. It has two possible values until the offset of the
+      sender's clock is known.
     """
 
     total_s: float
@@ -80,15 +86,16 @@ class Delay:
 
 
 class Transit:
-    """Estimates the delays of messages on one topic, from all senders."""
+    """An estimator of the delays of messages on one topic, from all senders."""
 
     def __init__(self) -> None:
         self._senders: list[_Sender] = []
 
     def delay(self, arrival: Arrival, longest_s: float) -> Delay:
-        """Return the delay of this message; a message is late above ``longest_s``.
+        """Return the delay of this message.
 
-        A sender's first message is assumed to have no delay in transit.
+        A message is late if its delay is above ``longest_s``. The first message of a sender is
+        assumed to have no delay in transit.
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
@@ -133,7 +140,7 @@ class _Sender:
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """Return how badly the message fits this sender; 0 if it fits perfectly."""
+        """Return how badly the message fits this sender, as a lateness in s; 0 is a perfect fit."""
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)
@@ -157,7 +164,10 @@ class _Offset:
         self._late_since_s = self._least_late_s = math.inf
 
     def late_s(self, difference_s: float, at_s: float) -> float:
-        """Return how far the difference is above the offset plus drift, in s; negative if below."""
+        """Return how far the difference is above the offset plus drift, in s; negative if below.
+
+        ``difference_s``: arrival by our clock minus sending by the sender's clock.
+        """
         drift_s = LARGEST_DRIFT * max(0.0, at_s - self._least_at_s)
         return difference_s - self._least_s - drift_s
 

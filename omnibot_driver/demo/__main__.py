@@ -24,7 +24,8 @@ from omnibot_driver.demo.program import PATIENCE_S, DemoFailed, Program
 from omnibot_driver.simulator.common.options import DEFAULT_BOARD
 
 ENVIRONMENT: Final = {"ROS_DOMAIN_ID": "97", "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-"""Defaults that keep the demo out of ROS domain 0, where a real robot may be."""
+"""Default environment variables, which keep the demo out of ROS domain 0, where a real robot may
+be."""
 STOPPING_S: Final = 3.0
 ROW_EVERY_S: Final = 1.0
 
@@ -32,7 +33,8 @@ ROW_EVERY_S: Final = 1.0
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
     """Run the demo with this board for ``seconds``, or until ``asked_to_end`` returns True.
 
-    Raises ParameterError for an unknown board, DemoFailed, and ImportError without ROS.
+    Raises ParameterError for an unknown board, ImportError without ROS, and DemoFailed if the demo
+    cannot continue.
     """
     capability = capabilities.of(board)
     namespace = f"/demo_{os.getpid()}"

@@ -16,14 +16,14 @@ from omnibot_driver.simulator.common import options
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capability:
-    """What a board that accepts ``cmd_vel`` can do.
+    """What the demo needs to know about a board that accepts ``cmd_vel``.
 
     ``title``: name of the board, for the sentence "A simulated ... drives".
-
-    ``ports``: the driver's parameter for each printed address; empty if the driver derives the
-    address.
-
+    ``imu``, ``sideways``: whether the board has an IMU, and whether the robot can drive sideways.
+    ``ports``: for each address that the simulator prints, the driver's parameter for it. Empty if
+    the driver derives this address from another one.
     ``real``: arguments of the driver for the real robot.
+    ``page``: path of the document about the board.
     """
 
     title: str
@@ -60,7 +60,7 @@ def of(name: str) -> Capability:
 def port_arguments(name: str, ports: dict[str, str]) -> str:
     """Return the arguments after ``--ros-args`` for this board.
 
-    ``ports``: values of the port parameters, by parameter.
+    ``ports``: addresses of the ports, by the name of the port's parameter.
     """
     board = {} if name == options.DEFAULT_BOARD else {"board": name}
     return " ".join(f"-p {key}:={value}" for key, value in {**board, **ports}.items())

@@ -29,9 +29,10 @@ To use a real robot, first lift its wheels off the ground ({page}). Then run
 def status_row(
     state: str, rates_hz: tuple[int | None, int], leg: int, pose: Pose, *velocities: BodyTwist
 ) -> str:
-    """Return a row of the table under HEADING.
+    """Return a row of the table under ``HEADING``: state, rates, lap, pose and velocities.
 
-    ``rates_hz``: of IMU and odometry. ``velocities``: the commanded twist, then the measured one.
+    ``rates_hz``: rates of the IMU, None without an IMU, and of the odometry. ``leg``: number of
+    completed sides of the square. ``velocities``: the commanded twist, then the measured one.
     """
     imu_hz, odom_hz = rates_hz
     numbers = [(pose.x_m, 6, 2), (pose.y_m, 6, 2), (_degrees(pose.yaw_rad), 5, 0)]
@@ -85,8 +86,9 @@ In another terminal with ROS 2 Jazzy, you can watch and stop the robot:
 class Drive:
     """The results of a drive.
 
+    ``way_m``: distance driven. ``laps``: number of driven laps of the square.
     ``pose``, ``true_pose``: the robot's pose at the end, by odometry and as simulated.
-
+    ``points``: the driven path, as x and y in m. ``page``: path of the document about the board.
     ``real``: arguments of the driver for the real robot.
     """
 

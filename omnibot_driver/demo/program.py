@@ -58,9 +58,9 @@ class Program:
             raise self.failure(f"the {self._name} ended with code {code}")
 
     def ask(self, question: str = "") -> str:
-        """Send a question to the console; return the next line from it.
+        """Send ``question`` to the process; return the next line that the process prints.
 
-        Raises DemoFailed if no line comes.
+        Raises DemoFailed if no line arrives. The process must have been started with ``console``.
         """
         stdin, stdout = self._process.stdin, self._process.stdout
         if stdin is None or stdout is None:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The robot, as a ROS program uses it.
+"""The demo's robot: reads the driver's topics, and publishes commands that drive a square.
 
 The module must not know who started the robot, or how the robot is shown.
 """
@@ -26,18 +26,17 @@ from omnibot_driver.demo.square import HALT, steer, steer_ahead
 from omnibot_driver.tools.monitor.rates import Rate
 
 REMEMBERED = 1000
-"""How many points of the path are kept: enough for some laps."""
+"""Number of points of the path that are kept, enough for several laps."""
 ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
-"""Message rates in Hz that every board exceeds when its driver has run for a while."""
+"""Message rates in Hz that must be reached before the robot drives. Every board exceeds them when
+its driver has run for a while."""
 
 
 class Robot:
-    """The robot, as a ROS program uses it.
+    """The demo's robot, which this ROS node observes and steers through the driver's topics.
 
     After every second odometry message, the object publishes a velocity on ``cmd_vel``.
-
     ``driving``: whether this velocity drives the square. Otherwise it is zero.
-
     ``leg``: how many sides of the square are complete.
     """
 

@@ -18,7 +18,7 @@ CREEP_MPS: Final = 0.05
 YAW_RATE_RADPS: Final = 0.5
 QUARTER_RAD: Final = math.pi / 2
 CORNER_M: Final = 0.01
-"""Distance from a corner, in m, within which the corner is reached."""
+"""Distance from a corner, in m, below which the robot has reached the corner."""
 GAIN_PER_S: Final = 3.0
 """Gain from distance to speed, and from angle error to yaw rate, in 1/s."""
 ON_COURSE_RAD: Final = 0.3
@@ -27,9 +27,10 @@ HALT: Final = BodyTwist(0.0, 0.0, 0.0)
 
 
 def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the present leg, and the robot's velocity in its own axes.
+    """Return the present leg, and the velocity to command in the robot's own axes.
 
-    The robot also turns: 90° left on even legs, back on odd legs.
+    The robot must be able to drive sideways. On each even leg it also turns 90° to the left, and on
+    each odd leg it turns back.
     """
     leg, along_m, aside_m = _progress(pose, leg)
     direction_rad = leg % 4 * QUARTER_RAD
@@ -45,7 +46,7 @@ def steer(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
-    """Return the present leg and the velocity for a robot that cannot drive sideways.
+    """Return the present leg and the velocity to command, for a robot that cannot drive sideways.
 
     This robot turns at the corners.
     """
@@ -58,7 +59,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """Return the present leg, and the robot's distances along it and to the left of it, in m."""
+    """Return the present leg, and the distances along the leg and to the left of it, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)
