@@ -10,7 +10,7 @@ SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bo
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the full names of the drivers; ``topics``: name and type of each topic."""
+    """Return the full node names of the drivers that publish ``topics``, pairs of name and type."""
     pairs = set(topics)
     names = {topic.rpartition("/")[0] for topic, _kind in pairs}
     return sorted(
@@ -21,7 +21,7 @@ def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
 
 
 def running_drivers(node: Any) -> list[str]:
-    """Return the full names of the drivers that publish now, as far as the rclpy ``node`` knows."""
+    """Return the full names of the drivers that publish now and that ``node`` has discovered."""
     found = node.get_topic_names_and_types()
     return [
         name

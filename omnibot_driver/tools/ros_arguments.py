@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Separates the arguments for ROS from those for the program. Does not need ROS."""
+"""Separates the arguments for ROS from those for the program. This module does not need ROS."""
 
 from collections.abc import Sequence
 

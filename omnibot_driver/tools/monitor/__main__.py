@@ -118,8 +118,8 @@ def _run(options: argparse.Namespace, ros_arguments: list[str]) -> int:
 def _find(feed: "Feed", timeout_s: float) -> None:
     """Wait until the driver publishes its state.
 
-    Raises ToolError if no state arrives within ``timeout_s``. The message names other drivers that
-    run.
+    Raises ToolError if no state arrives within ``timeout_s``. The message names other running
+    drivers.
     """
     if _comes_about(lambda: bool(feed.view().state), timeout_s):
         return
@@ -148,7 +148,7 @@ def _find(feed: "Feed", timeout_s: float) -> None:
 def _gather(feed: "Feed", timeout_s: float) -> View:
     """Wait for a message on each expected topic, at most ``timeout_s``; return the view.
 
-    The rates are measured over ``WINDOW_S``.
+    The call takes at least 2 s (``WINDOW_S``), in which the message rates are measured.
     """
     began_s = time.monotonic()
     _comes_about(lambda: not feed.view().missing(feed.diagnoses()), timeout_s)

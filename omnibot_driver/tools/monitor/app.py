@@ -27,7 +27,8 @@ from omnibot_driver.tools.monitor.teleop import LEVELS, DeadMan
 REFRESH_S: Final = 0.2
 PARTS: Final = ("title", "estop", "path", "figures", "verdicts", "teleop", "said")
 MOST_IN_FULL: Final = 4
-"""How many verdicts are shown in full. If there are more, each verdict is cut to one line."""
+"""Largest number of diagnostic verdicts that are shown in full. If there are more, each verdict is
+cut to one line."""
 GREEN, YELLOW, RED, GREY, CYAN = "#98e024", "#f4bf4f", "#ff5f57", "#a0a0a0", "#58d1eb"
 COLOURS: Final = {
     Level.OK: GREEN,
@@ -77,7 +78,7 @@ class Release(ModalScreen[bool]):
         )
 
     def on_key(self, event: events.Key) -> None:
-        """Use the key as the answer to the question."""
+        """Close the question, and release the e-stop if the key is y."""
         event.stop()
         self.dismiss(event.key == "y")
 
@@ -141,7 +142,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Textual starts a new thread that reads keys. ``suspend`` must end the old thread first.
+        Textual starts a new thread that reads keys. The method ``suspend`` ends the old thread
+        first.
         """
         with self.suspend():
             pass
@@ -196,7 +198,7 @@ class Monitor(App[None]):
     # Keys
 
     def on_key(self, event: events.Key) -> None:
-        """Steer the robot, or change its speed, if the key does this."""
+        """Steer the robot, or change its speed, if the key has this meaning."""
         dead_man = self._robot.dead_man
         if dead_man is None:
             return
@@ -206,7 +208,7 @@ class Monitor(App[None]):
             dead_man.change_speed(1 if event.key == "plus" else -1)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Hide the keys of actions that the robot's board does not support."""
+        """Return False for an action that the robot's board does not support, to hide its key."""
         return action not in self._lacks and super().check_action(action, parameters)
 
     def on_app_blur(self) -> None:

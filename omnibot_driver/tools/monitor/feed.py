@@ -56,8 +56,8 @@ class Feed:
     """The connection to the driver ``name`` in ``namespace``. It lasts until ``close`` is called.
 
     Any thread may send requests, such as ``estop``. Raises ToolError for invalid names.
-
-    ``dead_man``: with it, the monitor publishes ``cmd_vel`` while a key is held.
+    ``dead_man``: dead man's switch. If given, the monitor publishes ``cmd_vel`` while a key is
+    held.
     """
 
     def __init__(
@@ -204,7 +204,10 @@ class Feed:
         self._without_imu = IMU_PARAMETER not in future.result().result.names
 
     def _lacks(self) -> frozenset[str]:
-        """Return what this driver's board does not have; empty while this is unknown."""
+        """Return those of ``imu``, ``start`` and ``pause`` that this driver's board does not have.
+
+        The result is empty while this is unknown.
+        """
         offers = {"start": self._start, "pause": self._pause}
         if not self._estop.service_is_ready():
             offers = {}

@@ -24,25 +24,24 @@ DIAGNOSTICS_TOPIC: Final = "/diagnostics"
 COMMAND_LIVES_S: Final = 0.5
 """Time in s for which a command is valid: the default of the driver's ``cmd_vel_timeout``."""
 SILENT_S: Final = 3.0
-"""Age of the last message, in s, above which a driver is silent, and its diagnostics are
+"""Time in s without a message after which a driver is regarded as silent, and its diagnostics as
 outdated."""
 STEP_M: Final = 0.02
 LONGEST_PATH: Final = 5000
 JUMP_M: Final = 0.05
 JUMP_MPS: Final = 2.0
-"""``JUMP_M``, ``JUMP_MPS``: the pose may move by JUMP_M + JUMP_MPS · time between two messages.
-
-Otherwise the odometry was reset, and a new path begins. Units: m and m/s.
-"""
+"""``JUMP_M``, ``JUMP_MPS``: limits of the pose's change between two messages, in m and m/s. The
+pose may move by JUMP_M + JUMP_MPS · time. If it moves farther, the odometry was reset, and a new
+path begins."""
 
 
 @dataclass(frozen=True, slots=True)
 class Flow:
     """How often messages arrive on a topic.
 
+    ``hz``: message rate.
     ``age_s``: time since the last message; None if no message came recently.
-
-    ``history``: messages in each second of the last minute.
+    ``history``: number of messages in each second of the last minute.
     """
 
     hz: float
@@ -130,7 +129,10 @@ class View:
 
 
 class Model:
-    """Stores received values, and returns them as a View. All times are of one clock, in s."""
+    """The latest received values, which ``view`` returns as a View.
+
+    All times are of one clock, in s.
+    """
 
     def __init__(self, driver: str, now_s: float) -> None:
         self.said = ""
@@ -172,7 +174,7 @@ class Model:
     def commanded(self, twist: BodyTwist, now_s: float) -> None:
         """Store a message of ``cmd_vel``.
 
-        Another node has sent this message. So the message does not show that the driver runs.
+        Another node has sent it, so the message does not show that the driver runs.
         """
         self._commanded = twist, now_s
 

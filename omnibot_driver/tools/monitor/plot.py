@@ -15,7 +15,7 @@ from omnibot_driver.core.geometry.se2 import Pose
 
 BRAILLE: Final = 0x2800
 DOTS: Final = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))
-"""Bits of the dots in a Braille character: four rows of two."""
+"""Bits of the dots in a Braille character, which has four rows of two dots."""
 BARS: Final = " ▁▂▃▄▅▆▇"
 ARROWS: Final = "→↗↑↖←↙↓↘"
 SMALLEST_M: Final = 0.5

@@ -13,7 +13,7 @@ HISTORY_S: Final = 60
 
 
 class Rate:
-    """Counts messages since ``began_s``.
+    """The number and rate of messages since ``began_s``.
 
     All times are of one clock, in s. They must not decrease.
     """
@@ -33,13 +33,13 @@ class Rate:
         self._seconds[-1] += 1
 
     def hz(self, now_s: float) -> float:
-        """Return the rate over the last ``WINDOW_S``, or since ``began_s`` if that was later."""
+        """Return the message rate in Hz, over the last 2 s or, if shorter, since ``began_s``."""
         self._forget(now_s)
         span_s = min(WINDOW_S, now_s - self._began_s)
         return len(self._recent_s) / span_s if span_s > 0.0 else 0.0
 
     def age_s(self, now_s: float) -> float | None:
-        """Return the age of the last message, in s; None if the age is above ``WINDOW_S``."""
+        """Return the age of the last message, in s; None if the age is above 2 s."""
         self._forget(now_s)
         return now_s - self._recent_s[-1] if self._recent_s else None
 

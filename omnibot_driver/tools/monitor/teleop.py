@@ -2,7 +2,7 @@
 
 """Steers the robot by keys, with a dead man's switch.
 
-A terminal does not report the release of a key. So each report of a pressed key moves the robot
+A terminal does not report the release of a key, so each report of a pressed key moves the robot
 only briefly. The module knows keys and times; it does not know ROS or terminals.
 """
 
@@ -25,7 +25,7 @@ DEAF_S: Final = 0.3
 """Time in s after a suspension during which keys do not steer, because earlier keys still arrive.
 """
 ZEROS: Final = 5
-"""How many zero commands follow a motion.
+"""Number of zero commands that follow a motion.
 
 After them the monitor publishes nothing, because other nodes may want to drive.
 """
@@ -45,9 +45,10 @@ MOTIONS: Final = {
 
 
 class DeadMan:
-    """Turns pressed keys into commands. The caller calls ``command`` regularly.
+    """A dead man's switch that converts pressed keys to commands.
 
-    Another thread may call ``press``, which stores key and time in one assignment.
+    The caller calls ``command`` regularly. Another thread may call ``press``, which stores key and
+    time in one assignment.
     """
 
     def __init__(self) -> None:

@@ -84,7 +84,7 @@ def figures(view: View) -> list[str]:
 
 
 def verdicts(view: View) -> list[tuple[Level, str]]:
-    """Return the driver's statuses as lines with levels. All OK statuses share one line."""
+    """Return the diagnostic statuses as levels and texts. All OK statuses share one text."""
     if not view.statuses:
         return [(Level.STALE, "no diagnostics received")]
     worst = sorted((s for s in view.statuses if s.level), key=_urgency, reverse=True)
@@ -117,7 +117,8 @@ def report(view: View) -> str:
 def as_json(view: View, troubles: Iterable[str]) -> str:
     """Return the view as JSON.
 
-    JSON has no NaN and no infinity. So such a value is null, and ``troubles`` names it.
+    JSON has no NaN and no infinity. A NaN or infinite value becomes null, and ``troubles`` names
+    it.
     """
     inertial = {
         "imu": {

@@ -24,11 +24,12 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 
 
 class VelocityTopic:
-    """The topic ``cmd_vel``. A process must use one message type for a topic: here the driver's.
+    """The monitor's subscription and publisher of ``cmd_vel``.
 
+    A process must use only one message type for a topic. Both use the type of the driver's
+    subscription.
     ``heard``: receives each command on the topic.
-
-    ``dead_man``: without it, nothing is published.
+    ``dead_man``: if None, nothing is published.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class VelocityTopic:
             node.create_timer(DRIVE_EVERY_S, self._tick, clock=steady)
 
     def close(self) -> None:
-        """Stop the robot if this program has steered it. The node must no longer spin."""
+        """Stop the robot if this program has steered it. The node must not spin any more."""
         if self.dead_man and self.dead_man.has_driven and self._publisher:
             self._say(HALT)
             self._publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_WITHIN_S))

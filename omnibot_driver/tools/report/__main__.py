@@ -56,7 +56,7 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
 
 @contextmanager
 def _progress(what: str, unit: str) -> Iterator["Progress"]:
-    """Show a progress bar if stderr is a terminal."""
+    """Show a progress bar if stderr is a terminal. Yield the function that updates the bar."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -122,7 +122,7 @@ def _report(wanted: argparse.Namespace) -> int:
 def main(given: list[str] | None = None) -> int:
     """Write the report. Return 0, or 3 if it finds something wrong.
 
-    Return 1 without anything to report, and 2 on wrong usage.
+    Return 1 if there is nothing to report on. Exit with code 2 on wrong usage.
     """
     try:
         return _report(arguments(given))

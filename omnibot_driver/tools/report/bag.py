@@ -31,7 +31,8 @@ Progress = Callable[[int, int], None]
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
     """Return the log of one robot in a bag.
 
-    Raises ToolError without a readable message, or for several robots if ``namespace`` is None.
+    Raises ToolError if the bag has no readable message, or if it has several robots and
+    ``namespace`` is None.
     """
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)
@@ -66,7 +67,7 @@ def read(path: Path, namespace: str | None, progress: Progress) -> Log:
 def _messages(
     reader: Reader, topics: Collection[str], troubles: list[str]
 ) -> Iterator[tuple[Connection, int, bytes]]:
-    """Yield the messages up to the first error in the bag; add such an error to ``troubles``."""
+    """Yield the messages up to the first error in the bag; add the error's text to ``troubles``."""
     wanted = [item for item in reader.connections if item.topic in topics]
     if not wanted:
         return
@@ -115,7 +116,7 @@ def _open(path: Path, stack: ExitStack) -> tuple[list[Reader], list[str]]:
 
 
 def _open_file(file: Path, stack: ExitStack, troubles: list[str]) -> Reader:
-    """Open a file of a bag. A broken file, or one with a journal, is first repaired in a copy."""
+    """Open a file of a bag. If it is incomplete or has a journal, repair it in a copy first."""
     broken = file.suffix == ".mcap" and salvage.breaks_off(file)
     whole = file
     if broken or salvage.has_journal(file):

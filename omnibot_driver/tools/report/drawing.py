@@ -21,7 +21,8 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""Largest number of points of a drawn line. A longer line is drawn as its envelope."""
+"""Largest number of points of a drawn line. Of a longer line, only the smallest and largest values
+are drawn."""
 
 
 def new_figure(height_in: float) -> Figure:
@@ -53,7 +54,7 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Shorten a line to about ``POINTS`` points: the minimum and the maximum of each piece."""
+    """Return about 3000 points of a longer line: the minimum and the maximum of each piece."""
     if len(times_s) <= POINTS:
         return times_s, values
     size = -(-len(times_s) // (POINTS // 2))
@@ -84,7 +85,7 @@ def dots(axes: Axes, times_s: Array, values: Array, colour: str, label: str) -> 
 
 
 def shade(axes: Axes, log: Log) -> None:
-    """Shade the times of the latched e-stop (red), and of each state that is not a running one."""
+    """Shade the times of a latched e-stop (red), and of states in which the board does not run."""
     for span in log.latched:
         axes.axvspan(span.begin_s, span.end_s, color=RED, alpha=0.18, linewidth=0)
     for span in log.states:

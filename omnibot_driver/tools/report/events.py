@@ -63,7 +63,10 @@ def _states(log: Log) -> Iterator[Finding]:
 
 
 def _lost(states: list[Span]) -> list[Span]:
-    """Return the spans in which the board was out of reach, with the port open or closed."""
+    """Return the spans in which the board was out of reach: disconnected or connecting.
+
+    Adjoining spans are joined.
+    """
     lost: list[Span] = []
     for state in states:
         if state.what in OUT_OF_REACH and state.end_s > FIRST_SECONDS:
@@ -75,7 +78,7 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Return whether diagnostics showed this state more than ``SILENT_S`` after it began."""
+    """Return whether diagnostics still reported this state 2 s (``SILENT_S``) after it began."""
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
         for status in log.diagnostics

@@ -23,8 +23,9 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One sentence with a measured value.
+    """One result of the report: a sentence with a measured value.
 
+    ``subject``: what the finding is about, such as "Timing".
     ``advice``: what the reader should do; empty if nothing.
     """
 

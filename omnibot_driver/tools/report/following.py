@@ -15,7 +15,7 @@ from omnibot_driver.tools.report.log import COMMAND_TIMEOUT_S, Array, Log, Mask,
 LAGS_S: Final = np.arange(0.0, 0.62, 0.02)
 TOLERANCE: Final = 0.1
 TOLD: Final = 0.05
-"""Speed of a wheel's rim, in m/s, above which the robot is regarded as commanded or as moving.
+"""Speed of a wheel's rim, in m/s, above which a command or a measurement is regarded as motion.
 
 Friction may prevent slower motions.
 """
@@ -30,9 +30,9 @@ AFTER_STOP_S: Final = 1.5
 class Pair:
     """A command topic, and measurements of the motion that it commands.
 
-    ``weights``: factors that convert the values to the speed of a wheel's rim in m/s.
-
-    ``scales``: the driver's parameter to change if the values on an axis are wrong.
+    ``weights``: for each axis, the factor that converts a value to the speed of a wheel's rim in
+    m/s.
+    ``scales``: for each axis, the driver's parameter to change if the values are wrong.
     """
 
     topic: str
@@ -45,7 +45,7 @@ class Pair:
 
 
 def twists(log: Log) -> Pair:
-    """Return the pair of cmd_vel and the twist in odom. Both contain only finite values."""
+    """Return the commands on cmd_vel and the twists in odom. Both contain only finite values."""
     odom = _sampled(log.odom)
     linear, angular = _scales(log)
     scales = linear, linear, angular
@@ -71,7 +71,10 @@ def _scales(log: Log) -> tuple[str, str]:
 
 
 def pairs(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements in the log. They contain only finite values."""
+    """Return the pairs of commands and measurements of cmd_vel and wheel_cmd, if in the log.
+
+    The pairs contain only finite values.
+    """
     count = len(log.wheels)
     wheels = Pair(
         "wheel_cmd",
@@ -122,7 +125,7 @@ class Answer:
 def answer(pair: Pair, usable: Mask) -> Answer | None:
     """Return how the robot responded to its commands; None if no motion was commanded.
 
-    ``usable``: which measurements to use. The best-fitting delay is used.
+    ``usable``: which measurements to use. The delay is the one that fits the measurements best.
     """
     times_s, values = pair.measured.stamp_s[usable], pair.measured.values[usable]
     weights = np.array(pair.weights)
@@ -187,7 +190,7 @@ def judge(log: Log) -> Iterator[Finding]:
 def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
     """Return the commanded and the measured speed of a wheel's rim in m/s, and the times in s.
 
-    Of several commands, the fastest counts.
+    If several topics command the robot, the fastest command is used.
     """
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
@@ -202,9 +205,9 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
-    """Return at which of these times the driver did not carry out commands.
+    """Return for each of these times whether the driver did not carry out commands.
 
-    An e-stop counts, and a state that is not running, each with the ``COMMAND_TIMEOUT_S`` after it.
+    These are times with a latched e-stop or a state that is not running, and the 0.5 s after them.
     """
     off = [state for state in log.states if state.what not in RUNNING]
     spans = [
@@ -214,7 +217,7 @@ def _stopped(log: Log, at_s: Array) -> Mask:
 
 
 def _sustained(times_s: Array, rows: Mask) -> list[Span]:
-    """Return the spans of time in which ``rows`` is true for at least ``SUSTAINED_S``."""
+    """Return the spans of time in which ``rows`` is true for at least 1 s (``SUSTAINED_S``)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     spans = [Span(times_s[first], times_s[last - 1], "") for first, last in edges.reshape(-1, 2)]
     return [item for item in spans if item.length_s >= SUSTAINED_S]

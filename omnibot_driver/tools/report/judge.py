@@ -42,7 +42,7 @@ def _all(log: Log) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "Recording",
-            f"No message of {', '.join(others)}, so the report can show a pause of the board as a"
+            f"No message of {', '.join(others)}, so the report may show a pause of the board as a"
             " gap or a stop.",
             "Record all topics: ros2 bag record --all.",
         )

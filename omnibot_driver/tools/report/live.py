@@ -76,7 +76,10 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """Find the robot; return its namespace, topics, all message types, and whether it is alone."""
+    """Find the robot; return its namespace, topics, all message types, and whether it is alone.
+
+    "Alone" means that no other robot was found.
+    """
     began_s = time.monotonic()
     while True:
         executor.spin_once(timeout_sec=0.1)

@@ -22,7 +22,7 @@ SETTLING_S: Final = 0.2
 class Series:
     """The messages of one topic in the order of arrival, one row for each message.
 
-    ``stamp_s``: the timestamp in each message.
+    ``arrived_s``: the time of arrival. ``stamp_s``: the timestamp in each message.
     """
 
     arrived_s: Array
@@ -44,7 +44,7 @@ class Series:
     def held(self, at_s: Array, timeout_s: float = COMMAND_TIMEOUT_S) -> Array:
         """Return, for each time in ``at_s``, the last row that had arrived by then.
 
-        A missing row, or one older than ``timeout_s``, is zeros.
+        The result is zeros if no row had arrived, or if the row was older than ``timeout_s``.
         """
         held = np.zeros((len(at_s), self.values.shape[1]))
         if len(self):

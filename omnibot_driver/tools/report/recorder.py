@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Converts messages to columns. Messages from a bag and from rclpy have the same fields."""
+"""Converts messages to columns of numbers.
+
+Messages from a bag and from rclpy have the same fields.
+"""
 
 import math
 from array import array
@@ -48,11 +51,10 @@ def _wheels(message: Any) -> Row:
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """How the messages of a topic are converted.
+    """How the messages of a topic are converted to rows of numbers.
 
-    ``width``: how many values a row has. None: one for each wheel.
-
-    ``read``: by message type, the function that returns the row.
+    ``width``: number of values in a row. None: one value for each wheel.
+    ``read``: for each message type, the function that converts a message to a row.
     """
 
     width: int | None
@@ -83,7 +85,7 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """The rows, if their width becomes known only at the end."""
+        """Rows of values, used if the number of values in a row becomes known only at the end."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -113,7 +115,10 @@ class _Column:
 
 
 class Recorder:
-    """Collects one robot's messages. The caller calls ``hear`` for each message, then ``log``."""
+    """A collector of one robot's messages.
+
+    Its user calls ``hear`` for each message, and then ``log``.
+    """
 
     def __init__(self, robot: str) -> None:
         self._robot = robot
@@ -125,8 +130,7 @@ class Recorder:
     def hear(self, role: str, kind: str, arrived_ns: int, message: Any) -> None:
         """Record a message that arrived on a topic.
 
-        ``role``: which topic in ``SERIES`` or ``EVENTS`` this is.
-
+        ``role``: the topic's name without its namespace, such as ``odom`` or ``state``.
         ``kind``: message type of the topic.
         """
         if role in self._columns:
@@ -185,7 +189,7 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Return the spans of time in which the value on a topic stayed the same.
 
-        ``name``: returns the text of a value's span.
+        ``name``: function that returns a value as text, for the ``what`` of its span.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

@@ -22,7 +22,8 @@ LONG_GAP_S: Final = 0.5
 MANY_LOST: Final = 0.01
 RATE_TOLERANCE: Final = 0.05
 UNEVEN: Final = 0.1
-"""Standard deviation of the steps between timestamps, in periods, above which they are uneven."""
+"""Standard deviation of the steps between timestamps, in periods, above which the steps are
+regarded as uneven."""
 LATE_S: Final = 0.005
 EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
@@ -52,7 +53,10 @@ class Stream:
     rates: tuple[str, ...]
 
     def promised(self, log: Log) -> "Stream":
-        """Return this stream with the expected rate from the driver's diagnostics, if any."""
+        """Return this stream with the expected rate from the driver's diagnostics.
+
+        If the diagnostics contain no rate, return the stream unchanged.
+        """
         if not log.alone:
             return self
         for key in self.rates:
@@ -87,16 +91,12 @@ If the driver's diagnostics contain no rate, the rate of an OmniBot is used.
 class FrameSchedule:
     """The measured timing of a topic.
 
-    ``at_s``: the timestamp before each step.
-
-    ``period_s``: the median step.
-
+    ``at_s``: the timestamp before each step from one message to the next.
+    ``steps_s``: length of each step. ``period_s``: the median step.
     ``gap_at_s``, ``gap_s``: start and length of each gap that the driver's state does not explain.
-
     ``missing``: how many messages are missing in each gap.
-
-    ``leap_at_s``, ``leap_s``: each long step that short steps compensate.
-
+    ``leap_at_s``, ``leap_s``: start and length of each long step that short steps compensate.
+    ``arrived_s``: time of arrival of each message.
     ``late_s``: time from the timestamp of each message to its arrival.
     """
 
@@ -113,7 +113,7 @@ class FrameSchedule:
 
 
 def measure(log: Log, series: Series, stream: Stream) -> FrameSchedule:
-    """Return the timing by the timestamps. Messages without a timestamp are left out."""
+    """Return the timing of a topic by its timestamps. Messages without a timestamp are left out."""
     stream = stream.promised(log)
     stamped = series.only(np.isfinite(series.stamp_s))
     at_s, steps_s = stamped.stamp_s[:-1], np.diff(stamped.stamp_s)
@@ -160,10 +160,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return, for each long step, the index at which the steps end that may compensate it.
+    """Return for each long step the index after the last step that may compensate it.
 
-    The next long step ends them too. ``wide``: indices of the long steps. ``most``: largest number
-    of steps, counted from the long one.
+    These steps end after ``most`` steps, counted from the long step, or before the next long step.
+    ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
     ends[:-1] = np.minimum(ends[:-1], wide[1:])

@@ -17,7 +17,7 @@ Topics = dict[str, str]
 
 
 def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
-    """Return for each robot's namespace ("/" for none) its topics.
+    """Return the topics of each robot, by the robot's namespace ("/" if it is empty).
 
     ``topics``: name and message type of each topic.
     """
@@ -36,9 +36,10 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that a topic's name allows: the namespace, and whether the topic fits.
+    """Return the roles that a topic may have by its name: each with the namespace and a verdict.
 
-    ``kind`` must fit. A topic such as ``state`` also needs its node in ``drivers``.
+    The verdict is whether the role fits: the message type ``kind`` must be right. A topic such as
+    ``state`` must also belong to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():
@@ -54,8 +55,8 @@ def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tupl
 def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tuple[str, Topics]:
     """Return the namespace and the topics of one robot.
 
-    ``wanted``: its namespace; None: the only robot. ``where``: for the error's message. Raises
-    ToolError.
+    ``wanted``: namespace of this robot; None selects the only robot.
+    ``where``: name of the source of the topics, for error messages. Raises ToolError.
     """
     names = ", ".join(robots)
     if not robots:

@@ -2,8 +2,8 @@
 
 """Repairs copies of bag files whose recording was not finished.
 
-An mcap file (mcap.dev/spec) is records and an index. A record is kind (1 byte), length (8 bytes)
-and content. An sqlite3 database has a separate journal.
+An mcap file (mcap.dev/spec) consists of records and an index. A record has a kind (1 byte), a
+length (8 bytes) and content. An sqlite3 database has a separate journal.
 """
 
 import shutil
@@ -22,7 +22,7 @@ JOURNALS: Final = ("-wal", "-journal")
 
 
 def breaks_off(file: Path) -> bool:
-    """Return whether this mcap file lacks its end."""
+    """Return whether this mcap file lacks its end, because its recording was not finished."""
     with file.open("rb") as source:
         source.seek(max(0, file.stat().st_size - len(MAGIC)))
         return source.read() not in (MAGIC, b"")

@@ -25,10 +25,8 @@ REST_S: Final = 0.5
 LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
-"""Rate in rad/s above which the robot is regarded as turning, if there is no odometry.
-
-A larger bias is rare.
-"""
+"""Mean gyro reading in rad/s above which the robot is regarded as turning, if there is no odometry.
+A bias above this value is rare."""
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
@@ -52,7 +50,7 @@ def rate_hz(imu: Series) -> float:
 def at_rest(log: Log, imu: Series) -> Mask:
     """Return for each reading whether the robot was at rest, by odometry.
 
-    Without odometry, the mean and the spread of each block of readings decide.
+    Without odometry, blocks of 100 IMU readings are judged by their mean and spread.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) > 1:
@@ -89,7 +87,7 @@ class Spectrum:
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
     """Return Welch's mean spectrum of the selected ``rows``; None if there is too little data.
 
-    The mean is over long pieces without missing readings.
+    The mean is taken over all pieces of at least 256 readings of which none is missing.
     """
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
@@ -150,7 +148,7 @@ def judge(log: Log) -> Iterator[Finding]:
 
 
 def longest_same(values: Array) -> int:
-    """Return the length of the longest run of equal rows."""
+    """Return the length of the longest run of equal rows in ``values``."""
     changes = np.flatnonzero((np.diff(values, axis=0) != 0.0).any(axis=1)) + 1
     return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
 
@@ -206,9 +204,9 @@ def _bias(gyro: Array) -> Iterator[Finding]:
 
 
 def turned(log: Log, imu: Series, rest: Mask) -> tuple[float, float] | None:
-    """Return the turns by gyro / those by odometry, and how far the robot turned, in rad.
+    """Return the ratio of turns by gyro to turns by odometry, and the sum of all turns in rad.
 
-    Left and right turns both count as positive.
+    In the sum, left and right turns are both positive. The result is None if odometry has no turns.
     """
     odom = log.odom.only(log.odom.finite & np.isfinite(log.odom.stamp_s))
     if len(odom) < 2:

@@ -15,19 +15,18 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: allowed difference between pose and twist in a step, in m and rad.
-
-fastest_linear_speed keeps the driver's corrections of odom smaller.
-"""
+"""``LEAP_M``, ``LEAP_RAD``: limits of the difference between a step of the pose and the motion by
+the twist, in m and rad. A step above one of them is a leap. The driver's own corrections of odom
+are smaller, because fastest_linear_speed limits them."""
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Time in s from which a step between two messages is a gap. The twist does not show motion in a
-gap."""
+"""Time in s from which a step between two messages is regarded as a gap, whose motion the twist
+does not show."""
 
 
 def moving(odom: Series) -> Mask:
-    """Return for each message whether its twist shows motion."""
+    """Return for each odometry message whether its twist shows motion."""
     return np.asarray((np.abs(odom.values[:, 3:]) > MOVING).any(axis=1))
 
 
@@ -36,12 +35,10 @@ class Steps:
     """The steps from each message of odom to the next.
 
     ``way_m``, ``turned_rad``: distance and turn of the step; 0 for a leap.
-
-    ``off_m``, ``off_rad``: difference between the pose and where the twist leads.
-
-    ``leap``: whether this difference is too large; for a gap, only if the next pose is zero.
-
-    ``reset``: a leap to zero.
+    ``off_m``, ``off_rad``: difference between the pose's step and the motion by the twist.
+    ``leap``: whether this difference is too large. In a gap, only a step to the zero pose can be a
+    leap.
+    ``reset``: whether the step is a leap to the zero pose.
     """
 
     way_m: Array
@@ -53,7 +50,7 @@ class Steps:
 
 
 def steps(odom: Series) -> Steps:
-    """Return the steps between successive messages.
+    """Return the steps between successive odometry messages.
 
     ``odom`` must have at least two messages, and all must be finite.
     """
