@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of ``OMNIBOT_DRIVER_COMPILE=1``. If compiling fails, plain Python is installed.
+"""Tests of an installation with ``OMNIBOT_DRIVER_COMPILE=1``, which compiles a part of the core.
 
-A substitute for mypyc makes one small C module, because mypyc takes a minute.
+If compiling fails, plain Python is installed. A substitute for mypyc makes one small C module,
+because mypyc itself takes a minute.
 """
 
 import os
@@ -49,7 +50,11 @@ FAILURES = {
 
 
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
-    """Build the package into ``lib`` in ``folder``, with a replaced mypyc. Return the output."""
+    """Build the package into ``lib`` in ``folder``, and return the output of the build.
+
+    A substitute replaces mypyc. It runs the statement ``fails``, and writes ``source`` as its C
+    file.
+    """
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()
     (folder / "stand_in/mypyc/build.py").write_text(
@@ -81,7 +86,7 @@ def compiled_modules(folder: Path) -> list[str]:
 def test_what_cannot_be_compiled_is_installed_as_it_is(
     tmp_path: Path, fails: str, source: str
 ) -> None:
-    """Compiling fails. No compiled part is left, and one line of output gives the reason."""
+    """Compiling fails. The plain Python modules are installed, and one line gives the reason."""
     output = built(tmp_path, fails, source)
     assert f"{PACKAGE}: not compiled (" in output
     assert not compiled_modules(tmp_path / "lib")

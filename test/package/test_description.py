@@ -53,9 +53,9 @@ def rotate(rpy: Vector, vector: Vector) -> Vector:
 
 
 def floor_speed(joint: Any, rate_radps: float, radius_m: float) -> tuple[Vector, Vector]:
-    """Return the position of a wheel, and the velocity of its centre over the floor, in m/s.
+    """Return the position of a wheel in m, and the velocity of its centre over the floor, in m/s.
 
-    The wheel's lowest point rests on the floor.
+    The wheel turns with ``rate_radps``, and its lowest point rests on the floor.
     """
     axle = rotate(tuple(joint.origin.rpy), tuple(joint.axis))
     spin = tuple(rate_radps * part for part in axle)
@@ -111,10 +111,10 @@ def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float
 
 
 def test_a_positive_wheel_turns_counter_clockwise_seen_from_outside() -> None:
-    """The axles point away from the robot's centre.
+    """The axles of the description point away from the robot's centre.
 
-    So a wheel with a positive rate turns counter-clockwise, seen from outside. The commissioning
-    guide says this.
+    Seen from outside, a wheel with a positive rate therefore turns counter-clockwise, as the
+    commissioning guide says.
     """
     for name in WHEELS:
         joint = ROBOT.joint_map[name]
@@ -132,7 +132,7 @@ def test_the_wheels_stand_on_the_ground() -> None:
 
 
 def test_the_imu_hangs_upside_down() -> None:
-    """The IMU is where the vendor's drivers have it.
+    """In the description, the IMU has the position that the vendor's drivers use.
 
     Its z axis points down, and its x axis forward.
     """
@@ -145,7 +145,7 @@ def test_the_imu_hangs_upside_down() -> None:
 
 
 def test_another_robot_is_described_by_arguments() -> None:
-    """Arguments describe a bigger robot with its IMU at another place. No new file is necessary."""
+    """xacro arguments describe a bigger robot with its IMU at another place, without a new file."""
     robot = description(
         wheel_radius="0.05",
         base_radius="0.2",

@@ -39,7 +39,7 @@ def anchors(page: Path) -> set[str]:
 
 
 def found(pattern: str) -> Iterator[str]:
-    """Yield what the group in ``pattern`` matches, for every match in the documents."""
+    """Yield the text of the group in ``pattern``, for every match in the documents."""
     for page in PAGES:
         yield from re.findall(pattern, page.read_text())
 
@@ -101,7 +101,7 @@ def test_every_command_exists() -> None:
     not all(map(find_spec, SPHINX)), reason="Sphinx, its theme or myst-parser is not installed"
 )
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
-    """The site contains every page, the README and the changelog."""
+    """Sphinx builds the site without a warning, with every page, the README and the changelog."""
     command = [sys.executable, "-m", "sphinx", "-q", "-W", "-c", "docs", ".", str(tmp_path)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

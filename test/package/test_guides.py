@@ -25,7 +25,7 @@ SENSES = {"clockwise": -1, "counter-clockwise": 1, "still": 0}
 
 
 def text_of(node: ast.AST) -> str:
-    """Return the text of a string node, with gaps for inserted values.
+    """Return the text of a string node, with "…" in place of each inserted value.
 
     For other nodes, return "".
     """
@@ -69,16 +69,16 @@ TELLING = {
 }
 """Functions and classes whose argument is a message to the user."""
 WRAPPERS = {"… (reported once)", "… (…)"}
-"""Messages that contain another message and no words that need a row."""
+"""Messages that only wrap another message. They need no row in the troubleshooting guide."""
 SENTENCES = re.findall(r"^\| `([^`]+)` \| .* \|$", TROUBLESHOOTING.read_text(), re.MULTILINE)
 STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """The guide quotes a message of the driver, with gaps and colons between its parts.
+    """The troubleshooting guide quotes a message of the driver. The code contains its parts.
 
-    The code contains each part.
+    Gaps ("…") and colons separate the parts.
     """
     parts = [part.strip() for part in GAPS.split(sentence)]
     assert any(len(part) > 8 for part in parts)
@@ -87,9 +87,10 @@ def test_the_driver_still_says_it(sentence: str) -> None:
 
 
 def test_what_the_driver_tells_is_explained() -> None:
-    """The guide has a row for each message of the driver.
+    """The troubleshooting guide has a row for each message of the driver.
 
-    The row has the message's beginning, or the message contains all parts of the row.
+    A row fits if it has the beginning of the message, or if the message contains all parts of the
+    row.
     """
 
     def is_explained(template: str) -> bool:
@@ -104,13 +105,13 @@ def test_what_the_driver_tells_is_explained() -> None:
 
 
 def test_every_state_is_explained() -> None:
-    """The guide's table has a row for each state of the driver."""
+    """The table of the troubleshooting guide has a row for each state of the driver."""
     assert set(SENTENCES) >= STATES
     assert all(state in said() for state in STATES)
 
 
 def test_every_status_of_the_diagnostics_has_its_row() -> None:
-    """The guide has a row for each status of the diagnostics, in the order of publication."""
+    """docs/diagnostics.md has a row for each diagnostic status, in the order of publication."""
     code = (ROOT / "omnibot_driver/core/reporting/diagnosis.py").read_text()
     names = dict.fromkeys(re.findall(r'Status\(\s*"([\w-]+)"', code))
     rows = re.findall(r"^\| ([\w-]+) \|", DIAGNOSTICS.read_text(), re.MULTILINE)
@@ -135,7 +136,7 @@ def test_the_tour_shows_what_the_driver_says() -> None:
 
 
 def test_every_assumption_has_its_step_and_what_mends_it() -> None:
-    """The form at the end of the guide lists all steps of the guide.
+    """The form at the end of the commissioning guide lists all steps of the guide.
 
     The form names only parameters of the driver.
     """
@@ -148,9 +149,9 @@ def test_every_assumption_has_its_step_and_what_mends_it() -> None:
 
 
 def test_the_wheels_turn_as_the_guide_says() -> None:
-    """The guide says in which direction each wheel turns for a command. The kinematics agree.
+    """The commissioning guide says how each wheel turns for a command. The kinematics agree.
 
-    Positive: counter-clockwise, seen from outside the robot.
+    A positive rate is counter-clockwise, seen from outside the robot.
     """
     kinematics = OmniKinematics(wheel_radius_m=0.029, base_radius_m=0.143)
     expected = {

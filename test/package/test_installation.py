@@ -30,7 +30,7 @@ SHARED_FILES = [
 
 
 def run(command: Sequence[str | Path], cwd: Path) -> str:
-    """Run the command to its end, and return its output. It must succeed."""
+    """Run the command to its end, and return its output. The command must succeed."""
     done = subprocess.run(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
     )
@@ -40,7 +40,7 @@ def run(command: Sequence[str | Path], cwd: Path) -> str:
 
 @contextmanager
 def running(command: Sequence[str | Path], cwd: Path) -> Iterator[subprocess.Popen[str]]:
-    """Run the command while the context lasts, and kill it at the end or after ``DEADLINE_S``."""
+    """Run the command while the context lasts; kill it at the end, or after 60 s at the latest."""
     process = subprocess.Popen(
         command, cwd=cwd, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
@@ -100,7 +100,7 @@ def in_workspace(workspace: Path, command: Sequence[str | Path]) -> list[str | P
 
 @pytest.fixture(scope="module")
 def prefix(workspace: Path) -> Path:
-    """Return the package's installation prefix as the ament index knows it."""
+    """Return the package's installation prefix from the ament index."""
     path = run(in_workspace(workspace, ["printenv", "AMENT_PREFIX_PATH"]), workspace).strip()
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv("AMENT_PREFIX_PATH", path)
@@ -110,14 +110,14 @@ def prefix(workspace: Path) -> Path:
 
 
 def test_colcon_installs_what_ros2_looks_for(prefix: Path) -> None:
-    """The index entry, the manifest and every file for users are under share."""
+    """colcon installs the ament index entry, the manifest and all files for users under share."""
     assert len(SHARED_FILES) > len(FOR_USERS)
     for name in SHARED_FILES:
         assert (prefix / "share" / name).is_file(), name
 
 
 def test_the_installed_documents_link_to_installed_files(prefix: Path) -> None:
-    """Links in the installed documents also work for users without the repository."""
+    """The installed documents link only to installed files, so they need no repository."""
     pages = [*(prefix / "share" / PACKAGE).glob("**/*.md")]
     assert len(pages) > 10
     for page in pages:
@@ -167,7 +167,7 @@ def test_the_installed_driver_drives_the_installed_simulator(workspace: Path, pr
 def test_colcon_test_runs_the_tests(sources: Path, workspace: Path) -> None:
     """``colcon test`` runs the tests, because setup.py names pytest.
 
-    Otherwise it would run none.
+    Without this name, colcon would run no tests.
     """
     one = ["test/core/omnibot/test_modes.py", " --maxfail=1"]
     colcon = [sys.executable, "-m", "colcon"]

@@ -67,7 +67,7 @@ Started = dict[str, dict[str, Any]]
 def launch(tmp_path: Path) -> Callable[..., Started]:
     """Return a function that launches a file with recorders instead of the real executables.
 
-    It returns the arguments and parameter files of each recorder.
+    The function returns the arguments and parameter files that each executable received.
     """
     executables = {
         PACKAGE: "driver",
@@ -124,7 +124,7 @@ def parameters(record: dict[str, Any]) -> dict[str, Any]:
 
 @pytest.mark.parametrize("path", LAUNCH_FILES, ids=lambda path: path.name)
 def test_a_launch_file_names_only_what_is_installed(path: Path) -> None:
-    """A launch file names other files of this package. Each of them is in an installed folder."""
+    """Each file of this package that a launch file names is in an installed folder."""
     strings = [
         node.value
         for node in ast.walk(ast.parse(path.read_text()))
@@ -157,7 +157,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 class Stub(ModuleType):
     """A substitute for a module of launch.
 
-    A call of any function in it only records its arguments.
+    Each name in the module is a function. A call returns an object with its name and arguments.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -194,7 +194,7 @@ def test_a_board_without_a_parameter_file_is_refused(
 
 @needs_launch
 def test_the_driver_gets_the_defaults_and_nothing_else(launch: Callable[..., Started]) -> None:
-    """Without arguments, the parameter file is used unchanged."""
+    """Without launch arguments, the driver gets the values of the parameter file, unchanged."""
     started = launch("driver.launch.py")
     assert set(started) == {"driver"}
     assert parameters(started["driver"]) == {
@@ -243,9 +243,10 @@ def test_the_parameter_file_is_that_of_the_board(
 def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
     launch: Callable[..., Started], tmp_path: Path, file: str
 ) -> None:
-    """The argument ``board`` is used beside a parameter file without a board.
+    """The user gives the argument ``board``, and a parameter file without a board.
 
-    Otherwise another board would get the OmniBot's frames.
+    The argument selects the board. Otherwise the robot of another board would get the OmniBot's
+    frames.
     """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")
@@ -256,7 +257,7 @@ def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
 
 @needs_launch
 def test_the_description_is_expanded_and_prefixed(launch: Callable[..., Started]) -> None:
-    """robot_state_publisher gets the expanded description and the prefix."""
+    """robot_state_publisher gets the description that xacro has expanded, and the frame prefix."""
     started = launch(
         "description.launch.py", "frame_prefix:=robot1/", "xacro_args:=base_height:=0.13"
     )
@@ -294,9 +295,9 @@ def test_rviz_is_shown_where_asked_for(launch: Callable[..., Started]) -> None:
 
 @needs_launch
 def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]) -> None:
-    """The filter publishes the transform, and the driver does not.
+    """ekf.launch.py starts the filter, which publishes the transform from odom to base_link.
 
-    All nodes are in one namespace.
+    The driver does not publish this transform. All nodes are in one namespace.
     """
     started = launch("ekf.launch.py", "namespace:=robot1", "frame_prefix:=robot1/")
     assert set(started) == {"driver", "ekf_node", "robot_state_publisher", "xacro"}
@@ -310,7 +311,7 @@ def test_the_filter_alone_publishes_the_transform(launch: Callable[..., Started]
 
 @needs_launch
 def test_the_simulation_is_the_driver_with_a_board_inside(launch: Callable[..., Started]) -> None:
-    """The simulation is one process. It takes options of the board and of the driver."""
+    """The simulation is one process. It accepts launch arguments for the board and the driver."""
     started = launch("simulation.launch.py", "namespace:=robot1")
     assert set(started) == {"driver"}
     assert parameters(started["driver"])["port"] == "sim://"

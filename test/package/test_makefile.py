@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def make(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run make in the repository, as from a new shell, to its end."""
+    """Run make in the repository, without the variables of an outer make, and return its result."""
     environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
     return subprocess.run(
         ["make", "--no-print-directory", *arguments],
@@ -43,7 +43,7 @@ def test_without_wheels_one_sentence_points_to_jazzy(
 ) -> None:
     """PyPI has no wheels for this Python. make fails, and names the installation guide of Jazzy.
 
-    It creates nothing.
+    make does not create a virtual environment.
     """
     done = make(target, f"PYTHON={no_python}", f"VENV={tmp_path / 'venv'}")
     sentence, verdict = done.stderr.splitlines()
@@ -66,7 +66,10 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
 
 @pytest.fixture
 def venv_with_errors(tmp_path: Path) -> Path:
-    """Return a finished ``.venv`` whose Python notes its arguments, and finds errors in a check."""
+    """Return a ready ``.venv`` whose Python only records its arguments, and fails for checks.
+
+    The failure stands for errors that the check has found.
+    """
     venv = tmp_path / "venv"
     (venv / "bin").mkdir(parents=True)
     python = venv / "bin/python"
@@ -80,7 +83,10 @@ def venv_with_errors(tmp_path: Path) -> Path:
 
 
 def test_files_are_formatted_although_errors_remain(venv_with_errors: Path) -> None:
-    """Long lines are errors that the formatter corrects. The remaining errors are shown last."""
+    """``make format`` formats the files even if they have errors that it cannot correct.
+
+    It shows the remaining errors last.
+    """
     done = make("format", f"VENV={venv_with_errors}")
     calls = (venv_with_errors.parent / "calls").read_text().splitlines()
     assert calls == ["-m ruff check --fix-only", "-m ruff format", "-m ruff check"]
@@ -88,7 +94,7 @@ def test_files_are_formatted_although_errors_remain(venv_with_errors: Path) -> N
 
 
 def test_a_file_without_format_is_told_with_the_remedy(venv_with_errors: Path) -> None:
-    """The check of the format fails. One line says which target corrects it."""
+    """``make lint`` finds a file with a wrong format. One line names the target to run."""
     done = make("lint", f"VENV={venv_with_errors}")
     assert "Please run make format." in done.stderr
     assert done.returncode != 0

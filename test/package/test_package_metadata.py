@@ -100,7 +100,10 @@ def imports(file: Path) -> Iterator[str]:
 
 
 def third_party(files: Iterable[Path]) -> set[str]:
-    """Return the rosdep keys of imports from outside Python and this repository."""
+    """Return the rosdep keys of libraries that these files import.
+
+    Python's own modules and those of this repository are left out.
+    """
     files = list(files)
     own = {PACKAGE}  # tests import their helpers by bare name
     own |= {file.stem for file in files} | {"toys"}
@@ -165,9 +168,9 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """rosdep does not install some libraries.
+    """rosdep does not install some libraries in a suitable version. A pip command installs them.
 
-    The README has a pip command for them, which Ubuntu 24.04 accepts.
+    The README has this command, with the option that Ubuntu 24.04 requires.
     """
     words = f"pip install --user --break-system-packages {' '.join(sorted(FROM_PIP))}"
     assert words in (ROOT / "README.md").read_text()
@@ -226,7 +229,7 @@ def test_the_core_imports_itself_and_pure_modules_only() -> None:
 def test_the_simulator_shares_nothing_with_the_core() -> None:
     """The simulator uses no code of the driver.
 
-    So one misreading of a manual cannot affect both.
+    Otherwise one misreading of a manual could affect both, and no test would detect it.
     """
     shared = {
         f"{file.relative_to(ROOT)}: {name}"
@@ -238,7 +241,7 @@ def test_the_simulator_shares_nothing_with_the_core() -> None:
 
 
 def test_mypy_checks_exactly_what_imports_no_ros() -> None:
-    """mypy checks all modules that do not import ROS, which has no type annotations."""
+    """mypy checks all modules that do not import ROS. ROS itself has no type annotations."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text())
     without_ros = {
         file

@@ -43,12 +43,12 @@ PATTERNS = {
     "lattice": r"lattices?",
     "farewell": r"farewells?",
 }
-"""The phrases that must not be used: the name of each phrase, and its pattern as full words."""
+"""The phrases that must not be used. The values are patterns, which match only full words."""
 
 ALLOWED = {
     "test/package/test_plain_english.py": "names the phrases",
 }
-"""Files that are not searched. The value is the reason."""
+"""Files that are not searched, each with the reason."""
 
 CONJUNCTIONS = {"And", "But", "Nor", "Or"}
 """Words that must not begin a docstring.
@@ -59,7 +59,7 @@ Such a docstring could not be understood without the function's name.
 
 @cache
 def texts() -> dict[str, str]:
-    """Return every text file of the repository. The keys are the names of the files."""
+    """Return the text of every text file of the repository, by file name."""
     return {
         str(name): (ROOT / name).read_text(encoding="utf-8")
         for name in sorted(file.relative_to(ROOT) for file in ROOT.rglob("*"))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 MOST_EXAMPLES = 200
-"""Largest number of examples that a property may try without the mark ``slow``."""
+"""Largest number of examples that a property-based test may try without the mark ``slow``."""
 
 
 def quick_folders() -> list[str]:
@@ -36,9 +36,9 @@ def test_none_of_them_imports_ros() -> None:
 
 
 def test_a_property_of_many_examples_is_marked_slow() -> None:
-    """A property that tries many examples has the mark ``slow``.
+    """A property-based test that tries many examples has the mark ``slow``.
 
-    ``make check`` leaves out such tests, so that it stays quick.
+    ``make check`` leaves out tests with this mark, so that it stays quick.
     """
     for name, module in modules():
         for node in ast.walk(module):

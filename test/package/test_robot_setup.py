@@ -34,7 +34,7 @@ OFFERED = rules([line.lstrip("#") for line in LINES if line.lstrip("#").startswi
 
 
 def test_every_rule_matches_before_it_assigns() -> None:
-    """Each rule has only keys and operators that udev knows."""
+    """Each udev rule has only keys and operators that udev supports."""
     for rule in ACTIVE + OFFERED:
         for key, (operator, _) in rule.items():
             assert key in MATCHES | ASSIGNMENTS
@@ -42,9 +42,9 @@ def test_every_rule_matches_before_it_assigns() -> None:
 
 
 def test_each_adapter_gets_the_same_name_and_rights() -> None:
-    """The file has a rule for each of four adapters. All but one are commented out.
+    """The udev file has a rule for each of four adapters. All but one are commented out.
 
-    Each makes the link /dev/omnibot, for the group dialout.
+    Each rule makes the link /dev/omnibot, and gives the group dialout access.
     """
     assert len(OFFERED) == 4
     for rule in OFFERED:
@@ -59,15 +59,15 @@ def test_each_adapter_gets_the_same_name_and_rights() -> None:
 def test_only_one_adapter_is_taken_for_the_board() -> None:
     """Only one rule that is not commented out makes the link /dev/omnibot.
 
-    A second one might give this name to a lidar.
+    A second active rule might give this name to a lidar.
     """
     assert len([rule for rule in ACTIVE if "SYMLINK" in rule]) == 1
 
 
 def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
-    """A rule sets an FTDI adapter's timer to 1 ms instead of 16 ms.
+    """A udev rule sets the latency timer of an FTDI adapter to 1 ms instead of 16 ms.
 
-    It applies when the kernel's driver is bound.
+    The rule applies when the kernel binds its FTDI driver to the adapter.
     """
     (timer,) = [rule for rule in ACTIVE if "ATTR{latency_timer}" in rule]
     assert timer["DRIVER"] == ("==", "ftdi_sio")
@@ -76,7 +76,7 @@ def test_an_ftdi_adapter_does_not_hold_bytes_back() -> None:
 
 
 def unit_settings() -> dict[str, list[str]]:
-    """Return the keys of the unit with their values. Continued lines are joined."""
+    """Return the values of each key in the systemd unit. Continued lines are joined."""
     settings: dict[str, list[str]] = {}
     for line in UNIT.read_text().replace("\\\n", " ").splitlines():
         key, assigned, value = line.partition("=")
@@ -86,7 +86,10 @@ def unit_settings() -> dict[str, list[str]]:
 
 
 def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> None:
-    """The unit starts the driver without a shell between, so signals reach the driver itself."""
+    """The systemd unit starts the driver without a shell in between.
+
+    Signals therefore reach the driver itself.
+    """
     (command,) = unit_settings()["ExecStart"]
     assert ". /opt/ros/jazzy/setup.bash && " in command
     assert re.search(r'&& +exec "\S+/lib/omnibot_driver/driver" +--ros-args ', command)
@@ -107,7 +110,7 @@ def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None
 
 @pytest.mark.skipif(not shutil.which("systemd-analyze"), reason="systemd-analyze is not installed")
 def test_systemd_accepts_the_unit() -> None:
-    """systemd reports no unknown key or value of the unit on stderr."""
+    """systemd-analyze accepts each key and value in the systemd unit."""
     done = subprocess.run(
         ["systemd-analyze", "verify", "--man=no", str(UNIT)],
         capture_output=True,

@@ -32,12 +32,12 @@ OTHERS = {"robot_description", "diagnostics", "goal_pose"}
 
 
 def load(name: str) -> Any:
-    """Return the parsed YAML file."""
+    """Return the parsed YAML file with this name in config/."""
     return yaml.safe_load((CONFIG / name).read_text())
 
 
 def parameters(name: str, node: str) -> dict[str, Any]:
-    """Return a node's parameters in the file."""
+    """Return the parameters of a node in a YAML file of config/."""
     found: dict[str, Any] = load(name)[node]["ros__parameters"]
     return found
 
@@ -81,9 +81,9 @@ def test_the_drivers_names_are_found() -> None:
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("*.yaml")), ids=lambda path: path.name)
 def test_ros_reads_each_parameter_file(path: Path) -> None:
-    """rcl reads each parameter file.
+    """rcl, the ROS client library, reads each parameter file.
 
-    Its parser is stricter than YAML: it accepts neither anchors nor mixed lists.
+    The parser of rcl is stricter than YAML: it accepts neither anchors nor mixed lists.
     """
     context = Context()
     rclpy.init(args=["--ros-args", "--params-file", str(path)], context=context)
@@ -150,7 +150,10 @@ def test_nav2_uses_the_drivers_topics_and_frames() -> None:
 
 
 def test_every_critic_that_is_tuned_is_used() -> None:
-    """Each critic with settings is in the list of critics. A misspelt name would be ignored."""
+    """Each critic of Nav2's controller that has settings is in the list of critics.
+
+    Nav2 would ignore the settings of a critic that is not in the list.
+    """
     mppi = load("nav2_omnibot.yaml")["controller_server"]["ros__parameters"]["FollowPath"]
     assert {name for name in mppi if name.endswith("Critic")} == set(mppi["critics"])
 
@@ -171,7 +174,7 @@ def test_the_mux_is_locked_by_the_drivers_estop() -> None:
 def test_the_mux_passes_on_what_the_driver_takes() -> None:
     """The sources of twist_mux are topics that the driver does not use.
 
-    Their timeout is the driver's command timeout.
+    Their timeout is the driver's command timeout, and their message type that of the driver.
     """
     mux = parameters("twist_mux.yaml", "twist_mux")
     sources = mux["topics"].values()
@@ -197,7 +200,7 @@ def test_rviz_shows_topics_and_frames_that_exist() -> None:
 
 
 def test_foxglove_shows_topics_and_services_that_exist() -> None:
-    """Each name in Foxglove's layout is a topic or service of the driver, or is in ``OTHERS``."""
+    """Each topic or service in Foxglove's layout belongs to the driver or to a known other node."""
     text = (CONFIG / "foxglove.json").read_text()
     names = set(re.findall(r'"/([a-z_/]+)', text))
     assert {"odom", "imu/data_raw", f"{NODE}/state", f"{NODE}/estop"} < names
@@ -213,9 +216,9 @@ def test_foxglove_lays_out_every_panel_once() -> None:
 
 
 def test_foxglove_drives_slowly_and_often_enough() -> None:
-    """Foxglove's buttons command speeds within the limits.
+    """Foxglove's buttons command speeds within the driver's limits.
 
-    They repeat faster than the command timeout.
+    A button repeats its command more than twice within the driver's command timeout.
     """
     teleop = json.loads((CONFIG / "foxglove.json").read_text())["configById"]["Teleop!drive"]
     assert teleop["publishRate"] > 2 / TIMEOUT

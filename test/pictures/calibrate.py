@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pictures of ``calibrate imu``, ``scale`` and ``geometry``, made with robots of known errors.
+"""Pictures of ``calibrate imu``, ``scale`` and ``geometry``, made with robots with known errors.
 
 docs/tools/calibrate.md lists these errors, and the errors that the calibration finds.
 """

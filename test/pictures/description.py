@@ -17,10 +17,8 @@ Array = NDArray[np.float64]
 
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
-"""The picture's size in pixels, the rows computed at once, and the rays for each pixel.
-
-``FINER``: number of rays in each direction.
-"""
+"""``WIDTH``, ``HEIGHT``: size of the picture in pixels. ``BAND``: pixel rows that are computed at
+once. ``FINER``: number of rays for each pixel, in each of both directions."""
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
 LAMPS, LAMP_SIZE = 6, 0.06
@@ -106,7 +104,8 @@ class Solid:
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
         """Return the normals of the surface where rays meet it, at the distances ``at``.
 
-        ``axis``: across the face. ``sign``: 1 along the ray, -1 against it.
+        ``axis``: the solid's axis across the face that a ray meets. ``sign``: 1 if the ray leaves
+        the solid, -1 if it enters.
         """
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))
@@ -128,7 +127,7 @@ def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArr
 
 @dataclass
 class Link:
-    """A group of solids that are near each other, and a sphere around them."""
+    """A link of the robot: a group of solids that are near each other, and a sphere around them."""
 
     solids: list[Solid]
 
@@ -170,7 +169,7 @@ def links() -> Iterator[Link]:
 
 
 def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
-    """Return how much light each point gets, from 0 to 1."""
+    """Return how much light each point gets, from 0 (in the robot's shadow) to 1."""
     light = np.zeros(len(points))
     for _ in range(LAMPS):
         towards = unit(LIGHT + random.normal(0.0, LAMP_SIZE, points.shape))
@@ -182,7 +181,7 @@ def lit(robot: list[Link], points: Array, random: np.random.Generator) -> Array:
 
 
 def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array:
-    """Return the colours that are seen along these rays from the eye."""
+    """Return the colours that the camera sees along these rays."""
     eyes = np.broadcast_to(EYE_M, rays.shape)
     depth = np.where(rays[:, 2] < 0.0, -EYE_M[2] / np.minimum(rays[:, 2], -1e-9), np.inf)
     colour = np.ones(rays.shape)
@@ -214,9 +213,9 @@ def render(rays: Array, robot: list[Link], random: np.random.Generator) -> Array
 
 
 def glaze(colour: Array, depth: Array, rays: Array, glass: list[tuple[Solid, Hits]]) -> Array:
-    """Draw the clear solids over the colours behind them, from the lowest to the highest.
+    """Draw transparent solids over the colours behind them, from the lowest to the highest.
 
-    A face covers more if it is seen at a flat angle.
+    A face hides more of what is behind it if it is seen at a flat angle.
     """
     for solid, hits in sorted(glass, key=lambda item: item[0].matrix[2, 3]):
         for at, normal in ((hits.far, hits.far_normal), (hits.near, hits.near_normal)):

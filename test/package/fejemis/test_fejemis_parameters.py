@@ -19,7 +19,7 @@ def check(**given: Any) -> dict[str, Any]:
 
 
 def test_nothing_is_written_by_default() -> None:
-    """By default the driver writes nothing. It must not overwrite a board's own settings."""
+    """By default the driver writes nothing to the boards, to keep their stored settings."""
     values = check()
     assert settings(values).written == {}
     assert kinematics(values).track_m == 0.4
@@ -27,10 +27,10 @@ def test_nothing_is_written_by_default() -> None:
 
 
 def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
-    """The driver writes the given parameters in the units of the boards.
+    """The user gives parameters. The driver writes them in the units of the boards.
 
-    ``confw``: radii, gear, ticks, track. ``confs``: track, steering distance. ``fwoffset``:
-    degrees.
+    The command ``confw`` gets radii, gear, ticks and track; ``confs`` gets track and steering
+    distance; ``fwoffset`` gets an angle in degrees.
     """
     values = check(
         wheel_radii=[0.08, 0.081],
@@ -60,7 +60,7 @@ def test_what_is_given_is_written_in_the_units_of_the_boards() -> None:
     ],
 )
 def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: str) -> None:
-    """One command writes several parameters. If the user gives only some of them, this is refused.
+    """The user gives only some of the parameters that one command writes. This is refused.
 
     The driver cannot guess the missing values.
     """
@@ -69,7 +69,10 @@ def test_what_one_command_takes_is_set_together(given: dict[str, Any], missing: 
 
 
 def test_a_track_alone_is_refused() -> None:
-    """``track`` alone is refused, because two commands contain it, and both need further values."""
+    """The user gives only ``track``. This is refused, because two commands need it.
+
+    Both commands need further values, and the driver cannot know which command is meant.
+    """
     with pytest.raises(ParameterError, match="set 'steering_distance' too"):
         check(track=0.4)
 
@@ -84,12 +87,12 @@ def test_the_same_port_twice_is_refused(tmp_path: Path) -> None:
 
 
 def test_ports_are_not_compared_for_a_simulated_pair() -> None:
-    """A simulated pair of boards does not use ``front_port``. Any value is accepted."""
+    """A simulated pair of boards does not use ``front_port``, so any value is accepted."""
     assert check(port="sim://")["front_port"] == "/dev/ttyACM1"
 
 
 @pytest.mark.parametrize("name", ["baudrate", "max_wheel_speed", "axis_signs", "low_pass"])
 def test_what_the_robot_has_no_use_for_is_refused(name: str) -> None:
-    """A Fejemis refuses a parameter that only other boards have."""
+    """The user gives a Fejemis a parameter that only other boards have. It is refused."""
     with pytest.raises(ParameterError, match=f"parameter '{name}' belongs to board"):
         check(**{name: 1})

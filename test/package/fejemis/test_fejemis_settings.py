@@ -31,9 +31,9 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
-    """The filter fuses only velocities and the yaw rate of the gyro.
+    """The filter fuses only the velocities from odometry and the yaw rate of the gyro.
 
-    The board's yaw comes from the same gyro, so it is not fused.
+    The board computes its yaw from the same gyro, so this yaw is not fused.
     """
     ekf = load("ekf_fejemis.yaml")["/**"]["ros__parameters"]
     fused = {
