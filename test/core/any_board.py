@@ -79,8 +79,7 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: driving time that a start loses, in s. At 0.3 m/s for 4 s, the robot drives 0.97 m
-    instead of 1.2 m.
+    ``late_s``: driving time that a start loses, in s.
     """
 
     # 0.5 s until a wheel turns, then another 0.5 s until the wheel has its speed.
@@ -114,7 +113,7 @@ def lois_ecu(firmware: str) -> tuple[Board, Any]:
 
 
 class MartRobot:
-    """The simulated MART controller. It makes five ticks in each tick of the bench."""
+    """The simulated MART controller. Five of its ticks are one tick of the bench."""
 
     def __init__(self, firmware: Any) -> None:
         from omnibot_driver.simulator.mart import QUIRKS, MartSettings, SimulatedMart
@@ -144,7 +143,7 @@ def mart(firmware: str) -> tuple[Board, Any]:
 
 
 class FejemisRobot:
-    """The simulated Fejemis. It makes five ticks in each tick of the bench."""
+    """The simulated Fejemis. Five of its ticks are one tick of the bench."""
 
     def __init__(self, sums: bool) -> None:
         from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis

@@ -42,7 +42,7 @@ def settled(on: Line) -> bool:
 
 
 def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
-    """Return the time step in s and the pose step between consecutive estimates."""
+    """Return the time in s and the motion from each estimate to the next one."""
     return [
         (after.stamp_s - before.stamp_s, after.pose - before.pose)
         for before, after in pairwise(estimates)

@@ -95,7 +95,10 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to send commands. A paused board could take a byte of a command for a letter."""
+        """Whether to send commands: only if the test wants to drive, and the board runs.
+
+        A paused board may read a byte of a command as a letter such as P.
+        """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 
     @property

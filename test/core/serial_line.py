@@ -65,7 +65,7 @@ class Board:
 
 
 def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Split the stream as an ideal line does: one read for all bytes between two idle gaps."""
+    """Split the stream as an ideal line does. A read has all bytes between two idle gaps."""
     held = bytearray()
     last = line[0][0]
     for at, byte in line:

@@ -77,7 +77,7 @@ class Bench:
         self.settle()
 
     def settle(self) -> None:
-        """Write the session's output and collect its events, as the shell does after each input."""
+        """Write the session's output and collect its events, as the driver does after an input."""
         data = joined(self.session.take_output(self.now))
         if data:
             self.written.append((self.now, data))

@@ -26,7 +26,7 @@ TIMEOUT_S = 0.5
 
 
 class Words:
-    """A substitute for an encoder. Its orders are bytes already, and it returns them unchanged."""
+    """A substitute for an encoder. It accepts bytes as orders, and returns them unchanged."""
 
     def stop(self) -> Packets:
         return packed(STOP)
@@ -66,7 +66,10 @@ def make_stream() -> Stream:
 
 
 def run(stream: Stream, start: float, end: float) -> list[tuple[float, bytes]]:
-    """Serve the stream each time it is due, as the pacer does. Return times and bytes written."""
+    """Write the stream's set-points from ``start`` to ``end``, each when it is due.
+
+    Return the time and the bytes of each write.
+    """
     written = []
     now = start
     while now <= end:

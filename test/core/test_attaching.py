@@ -31,7 +31,10 @@ from omnibot_driver.core.readings import PoseReading
 
 @given(st.lists(small_moves, min_size=1, max_size=5), headings)
 def test_deltas_before_the_first_pose_wait_for_it(moves: list[Pose], initial: float) -> None:
-    """The deltas are published as if the pose had come before them."""
+    """Deltas arrive before the board's first pose, and wait for it.
+
+    They are then published as if the pose had come first.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     for move in moves:
         assert odometry.displace(trip.move(*xyyaw(move)), 0.0) == []
@@ -82,7 +85,10 @@ def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
 
 
 def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
-    """The odometry publishes the 25 deltas so far together, and later ones at once."""
+    """The board sends no pose. After a second, the odometry assumes heading 0.
+
+    The odometry publishes the 25 waiting deltas together, and later ones at once.
+    """
     odometry = Odometry(SETTINGS)
     for _ in range(24):
         assert odometry.displace(earth(0.01, 0.0), 0.0) == []
@@ -143,7 +149,10 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """Rounding causes the errors. A correction is spread over five displacements."""
+    """Rounding makes the sum of the displacements differ from the board's pose.
+
+    The correction is spread over five displacements.
+    """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.01, -0.005, 0.02))
@@ -237,9 +246,9 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 
 
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
-    """The heading is unknown before two poses agree, and after a long gap.
+    """The heading is known once two poses of the board agree.
 
-    It is also unknown while heading 0 is only assumed.
+    It is unknown before that, while heading 0 is assumed, and after a gap of 20 displacements.
     """
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known

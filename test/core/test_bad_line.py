@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Minutes of driving on a bad line, in simulated time. Bytes are lost alone and in bursts."""
+"""Minutes of driving on a bad line, in simulated time. The line loses single bytes and bursts."""
 
 import math
 import struct
@@ -70,9 +70,9 @@ class Drive:
 @pytest.mark.slow
 @pytest.mark.parametrize(("frame", "minutes"), [("earth", 3), ("body", 1)])
 def test_after_minutes_of_losses_odom_is_the_boards_own_pose(frame: str, minutes: int) -> None:
-    """Single bytes (1 in 1000) and bursts are lost, and odom is right within 2 cm.
+    """A line loses 1 byte in 1000, and bursts of bytes. Odom is right within 2 cm.
 
-    After 1.5 s without losses, it is right within 1.5 mm.
+    After 1.5 s without losses, odom is right within 1.5 mm.
     """
     drive = Drive(frame, LineFaults(lose=0.001, burst=0.0005))
     drive.run(60.0 * minutes)

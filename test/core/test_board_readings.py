@@ -125,7 +125,10 @@ def test_resetting_odometry_resets_the_boards(bench: AnyBench) -> None:
 
 
 def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: AnyBench) -> None:
-    """The driver publishes both the press and the release of the robot's button."""
+    """A user presses the robot's button and releases it. The press latches the e-stop.
+
+    The release does not unlatch it. The driver publishes both events.
+    """
     bench.drive_on()
     tell(bench, EStopButtonReading(True))
     assert bench.session.estop_active
@@ -179,7 +182,10 @@ def test_a_proof_takes_as_long_as_the_board_needs() -> None:
 
 
 def test_the_estop_is_not_released_while_the_button_is_held(bench: AnyBench) -> None:
-    """The refusal outlasts a reconnection, and says what to do."""
+    """The robot's button is pressed, and the user tries to release the e-stop. The driver refuses.
+
+    The driver still refuses after a reconnection, until the button is released.
+    """
     tell(bench, EStopButtonReading(True))
     with pytest.raises(RequestRefused, match="release the button, then call again"):
         bench.estop(False)

@@ -37,7 +37,10 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
-    """0.3 m/s for 4 s give 1.2 m, minus what the robot loses at the start."""
+    """The robot is commanded to drive 0.3 m/s for 4 s. It drives 1.2 m, or less if it starts late.
+
+    Odometry has the true distance within 2 cm.
+    """
     bench.drive_on(0.3, 4.0)
     bench.run(3.0)
     assert bench.robot.stands
@@ -86,7 +89,10 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
     bench: AnyBench, seconds: float
 ) -> None:
-    """The stall lasts up to 9 s, while the board's data waits unread."""
+    """This process stalls for up to 9 s while the robot drives, and the board's data waits unread.
+
+    After the stall the robot stands, until a new command moves it.
+    """
     for _ in range(2):
         bench.drive_on()
         bench.stall(seconds)
@@ -131,7 +137,10 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """After a stall or an e-stop, the command from before has no effect any more."""
+    """A stall or an e-stop ends a drive. The command from before has no effect any more.
+
+    Only a command that arrives afterwards moves the robot.
+    """
     bench.drive_on()
     event(bench)
     bench.settle()
@@ -160,7 +169,10 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
-    """The robot is cut off for 5 s, and may have driven on."""
+    """A driving robot neither sends nor receives for 5 s, and may have driven on.
+
+    When it is connected again, the driver stops it.
+    """
     bench.drive_on()
     bench.speaks = bench.hears = False
     bench.run(5.0)
@@ -190,7 +202,10 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
 
 
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
-    """Stop is sent until the robot is seen at rest. Commands are refused afterwards."""
+    """The driver shuts down while the robot drives, and sends Stop until the robot is at rest.
+
+    Later commands are refused.
+    """
     bench.drive_on()
     bench.session.shutdown.begin(bench.now)
     bench.settle()

@@ -62,7 +62,10 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """The data is received before the request, but not yet processed."""
+    """Data has been received but not processed when a request comes. The data does not confirm it.
+
+    Only data that is received after the request confirms it.
+    """
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):
         session.inbound.receive(board.step(), tick * TICK_S)

@@ -27,7 +27,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The robot rolls out during the pause, and all frames around it may be lost."""
+    """The board is paused during a drive, and the robot rolls out. Frames of the pause may be lost.
+
+    A second later, odom is right.
+    """
     on = line(seed)
     if hidden:
         on.loses = lambda _data, _now: True
@@ -43,7 +46,10 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:
-    """SEQ and the pose begin at zero. The board's text or its first frames may be lost."""
+    """The board restarts, so SEQ and its pose begin at zero. Some of its frames may be lost.
+
+    Odom continues from its last pose.
+    """
     on = line(seed)
     on.drives = False
     on.run(1.0)
@@ -90,7 +96,10 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """The lost motion came before the reset, so the next pose does not add it."""
+    """Frames are lost, and the odometry is reset before the next pose arrives.
+
+    That pose shows the lost motion. Odom does not include it, because it came before the reset.
+    """
     for seed in range(4):
         on = line(seed)
         lose(on, 1.0)
@@ -124,7 +133,10 @@ def test_a_line_that_is_opened_again_finds_the_robot_where_it_went() -> None:
 def test_an_hour_of_rounded_displacements_stays_within_2_mm_and_2_mrad(
     frame: str, count: int
 ) -> None:
-    """Each delta is rounded to 0.1 mm and 0.1 mrad. A pose follows every fifth delta."""
+    """The robot drives slowly for up to an hour. Each delta is rounded to 0.1 mm and 0.1 mrad.
+
+    The errors do not add up, because the board sends a pose after every fifth delta.
+    """
     odometry = attached()
     x = y = yaw = worst_m = worst_rad = 0.0
     for number in range(1, count + 1):
@@ -153,9 +165,10 @@ def float32(value: float) -> float:
 
 
 def test_wheel_counts_go_through_the_kinematics() -> None:
-    """After −1/8 of a turn of all wheels, the yaw is 2πr/8L.
+    """Deltas are in wheel counts. All three wheels turn backward by 1/8 of a turn.
 
-    B forward and A backward then drive the robot straight on.
+    The robot then has turned left in place. After this, B turns forward and A backward, and the
+    robot drives straight on.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -59,7 +59,10 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """Data from before the stall may still wait, so the board has 2 s again."""
+    """This process stalls. Data from before the end of the stall may still wait to be read.
+
+    So the board has 2 s after the stall before it counts as silent.
+    """
     liveness.stalled(50.0)
     assert not liveness.unheard(50.4)
     assert not liveness.fell_silent(51.9)
@@ -75,7 +78,10 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 
 
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
-    """Without data, a command ends after 0.5 s. If the robot is not driven, the limit is 2 s."""
+    """No data arrives. The driver wakes after 0.5 s if the robot is driven, otherwise after 2 s.
+
+    After 0.5 s without data, a command is ended. After 2 s, the board counts as silent.
+    """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5
     assert liveness.unheard(10.5)

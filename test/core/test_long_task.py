@@ -51,7 +51,10 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task that begins at rest goes on. It ends when a driven robot is stopped."""
+    """A task continues while the robot is at rest from the beginning.
+
+    It ends when a robot that has been driven is stopped.
+    """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)
     for driven in (False, False, True, True):

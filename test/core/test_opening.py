@@ -30,7 +30,10 @@ def test_the_opening_sequence_is_zeros_stop_and_s_until_data_flows() -> None:
 
 
 def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
-    """The states are disconnected, connecting, paused and nominal, as the interface names them."""
+    """The port is opened, the board reports a pause and is then started, and the port is closed.
+
+    The states are disconnected, connecting, paused, nominal and disconnected again.
+    """
     bench = Bench(run=False)
     assert bench.session.state == "disconnected"
     bench.open()
@@ -111,7 +114,10 @@ def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -
 
 
 def test_a_paused_robot_is_still_paused_after_a_reconnect(bench: Bench) -> None:
-    """The mode wanted by the user is kept while the port is closed."""
+    """The user pauses the board. Then the port is closed and opened again.
+
+    The board is still paused.
+    """
     bench.ask(Request.PAUSE, 5.0)
     bench.close()
     bench.open()

@@ -17,7 +17,10 @@ def bench() -> Bench:
 
 
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
-    """P is sent as soon as new data shows that the board runs."""
+    """The user pauses a driving robot. The driver sends Stop, and then P once.
+
+    P is sent as soon as new data shows that the board runs. The board's notice confirms the pause.
+    """
     bench.drive(0.5)
     bench.run(0.3)
     start = len(bench.written)
@@ -45,7 +48,10 @@ def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
 def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
     bench: Bench,
 ) -> None:
-    """The driver sends P only after new data. A paused board sends no data."""
+    """Another program has just paused the board, and the user requests a pause.
+
+    The driver sends P only after new data. A paused board sends none, so the driver sends no P.
+    """
     bench.board.receive(b"P")
     assert bench.session.state == "nominal"
     assert bench.ask(Request.PAUSE, 5.0).success
@@ -71,9 +77,9 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Old data makes the driver send P, which resumes a paused board.
+    """Another program pauses the board. Older data then makes the driver send P, which resumes it.
 
-    The late notice of the other pause proves nothing. P is sent again.
+    The late notice of the first pause does not confirm the request, so the driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")

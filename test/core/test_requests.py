@@ -53,7 +53,7 @@ def test_one_request_is_under_way_at_a_time(bench: Bench) -> None:
 
 
 def test_a_request_that_the_drivers_end_cuts_short_says_so(bench: Bench) -> None:
-    """The driver shuts down during a request. The answer to the request says so."""
+    """The driver shuts down during a request. The request fails and names this reason."""
     bench.speaks = False
     bench.session.request(Request.RESET, object(), bench.now)
     bench.session.shutdown.begin(bench.now)
@@ -78,9 +78,9 @@ def test_a_request_ends_with_the_port(bench: Bench) -> None:
 
 
 def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
-    """The port is lost before the Stop and the R of a reset are written.
+    """The port is lost before the driver has written the Stop and the R of a reset.
 
-    The driver does not write them to the next port.
+    The driver does not write them when the port is opened again.
     """
     bench = standing()
     bench.session.request(Request.RESET, object(), bench.now)
@@ -92,7 +92,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """During requests and silences, the session's next wake-up is always in the future."""
+    """While requests wait and the board is silent, the session's next wake-up is in the future."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -104,7 +104,10 @@ def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
 
 
 def test_starting_a_running_board_is_confirmed_and_changes_nothing(bench: Bench) -> None:
-    """The driver still writes S, because a P may be on its way to the board."""
+    """The user starts a board that already runs. The request succeeds, and the robot drives on.
+
+    The driver still writes S, because another program's P may be on its way to the board.
+    """
     bench.drive(0.3)
     start = len(bench.written)
     assert bench.ask(Request.START, 1.0).message == "running (nominal)"
@@ -135,7 +138,10 @@ def test_a_reset_brings_a_running_board_back_and_the_odometry_goes_on(bench: Ben
 
 @pytest.mark.parametrize("asked", [False, True])
 def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
-    """The board is paused before a reset. It is paused afterwards too, and the answer says so."""
+    """The board is paused and then reset. It is paused again afterwards.
+
+    The answer to the request says that the board is paused.
+    """
     bench = standing() if asked else paused()
     if asked:
         assert bench.ask(Request.PAUSE, 5.0).success
@@ -149,7 +155,10 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """The numbers in the board's notices continue, so the driver lets the reset fail."""
+    """A paused board does not receive the R of a reset, so the numbers in its notices continue.
+
+    The driver sees no restart, and the reset fails.
+    """
     bench = Bench(run=False)
     bench.open()
     bench.run(2.5)
@@ -160,7 +169,10 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
 
 
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
-    """The driver starts the board, but the robot stands until a fresh command."""
+    """A pause has failed, and the user resets the board. Afterwards the driver starts the board.
+
+    The robot stands until a new command arrives.
+    """
     bench = driving()
     bench.hears = False
     bench.ask(Request.PAUSE, 5.0)
@@ -189,7 +201,10 @@ def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) 
 
 
 def test_the_state_does_not_flap_while_a_deaf_board_is_asked_to_reset(bench: Bench) -> None:
-    """The state is ``connecting`` once, and ``nominal`` again when no restart was found."""
+    """The board does not receive the R of a reset. The state changes to ``connecting`` only once.
+
+    It is ``nominal`` again when the driver has found no restart.
+    """
     bench.hears = False
     bench.events.clear()
     shown = [bench.session.state]

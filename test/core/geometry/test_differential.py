@@ -30,12 +30,19 @@ def test_straight_ahead_both_wheels_roll_alike() -> None:
 
 
 def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
-    """At 1 rad/s, a rim 0.2 m from the centre moves at 0.2 m/s. The wheels turn at ∓2 rad/s."""
+    """The robot turns left on the spot at 1 rad/s.
+
+    Each wheel is 0.2 m from the centre and has a radius of 0.1 m. The left wheel turns at -2 rad/s,
+    the right wheel at 2 rad/s.
+    """
     assert ROBOT.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == pytest.approx((-2.0, 2.0))
 
 
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
-    """At 0.5 rad/s, radii of 0.8, 1.0 and 1.2 m give speeds of 0.4, 0.5 and 0.6 m/s."""
+    """The robot turns left at 0.5 rad/s about a point 1 m to its left, so it moves at 0.5 m/s.
+
+    The left wheel runs on a circle of 0.8 m at 0.4 m/s, the right wheel on 1.2 m at 0.6 m/s.
+    """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 
 

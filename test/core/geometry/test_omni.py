@@ -25,7 +25,11 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """The rim speed is ∓cos 30° Vx − sin 30° Vy − L Ω for A and B, and Vy − L Ω for C."""
+    """The wheel rates are the rim speeds of the manual's equations, divided by the wheel radius.
+
+    With the base radius L, the rim speeds of A and B are ∓cos 30° Vx - sin 30° Vy - L Ω. That of C
+    is Vy - L Ω.
+    """
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
     rim_b = 0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -37,7 +41,10 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The factor is 1/(2 cos 30°). The manual's expanded matrix is wrong by a factor of 4/3."""
+    """The body twist is the manual's odometry matrix, with the factor 1/(2 cos 30°).
+
+    The matrix that the manual prints in full is wrong by a factor of 4/3.
+    """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258
     expected = (
@@ -83,9 +90,9 @@ def test_left_turns_c_forth_and_a_and_b_back_at_half_its_rate() -> None:
 
 
 def test_a_left_turn_turns_all_wheels_back_alike() -> None:
-    """The robot turns left at 1 rad/s, and each rim moves at −L m/s.
+    """The robot turns left at 1 rad/s. Each rim moves at -L m/s, where L is the base radius in m.
 
-    The manual's «rotate all» turns the robot to the right.
+    If all wheels turn forward, the robot turns right. The manual calls this «rotate all».
     """
     assert MANUAL.wheel_rates(BodyTwist(0.0, 0.0, 1.0)) == close((-L / R, -L / R, -L / R))
     assert MANUAL.body_twist((1.0, 1.0, 1.0)).yaw_rate_radps < 0

@@ -14,7 +14,7 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 @pytest.mark.slow
 @given(small_moves)
 def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
-    """``roll`` gives the same pose as the textbook's integral of a constant twist."""
+    """``roll`` returns the displacement under a constant twist, as the textbook's integral does."""
     chord = roll(tangent)
     expected = arc(tangent.x_m, tangent.y_m, tangent.yaw_rad)
     assert (chord.x_m, chord.y_m) == pytest.approx(expected, abs=1e-9)
@@ -23,7 +23,10 @@ def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
 
 @given(st.builds(Pose, st.floats(-10, 10), st.floats(-10, 10), st.floats(-3.2767, 3.2767)))
 def test_unroll_and_roll_are_inverse(displacement: Pose) -> None:
-    """``unroll`` inverts ``roll`` for every turn that fits in a delta frame."""
+    """A displacement is converted to a constant twist and back. Nothing is lost.
+
+    This holds for every turn that fits in a delta frame.
+    """
     assert xyyaw(roll(log_of(displacement))) == close(xyyaw(displacement))
     assert xyyaw(log_of(roll(displacement))) == close(xyyaw(displacement))
 

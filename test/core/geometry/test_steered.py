@@ -43,7 +43,10 @@ def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
 
 
 def test_what_the_steered_wheel_does_to_the_body() -> None:
-    """At 1 m/s and 45°, 0.5 m before the axle: the robot moves at 0.707 m/s and 1.41 rad/s."""
+    """The steered wheel is 0.5 m before the axle, moves at 1 m/s and is steered to 45°.
+
+    The robot then moves at 0.707 m/s and turns at 1.41 rad/s.
+    """
     twist = ROBOT.steered_twist(1.0, math.pi / 4)
     assert triple(twist) == pytest.approx((math.sqrt(0.5), 0.0, math.sqrt(2.0)))
 
@@ -51,7 +54,7 @@ def test_what_the_steered_wheel_does_to_the_body() -> None:
 def test_the_driven_wheels_run_on_circles_about_the_same_centre() -> None:
     """The robot turns about a point 0.5 m to its left.
 
-    The wheels run on circles of 0.3 and 0.7 m.
+    The wheels run on circles with radii of 0.3 and 0.7 m.
     """
     assert ROBOT.wheel_rates(BodyTwist(0.5, 0.0, 1.0)) == pytest.approx((3.0, 7.0))
 
@@ -65,7 +68,7 @@ def test_wheels_and_back_is_the_feasible_part(robot: SteeredKinematics, twist: B
 
 @given(sizes, twists)
 def test_the_steered_wheel_tells_the_same_twist(robot: SteeredKinematics, twist: BodyTwist) -> None:
-    """A twist gives the wheel's angle and signed speed, and these give the twist back."""
+    """A twist is converted to the steered wheel's angle and speed, and back. Nothing is lost."""
     wanted = robot.feasible(twist)
     speed_mps = math.hypot(wanted.vx_mps, robot.wheelbase_m * wanted.yaw_rate_radps)
     speed_mps = math.copysign(speed_mps, wanted.vx_mps) if wanted.vx_mps else speed_mps

@@ -55,7 +55,7 @@ def test_a_calibration_finds_what_was_planted_and_takes_it_off(imu_only: bool) -
 def test_a_calibration_during_a_reset_is_refused_with_that_reason() -> None:
     """The user calibrates the gyro during a reset, when the board sends nothing.
 
-    The refusal names the reset, not the cable.
+    The driver refuses. It gives the reset as the reason, not a silent board.
     """
     bench = running()
     bench.session.request(Request.RESET, "reset", bench.now)
@@ -176,7 +176,10 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 
 
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
-    """With ``auto_gyro_bias``, half of the bias is found within 15 s at rest."""
+    """The user switches ``auto_gyro_bias`` on. After 15 s at rest, half of the bias is found.
+
+    Before that, and while the robot turns, the bias stays the same.
+    """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)
     assert bench.session.gyro_bias == (0.0, 0.0, 0.0)
@@ -191,7 +194,10 @@ def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
 
 
 def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
-    """Counts of a 4 g range show half of gravity if they are read as 2 g."""
+    """At rest the accelerometer shows half of gravity, as if its range were wrong by a factor of 2.
+
+    One notice advises to set ``accel_range`` to 4.
+    """
     bench = running()
     gravity = bench.session.figures(bench.now).imu.gravity_mps2
     assert gravity == pytest.approx(9.80665, rel=0.01)
@@ -206,7 +212,10 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 
 
 def test_the_figures_count_what_happened() -> None:
-    """Equal readings in a row are counted: they show that a sensor is stuck."""
+    """The figures count readings, gaps, losses, restarts and limited commands.
+
+    They also count equal readings in a row, which show that a sensor is stuck.
+    """
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)
     assert figures.state == "nominal"

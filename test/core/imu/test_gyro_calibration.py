@@ -46,9 +46,11 @@ def stand(
     force: Vector3 = GRAVITY,
     rolling: Vector3 | None = NONE,
 ) -> None:
-    """Feed readings at 100 Hz, and with every fourth a displacement.
+    """Give readings at 100 Hz to the calibration, and a displacement after every fourth reading.
 
-    If ``rolling`` is None, there are no displacements.
+    ``rates``: the readings of the gyro.
+    ``force``: every reading of the accelerometer.
+    ``rolling``: every displacement, or None for no displacements.
     """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):

@@ -17,7 +17,7 @@ Triple = tuple[int, int, int]
 
 @pytest.mark.parametrize(("range_g", "counts"), [(2, 16384), (4, 8192), (8, 4096), (16, 2048)])
 def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
-    """At standard gravity, the counts of each range are those of the datasheet's section 6.2."""
+    """A sensor measures 1 g. For each range, the datasheet's section 6.2 gives the counts."""
     scale = ImuScale(accel_range_g=range_g)
     assert scale.specific_force((counts, -counts, 0)) == pytest.approx((9.80665, -9.80665, 0.0))
 
@@ -28,7 +28,7 @@ def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
 def test_ten_degrees_a_second_are_the_datasheets_counts(
     range_dps: int, counts_per_10_dps: int
 ) -> None:
-    """At 10°/s, the counts of each range are those of the datasheet's section 6.1."""
+    """A sensor measures 10°/s. For each range, the datasheet's section 6.1 gives the counts."""
     scale = ImuScale(gyro_range_dps=range_dps)
     assert scale.angular_velocity((0, counts_per_10_dps, -counts_per_10_dps)) == pytest.approx(
         (0.0, 0.17453292519943295, -0.17453292519943295)
@@ -67,7 +67,11 @@ def test_a_range_that_the_sensor_does_not_have_is_an_error(accel: int, gyro: int
 @pytest.mark.parametrize("actual_g", [2, 4, 8, 16])
 @pytest.mark.parametrize("believed_g", [2, 4, 8, 16])
 def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_g: int) -> None:
-    """The advised range is the one in which gravity would be right within a tenth."""
+    """The sensor and the driver are set to ranges of 2, 4, 8 or 16 g.
+
+    If the ranges differ, the driver measures a wrong gravity and advises the sensor's range. An
+    error of 8 % does not change the advice.
+    """
     for error in (0.92, 1.0, 1.08):
         text = gravity_advice(error * 9.80665 * believed_g / actual_g, believed_g)
         assert bool(text) == (actual_g != believed_g)

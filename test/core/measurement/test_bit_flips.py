@@ -68,7 +68,7 @@ class Drive:
                 self.worst_rad = max(self.worst_rad, abs(self.last.yaw_rad))
 
     def arm(self, kind: bytes, byte: int, bit: int) -> None:
-        """Let one bit be changed in the next frame of the given kind."""
+        """Change one bit of one byte in the next frame of the given kind."""
 
         def flip(data: bytes) -> bytes:
             at = begins(data, kind)
@@ -104,7 +104,10 @@ def begins(data: bytes, kind: bytes) -> int:
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """Odom is wrong by at most 17 mm and 0.052 rad. After 1.5 s it is right again."""
+    """One bit of a frame is changed. Odom is then wrong by at most 17 mm and 0.052 rad.
+
+    After 1.5 s odom is right again.
+    """
     kind, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -125,7 +128,10 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
-    """Readings wrong by less than 5 m/s² and 0.6 rad/s may be published. Undamaged ones must be."""
+    """One bit of an IMU frame is changed. The reading is rejected, or published with a small error.
+
+    The error is below 5 m/s² and 0.6 rad/s. All undamaged readings are published.
+    """
     _, byte, bit, ticks = flip
     drive = Drive()
     drive.run(ticks * TICK_S)
@@ -166,7 +172,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """The board's first pose has a wrong heading. The next two poses agree, and odom is right."""
+    """The board's first pose has a wrong heading. The next two poses agree, so odom is right."""
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)
     drive.bench = Bench(BoardSettings(running=True, initial_pose=start))

@@ -62,7 +62,10 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """Odom may miss the displacement under way, which is at most 20 mm."""
+    """The odometry is reset during a drive. Afterwards odom has the distance since the reset.
+
+    Up to 20 mm may be missing: the motion that the board had not yet reported at the reset.
+    """
     for _ in range(10):
         bench.drive(0.5)
         bench.run(0.1)
@@ -102,7 +105,10 @@ def test_frames_that_the_port_lost_are_not_blamed_on_the_line(bench: Bench) -> N
 
 
 def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -> None:
-    """The robot rolls out in the pause. The first twist after the pause is unknown."""
+    """The robot rolls out while the board is paused. After the pause, odom includes this motion.
+
+    The first twist after the pause is unknown, because the motion's duration is unknown.
+    """
     bench.drive(0.5)
     bench.run(0.4)
     bench.ask(Request.PAUSE, 5.0)
@@ -121,7 +127,10 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
     signs: tuple[int, int, int], frame: str
 ) -> None:
-    """The command is a curve to the left. The board may start with any heading."""
+    """The user commands a curve to the left. The board may have any axis signs.
+
+    Odom shows this curve, although the board starts with a heading of 2 rad.
+    """
     bench = Bench(
         BoardSettings(frame=frame, initial_pose=BoardPose(0.0, 0.0, 2000.0), running=True),
         axis_signs=signs,
@@ -138,7 +147,10 @@ def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(
 
 
 def test_a_robot_that_drove_on_unheard_is_where_it_is_once_it_is_heard_again() -> None:
-    """The cable is unplugged for 3 s while the robot drives on."""
+    """The cable is unplugged for 3 s while the robot drives on.
+
+    When the cable is back, odom has the robot's true pose, within 5 mm and 5 mrad.
+    """
     bench = Bench(BoardSettings(initial_pose=BoardPose(4000.0, 0.0, 1571.0), running=True))
     bench.open()
     bench.run(1.0)

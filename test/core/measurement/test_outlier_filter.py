@@ -54,7 +54,10 @@ def trembling(random: Random) -> list[float]:
 
 
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
-    """Return noisy readings of 1 g upward. ``leaps[reading][word]`` is added to that word."""
+    """Return ``count`` noisy readings of an IMU at rest, with 1 g upward.
+
+    ``leaps``: for the number of a reading and of its word, a value that is added to the word.
+    """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
         words = trembling(random)
@@ -74,7 +77,10 @@ def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[R
 def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
     word: int, leap: float
 ) -> None:
-    """The word jumps by the value of a high bit. The ranges are 2 g and 250 °/s."""
+    """A high bit of one word of a reading is changed, so the word jumps for a single reading.
+
+    This reading is rejected, and the next one is released at once. The ranges are 2 g and 250 °/s.
+    """
     readings, through = row(60, {50: {word: leap}}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -84,7 +90,10 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 
 
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
-    """A word jumps and stays there, as when a robot is set down on a slope."""
+    """One word of the readings jumps and stays there, as when a robot is set down on a slope.
+
+    All readings are released, the first of them one reading late.
+    """
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
     assert came[50] == []
@@ -118,7 +127,7 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
     """A knock saturates the sensor, so a reading is at the end of the 2 g scale.
 
-    The reading is released.
+    No changed bit of a usual reading gives this value, so the reading is released.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -127,9 +136,9 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """A jump of the size of a changed bit is rejected.
+    """A reading jumps by the value of a high bit, and is rejected.
 
-    This size is larger if ``full_scale_mps2`` is larger.
+    This value is larger if ``full_scale_mps2``, the end of the sensor's scale, is larger.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -186,9 +195,9 @@ def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
 
 
 def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
-    """A displacement has 1.5 instead of 0.25 m/s.
+    """A single displacement jumps from 0.25 m/s to 1.5 m/s, and is rejected.
 
-    A pose after it waits for the next displacement.
+    The pose after it is held until the next displacement shows that the jump is over.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.011), ahead()], through)
@@ -199,7 +208,7 @@ def test_a_displacement_that_leaps_and_is_back_is_refused() -> None:
 def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> None:
     """The speed jumps and stays high, so the jump may be real.
 
-    The displacement is released late.
+    The first displacement after the jump is released late.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), pose, ahead(0.05), ahead(0.05)], through)
@@ -208,7 +217,10 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """After a jump, readings wait for the next displacement. When ten wait, all are released."""
+    """A displacement jumps, so it waits for the next displacement, and so do the poses after it.
+
+    When ten poses wait, all are released.
+    """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
     assert came[3:14] == [[]] * 10 + [[ahead(0.06), *[pose] * 10]]
@@ -226,7 +238,10 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 
 
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
-    """The robot rolls out in the pause, at most as far as it can drive in that time."""
+    """The robot rolls out in a pause. The first displacement after the pause has all this motion.
+
+    It is released if the robot can drive so far in the pause, and rejected otherwise.
+    """
     through = gate()
     through.admit(ahead(), 1.0)
     rolled_out = replace(ahead(0.5), duration_s=None)
@@ -291,9 +306,9 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor sends text, so no bits can change.
+    """A sensor sends text, so damage does not change single bits, and its full scale is infinity.
 
-    Its full scale is infinity, and a knock is released.
+    A knock that changes one reading is released at once.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
@@ -318,7 +333,10 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """With ``corrected``, a jump is accepted, because the board's odometry may correct itself."""
+    """A board's own odometry jumps because it corrects its own error.
+
+    A filter with ``corrected=True`` releases the jump, but a usual filter rejects it.
+    """
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
@@ -326,9 +344,10 @@ def test_an_estimate_that_is_put_right_may_leap() -> None:
 
 
 def test_a_correction_that_no_robot_can_drive_is_not_a_measured_motion() -> None:
-    """With ``corrected``, a step that no robot can drive is released with ``measured`` false.
+    """A board's own odometry corrects itself by a step that is too large for any robot.
 
-    Only a step that is not finite is rejected.
+    A filter with ``corrected=True`` releases the step, but marks it as not ``measured``. Only a
+    step that is not finite is rejected.
     """
     through = OutlierFilter(MotionLimits(), 0.01, corrected=True)
     steps = [ahead(), ahead(1.0), ahead(math.nan), ahead()]

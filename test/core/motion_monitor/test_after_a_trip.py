@@ -19,9 +19,9 @@ from omnibot_driver.simulator.omnibot import BoardSettings
 
 
 def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
-    """The settings are wrong. The user switches the motion monitor off, and the robot drives.
+    """The wiring is wrong. The user switches the motion monitor off, and the robot drives.
 
-    When the monitor is switched on again, it trips.
+    When the monitor is on again, it stops the robot.
     """
     bench = started(BoardSettings(running=True, motor_wiring=(-1, 2, 3)))
     stopped_after_s(bench, SLOWLY)
@@ -34,7 +34,10 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """The displacements are rejected because a motion limit is too low at first."""
+    """The motion monitor is off, and a motion limit is too low, so displacements are rejected.
+
+    The limit is corrected, and then the monitor is switched on again. It does not trip.
+    """
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
         bench.configure(motion_monitor=False, motion=limits)
@@ -62,7 +65,10 @@ def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault
 
 
 def test_a_refused_command_says_why() -> None:
-    """After a trip, the refusal of a command names the motion monitor and says what to do."""
+    """The motion monitor has stopped the robot, and a command is refused.
+
+    The message names the motion monitor and says what to do.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     with pytest.raises(CommandRefused, match="the motion monitor has stopped the robot; send a"):
@@ -70,9 +76,9 @@ def test_a_refused_command_says_why() -> None:
 
 
 def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
-    """The sender goes on after a trip, and its commands are refused until a zero command.
+    """The motion monitor stops the robot. Further commands are refused until a zero command comes.
 
-    After the second trip, only ~/start helps.
+    After the second stop by the monitor, only ~/start allows motion again.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -92,7 +98,10 @@ def test_a_sender_that_goes_on_does_not_restart_the_robot() -> None:
 
 
 def test_silence_for_the_timeout_lets_it_move_again() -> None:
-    """After a trip, the sender is silent for the timeout. Motion is then allowed again."""
+    """The motion monitor stops the robot. Then the sender is silent for the timeout.
+
+    Motion is allowed again.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert try_to_drive(bench, 2.0) == 0
@@ -103,7 +112,10 @@ def test_silence_for_the_timeout_lets_it_move_again() -> None:
 
 
 def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
-    """Commands are lost in the stall. Only the time after the stall counts as silence."""
+    """The motion monitor has stopped the robot. Then the driver stalls, and loses commands.
+
+    Only the time after the stall counts as silence of the sender.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     bench.now += 3.0
@@ -115,7 +127,10 @@ def test_a_stall_of_the_driver_is_not_silence_of_the_sender() -> None:
 
 
 def test_the_e_stop_works_while_motion_is_refused() -> None:
-    """After a trip, the user latches and releases the e-stop. Motion is still refused."""
+    """The motion monitor has stopped the robot. The user latches and releases the e-stop.
+
+    Motion is still refused.
+    """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
     assert estop(bench, True) == "e-stop latched"

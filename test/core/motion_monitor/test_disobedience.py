@@ -59,7 +59,10 @@ DISOBEYING = {
 def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     board: dict[str, object], command: Triple, what: str, advice: str, frame: str
 ) -> None:
-    """The scale or the wiring is wrong. The notice gives the fault and what to check."""
+    """The board's scale or its wiring is wrong, so the robot does not move as commanded.
+
+    The driver stops the robot. Its notice gives the fault and what to check.
+    """
     bench = started(BoardSettings(running=True, frame=frame, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, command) <= WITHIN_S
     (notice,) = bench.notices
@@ -90,7 +93,10 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """The robot reverses within the displacement, so its sum is about zero."""
+    """Displacements come every 0.1 s. The robot reverses within one, whose sum is about zero.
+
+    The monitor does not mistake this for a robot at rest, and stops the robot within 0.3 s.
+    """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
         bench.drive(speed_mps)
@@ -122,7 +128,10 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 
 @pytest.mark.parametrize("board", [FAST, A_AND_B])
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
-    """The user commands wheel rates. The monitor compares the resulting twist with the motion."""
+    """The user commands wheel rates, and the robot does not obey them.
+
+    The monitor compares its motion with the twist that results from these rates.
+    """
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S
 
@@ -193,7 +202,10 @@ def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
 
 
 def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
-    """Without the refusal, a node that repeats its goal could restart the robot again and again."""
+    """The robot drives away from its goal, so the motion monitor trips.
+
+    Goals are then refused. Otherwise a node that repeats its goal could restart the robot.
+    """
     bench = started(BoardSettings(running=True, control="velocity"), control="position")
     bench.go_to(-0.5, 0.0, 0.0)
     bench.board.grip(0.4, 0.0, 0.0)

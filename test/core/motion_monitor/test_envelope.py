@@ -80,7 +80,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """A replaced set-point has its full weight for 0.3 s, and none after 1.1 s."""
+    """A replaced set-point has its full weight in the envelope for 0.3 s, and none after 1.1 s."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -132,9 +132,10 @@ def test_the_history_does_not_grow_without_end() -> None:
 
 
 def test_a_held_robot_winds_up_by_what_it_loses() -> None:
-    """A held robot winds up by 1.2 times the lost distance, up to the integrator's limit.
+    """A held robot loses distance, so its wheel controllers wind up.
 
-    Normal motion reduces the wind-up.
+    The wind-up is 1.2 times the lost distance, up to the integrator's limit. Normal motion reduces
+    it.
     """
     wind_up = WindUp()
     for _ in range(10):
@@ -149,7 +150,7 @@ def test_a_held_robot_winds_up_by_what_it_loses() -> None:
 
 
 def test_a_robot_that_speeds_up_is_not_held() -> None:
-    """Rest was commanded a moment ago, and the robot is still at rest.
+    """A robot at rest has just been commanded to drive, and is still at rest.
 
     It does not count as held.
     """
@@ -159,9 +160,9 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """A displacement of zero may also be a reversal.
+    """Displacements of 0.1 s are zero, although motion is commanded. One may be due to a reversal.
 
-    Only two in a row prove that the robot is held.
+    Only a second one directly after it proves that the robot is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)
@@ -174,9 +175,9 @@ def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
 
 
 def test_what_is_made_good_is_paid_for() -> None:
-    """A held robot is released and makes up for the lost distance.
+    """A held robot is released and moves faster than commanded, to make up for the lost distance.
 
-    This distance is subtracted from the wind-up, down to zero.
+    The distance of this motion is subtracted from the wind-up, down to zero.
     """
     wind_up = WindUp()
     wind_up.carry(BodyTwist(0.0, 0.5, 0.0), 0.2)

@@ -89,7 +89,10 @@ def test_a_robot_that_moves_otherwise_than_commanded_is_found_out_within_0_3_s(
 def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
     speed_mps: float, time_constant_s: float
 ) -> None:
-    """A robot speeds up slowly, the wrong way. The time counts from when it reaches 0.05 m/s."""
+    """A robot speeds up slowly in the wrong direction.
+
+    The monitor finds this within 0.3 s after the robot has reached 0.05 m/s.
+    """
     drive = Drive()
     drive.command(speed_mps, 0.0, 0.0)
     wrong_s = -time_constant_s * math.log(1.0 - 0.05 / speed_mps)
@@ -106,7 +109,10 @@ def test_a_slow_robot_that_goes_the_wrong_way_is_found_out_within_0_3_s(
 def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_s(
     motion: Triple,
 ) -> None:
-    """A person pushes the robot, or the board obeys a command that is not from the driver."""
+    """A person pushes the robot, or the board obeys a command that is not from the driver.
+
+    The monitor finds the motion without a command within 0.3 s.
+    """
     found_s, fault = first(Drive().move(motion, 1.0))
     assert fault is Fault.UNCOMMANDED
     assert found_s <= 0.28
@@ -179,7 +185,10 @@ def test_two_senders_in_turn_do_not_trip() -> None:
 
 
 def test_without_the_heading_only_the_length_of_the_velocity_is_judged() -> None:
-    """Without the heading, forward and backward look alike. The monitor compares only the speed."""
+    """The robot's heading is unknown, so forward and backward look alike.
+
+    The monitor compares only the speed with the command.
+    """
     drive = Drive()
     drive.command(0.2, 0.0, 0.0)
     assert drive.move((-0.2, 0.0, 0.0), 2.0, heading_known=False) == []
@@ -210,7 +219,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
     """A robot that should drive at 0.4 m/s is held for 1 s, so it falls 0.4 m behind.
 
-    Afterwards it may move too fast until it has made up for this distance.
+    Afterwards it may move too fast until it has made up for this distance. Then this is a fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
@@ -222,7 +231,10 @@ def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
 
 
 def test_what_was_pushed_while_it_stood_may_come_back() -> None:
-    """A push of a robot at rest winds up its controllers. At the next command, it may move back."""
+    """A robot at rest is pushed forward, so its wheel controllers wind up.
+
+    At the next command, the robot may move back for a moment. The monitor finds no fault.
+    """
     drive = Drive()
     drive.move((0.3, 0.0, 0.0), 1.0)
     drive.command(0.1, 0.0, 0.0)
@@ -231,14 +243,20 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot at rest is pushed. It has obeyed Stop, so the faults that cause Stops get rarer."""
+    """A robot at rest, which has obeyed Stop, is pushed for a long time.
+
+    The monitor reports faults at growing intervals. Each fault makes the driver send Stop.
+    """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
     assert [time - times[0] for time in times] == pytest.approx([0, 5, 15, 35, 75], abs=1.0)
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """The robot has missed Stop, but may receive a later one. So a fault causes one every 5 s."""
+    """A driven robot misses Stop and drives on, but may receive a later Stop.
+
+    The monitor therefore reports a fault every 5 s. Each fault makes the driver send Stop.
+    """
     drive = Drive()
     drive.command(0.3, 0.0, 0.0)
     drive.move((0.3, 0.0, 0.0), 1.0)
@@ -273,7 +291,7 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """A fault is news once. It is news again after the robot has obeyed a command."""
+    """A fault is new only once, until the robot has obeyed a command. Then it is new again."""
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)

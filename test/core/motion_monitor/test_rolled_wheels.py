@@ -37,9 +37,10 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """``rolled`` is the sum of the tangents in the board's axes.
+    """Odometry sums all displacements along the robot's axes in ``rolled``.
 
-    A tangent is the constant twist of a period, multiplied by the period.
+    Each is taken as a constant twist, multiplied by its period. The wheel angles of the sum are
+    converted back to the same turn of the body.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
@@ -91,9 +92,10 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """Up to 0.4 s, the error is at most 0.12 rad.
+    """Displacements are lost in a drive. Odometry's wheel angles agree with the encoders again.
 
-    For 2 s in curves it is larger: the driver assumes the shortest path.
+    After a gap of up to 0.4 s, they are right within 0.12 rad. After 2 s in curves, the error is
+    larger, because the driver assumes the shortest path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)
@@ -125,7 +127,10 @@ def test_the_angles_go_on_over_a_reset_of_the_odometry_and_a_restart_of_the_boar
 
 
 def test_what_took_an_unknown_time_has_no_rate() -> None:
-    """A displacement has an unknown duration, as after a pause. It has a distance but no rate."""
+    """A displacement has an unknown duration, as after a pause. Wheel rates are then unknown.
+
+    The distance that the wheels have rolled is known.
+    """
     odometry = Odometry(OdometrySettings())
     (estimate,) = odometry.displace(DisplacementReading(0.1, 0.0, 0.0, "body", None, 0), 1.0)
     assert estimate.rolling is None

@@ -16,7 +16,10 @@ def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> Displa
 
 
 def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing() -> None:
-    """Between 0.5 m/s and 1 m/s, four displacements of 0.75 m/s are filled in."""
+    """Four displacements are missing between one with 0.5 m/s and one with 1 m/s.
+
+    Each missing one is estimated as the mean, 0.75 m/s.
+    """
     bridge = GapInterpolation()
     assert bridge.tangents(body(0.02, 0.0), None) == (Pose(), Pose(0.02))
     lost, own = bridge.tangents(after(4, 0.04), None)
@@ -25,7 +28,10 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """Of ten seconds, two are filled in. The driver stops a robot that is silent for longer."""
+    """Displacements of ten seconds are missing. Only the motion of two seconds is estimated.
+
+    A robot that is silent for longer is stopped by the driver.
+    """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)
     lost, _ = bridge.tangents(after(250, 0.02), None)

@@ -43,7 +43,10 @@ def drive(on: Bench) -> None:
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """With the scales, odom ends within 5 mm and 3 mrad of the truth after metres of curves."""
+    """The board assumes wrong sizes of its wheels and its base, and drives metres of curves.
+
+    With the right odometry scales, odom ends within 5 mm and 3 mrad of the true pose.
+    """
     on = bench(TRUE, frame=frame, initial_pose=BoardPose(4000.0, -1000.0, 2000.0))
     drive(on)
     truth, pose = on.board.truth, on.odometry[-1].pose
@@ -57,7 +60,7 @@ def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> N
 
 
 def test_the_twist_is_the_true_one() -> None:
-    """With the scales, the twist is right. So a filter can fuse it with a gyro."""
+    """The board assumes wrong sizes. With the right odometry scales, the twist is the true one."""
     on = bench(TRUE)
     on.drive(0.2, 0.1, 0.4)
     on.run(3.0)
@@ -72,7 +75,10 @@ def test_the_twist_is_the_true_one() -> None:
 
 
 def test_what_has_rolled_is_the_true_way() -> None:
-    """With the scales, the rolled distance is right. The joint angles are computed from it."""
+    """The board assumes wrong sizes. With the right odometry scales, the rolled distance is right.
+
+    The joint angles are computed from this distance.
+    """
     on = bench(TRUE)
     on.drive(0.2, 0.0, 0.0)
     on.run(3.0)
@@ -83,9 +89,9 @@ def test_what_has_rolled_is_the_true_way() -> None:
 
 
 def test_a_goal_in_odom_is_reached_in_truth() -> None:
-    """The user sends a goal in odom, which the driver converts to the board's own odometry.
+    """The board assumes wrong sizes. The user sends a goal in odom.
 
-    With the scales, the robot truly reaches the goal.
+    With the right odometry scales, the robot truly reaches the goal.
     """
     on = bench(TRUE, control="position")
     on.go_to(0.6, -0.4, 0.0)

@@ -34,7 +34,8 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    Poses are at most 1e7, in mm or mrad. An acceleration of -6 needs 0.5 g in all.
+    A pose is at most 1e7, in mm or mrad. A word of -6 in an acceleration looks like a header, and
+    is possible only if the acceleration is at least 0.5 g.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

@@ -2,7 +2,7 @@
 
 """Tests that an IMU frame is returned with the packet that completes it, with any adapter.
 
-An IMU frame may end like a header. The arrival times show that no frame is due yet.
+If an IMU frame ends like a header, the arrival times show whether another frame is due.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,7 +23,7 @@ IMU_LENGTH = 14
 DRIFT = 1.0002
 """Rate of the adapter's clock, relative to the board's clock.
 
-So the adapter's packets end at all phases of a tick, in turn.
+The rates differ, so the adapter's packets end at all phases of a tick, one after the other.
 """
 
 Handed = Iterator[tuple[float, bytes]]
@@ -91,9 +91,9 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """The line loses a byte.
+    """The line loses a byte. The decoder does not trust the line for the next ten seconds.
 
-    For the next ten seconds, the decoder does not treat the line as calm.
+    Its attribute ``calm`` is false in this time.
     """
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}

@@ -48,7 +48,7 @@ def readings(board: OmniBot, *sent: Frame) -> list[Reading]:
 
 
 def in_mode(mode: Mode) -> OmniBot:
-    """Return a board in ``mode``, after it has received data that shows this mode."""
+    """Return a board that has received data which shows ``mode``."""
     board = bot()
     if mode is Mode.PAUSED:
         board.receive(TEXT, 0.0)
@@ -68,7 +68,7 @@ def moved(seq: int) -> DeltaFrame:
 
 
 def test_a_delta_is_in_tenths_of_millimetres_and_milliradians_over_40_ms() -> None:
-    """10000 counts are 1 m or 1 rad."""
+    """In a delta, 10000 counts are 1 m or 1 rad. A delta covers 40 ms."""
     (reading,) = readings(bot(), DeltaFrame(10000, -5000, 2500, 0))
     assert reading == DisplacementReading(
         pytest.approx(1.0), pytest.approx(-0.5), pytest.approx(0.25), "earth", 0.04, 0
@@ -101,15 +101,15 @@ def test_imu_counts_are_scaled_by_the_ranges_of_the_settings() -> None:
 
 
 def test_a_text_says_that_the_board_is_paused() -> None:
-    """A paused text gives a reading, which does not contain the number in the text."""
+    """A paused text becomes a paused reading, without the number that is in the text."""
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """Consecutive paused texts show that the board stayed paused.
+    """A paused text directly after another one shows that the board stayed paused.
 
-    If data comes between them, the board ran, and may have restarted.
+    If data comes between the two texts, the board ran, and may have restarted.
     """
     texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
     assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
@@ -150,7 +150,10 @@ def lost(board: OmniBot, *sent: Frame) -> list[int]:
 
 @given(st.integers(0, 255), st.integers(0, 2000))
 def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, gap: int) -> None:
-    """The counter SEQ is one byte. The arrival times show how often it has wrapped."""
+    """Deltas are lost, and their counter SEQ, which is one byte, may wrap several times.
+
+    The arrival times show how often. All lost deltas are counted.
+    """
     board = bot()
     readings(board, moved(start))
     (reading,) = board.receive(encode(moved((start + 1 + gap) % 256)) + b"\xff", 0.04 * (gap + 1))
@@ -159,7 +162,10 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """SEQ wraps within a read. Between the two reads, exactly three deltas are lost."""
+    """Each of two reads has seconds of data, in which SEQ wraps. Three deltas between are lost.
+
+    Exactly three deltas are counted as lost, and no restart is reported.
+    """
     board = bot()
     periods = [encode(REST) * 4 + encode(moved(count % 256)) for count in range(200, 320)]
     board.receive(b"".join(periods[:58]), 10.0)
@@ -223,9 +229,9 @@ def test_waking_is_eight_zeros_and_stop() -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_start_is_s_in_every_mode(mode: Mode) -> None:
-    """The driver may send S in every mode, because S is harmless.
+    """To start the board in any mode, the driver sends S, which is harmless in every mode.
 
-    S alone does not change the mode. Only received data does.
+    Sending S does not change the mode that the driver assumes. Only received data does.
     """
     board = in_mode(mode)
     assert joined(board.start()) == ZEROS + b"\x53"
@@ -234,7 +240,10 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """P is a toggle, so it is never sent to a board that does not run."""
+    """To pause a running board, the driver sends Stop and P. In any other mode, it refuses.
+
+    P is a toggle, so it would start a board that does not run.
+    """
     board = in_mode(mode)
     if mode.running:
         assert joined(board.pause()) == STOP + ZEROS + b"\x50"

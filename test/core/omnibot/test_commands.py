@@ -54,14 +54,17 @@ def test_the_scales_are_those_of_the_settings() -> None:
 
 
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
-    """10 rad/s at a radius of 29 mm is 0.29 m/s, which is 20.3 LSB in mode 2."""
+    """A wheel is commanded to turn at 10 rad/s. With a radius of 29 mm, its rim moves at 0.29 m/s.
+
+    The frame has mode 2 and this rim speed in LSB, 20.
+    """
     assert bare(encoder().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
     wide = encoder(wheel_radius_m=0.058)
     assert bare(wide.wheels((10.0, 0.0, 0.0))) == bytes.fromhex("FF FE 02 00 29 00 00 00 00")
 
 
 def test_commands_are_rounded_to_the_nearest() -> None:
-    """0.0493 m/s is 3.451 LSB, so 3 is sent. 0.0508 m/s is 3.556 LSB, so 4 is sent."""
+    """Commands are rounded to the nearest LSB. 3.451 LSB are sent as 3, and 3.556 LSB as 4."""
     assert bare(encoder().velocity(BodyTwist(0.0493, -0.0508, 0.0)))[3:7] == bytes.fromhex(
         "00 03 FF FC"
     )
@@ -69,7 +72,10 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """With the switch at "position", zeros in mode 1 would send the robot to the origin."""
+    """A velocity is so small that all its words round to zero. The driver sends Stop.
+
+    If the board's switch is on "position", zeros in mode 1 would send the robot to the origin.
+    """
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
     counts = (70 * twist.vx_mps, 70 * twist.vy_mps, 500 * twist.yaw_rate_radps)
@@ -90,7 +96,7 @@ def test_almost_nothing_is_the_stop_frame(tiny: float) -> None:
 def test_a_command_too_large_for_the_wire_keeps_its_direction(
     values: tuple[float, float, float],
 ) -> None:
-    """A velocity is too large for 16 bits. All three words are scaled down by the same factor."""
+    """A velocity is too large for 16-bit words. All words are scaled down by the same factor."""
     command = bare(encoder().velocity(BodyTwist(*values)))
     counts = (70 * values[0], 70 * values[1], 500 * values[2])
     largest = max(1.0, max(map(abs, counts)) / 32767)
@@ -132,7 +138,10 @@ def test_a_pose_to_drive_to_is_millimetres_and_milliradians(
 def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
     far: float, place: int
 ) -> None:
-    """A 16-bit word ends at 32.77 m or rad. A goal that is only limited would be another place."""
+    """A goal is farther than 32.77 m or rad, the limit of a 16-bit word. The driver refuses it.
+
+    A limited goal would be another place.
+    """
     values = [0.0, 0.0, 0.0]
     values[place] = far
     with pytest.raises(CommandRefused, match=r"32\.77 m and 32\.77 rad.*~/reset"):
@@ -176,9 +185,9 @@ def test_settings_may_be_replaced_while_it_runs() -> None:
 def test_a_frame_means_the_velocity_that_it_commands(
     typed: str, twist: tuple[float, float, float]
 ) -> None:
-    """The driver reads the commanded velocity from bytes to the board. The last frame counts.
+    """The driver computes the commanded velocity from the bytes that it has sent to the board.
 
-    Zeros before a frame have no meaning.
+    The last frame counts. Zeros before a frame have no meaning.
     """
     found = encoder().meaning(packed(bytes(8) + bytes.fromhex(typed)))
     assert (found.vx_mps, found.vy_mps, found.yaw_rate_radps) == pytest.approx(twist, abs=1e-9)
@@ -188,9 +197,9 @@ def test_a_frame_means_the_velocity_that_it_commands(
 @settings(suppress_health_check=[HealthCheck.filter_too_much])
 @given(twists)
 def test_what_a_velocity_means_is_what_was_commanded_but_for_rounding(twist: BodyTwist) -> None:
-    """Rounding changes a word by 0.5 LSB.
+    """A velocity that is computed back from its frame is the commanded velocity, but for rounding.
 
-    Avoiding a harmful byte changes a word by up to 1.5 LSB.
+    Rounding changes a word by up to 0.5 LSB, and a word with a harmful byte by up to 1.5 LSB.
     """
     found = encoder().meaning(packed(encoder().velocity(twist)))
     assume(max(abs(twist.vx_mps), abs(twist.vy_mps), abs(twist.yaw_rate_radps)) < 3.0)

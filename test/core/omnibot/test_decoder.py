@@ -66,7 +66,10 @@ def test_an_undamaged_stream_is_decoded_in_random_chunks(name: str) -> None:
 def test_in_step_any_content_is_delivered_in_any_chunks(
     sent: list[Frame], data: st.DataObject
 ) -> None:
-    """The content may be a real shock, a stuck sensor, or words that look like headers."""
+    """The decoder is synchronized. All frames are returned, whatever their content.
+
+    The content may be a real shock, a stuck sensor, or words that look like headers.
+    """
     stream = LEAD_IN + b"".join(map(encode, sent))
     chunks = [chunk for chunk in data.draw(chunkings(stream)) if chunk]  # an empty one is a pause
     assert decoded(chunks, step_s=1e-3) == [REST, REST, *sent]
@@ -74,7 +77,10 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """A frame waits only if its values jump, or if its last byte may begin a header."""
+    """A frame of an undamaged stream is returned with its last byte.
+
+    It waits only if its values jump, or if its last byte may begin a header.
+    """
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
     for number, tick in enumerate(ticks_of(name)):
@@ -138,7 +144,11 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 
 
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
-    """The IMU frame's last byte may belong to a header. The frame waits in ticks with a delta."""
+    """An IMU frame ends with FF FB or FF FC, which could also be the header of the next frame.
+
+    The pauses between ticks show which frames are due. The IMU frame waits only in ticks with a
+    delta.
+    """
     made, waited = FrameDecoder(), []
     for tick in range(60):
         imu = encode(ImuFrame((120, -80, -16384), (1, 2, -4 - tick % 2)))

@@ -105,7 +105,10 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """At most 1 in 30 inserted bytes makes a false frame: a gyro value looks like a header."""
+    """A byte is inserted into a stream in which some gyro values look like headers.
+
+    At most 1 in 30 inserted bytes makes a false frame.
+    """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
@@ -131,7 +134,10 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """The first byte of the next header seems to complete the frame. The second shows the error."""
+    """A frame has lost a byte, and the first byte of the next header seems to complete it.
+
+    The second byte of the header shows the error. The frame is not returned.
+    """
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
     for number in range(8, 24):

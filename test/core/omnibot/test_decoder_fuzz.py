@@ -46,7 +46,10 @@ def assert_stand_in_order(found: list[Frame], stream: bytes) -> None:
 def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     stream: bytes, data: st.DataObject
 ) -> None:
-    """The frames are in order and without overlap. Fewer than ``DOUBT_BYTES`` are held."""
+    """All returned frames are in the stream, in order and without overlap.
+
+    The decoder holds fewer bytes than its limit, ``DOUBT_BYTES``.
+    """
     made, now, found = FrameDecoder(), 0.0, []
     for chunk in data.draw(chunkings(stream)):
         now += data.draw(times_s)
@@ -94,7 +97,10 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """Below 0.5 g, an acceleration of -6 has the bytes of an IMU header."""
+    """A robot in free fall sends an IMU frame with an acceleration of -6, -5 or -4.
+
+    The bytes of -6 look like a header. Below 0.5 g only a frame with -6 is lost.
+    """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
     assert found.count(fall) == (word != -6)
@@ -126,7 +132,7 @@ def work(
 ) -> tuple[list[int], int]:
     """Return the work up to the end of each chunk, beginning with 0, and the most bytes held.
 
-    Its unit is an examined byte or trellis edge.
+    The unit of the work is one byte or one trellis edge that the decoder examines.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 

@@ -100,9 +100,9 @@ def test_each_frame_table_is_laid_out_as_in_the_manual(
 
 
 def test_the_pose_may_be_little_endian() -> None:
-    """The manual can also be read such that the bytes of each float are reversed.
+    """The manual does not make clear in which order the bytes of a pose's floats come.
 
-    A setting selects this byte order.
+    A setting selects the order with the least significant byte first.
     """
     typed = bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 09")
     frame = PoseFrame(1000.0, -2.5, 1.0, 9)

@@ -18,9 +18,9 @@ from omnibot_driver.core.omnibot.gaps import InterFrameGaps
     ],
 )
 def test_bytes_of_a_slow_line_take_longer(baudrate: int, pause_s: float, idle: bool) -> None:
-    """24 bytes take 2.08 ms at 115200 baud and 6.25 ms at 38400 baud.
+    """A read contains 24 bytes, which take 2.08 ms at 115200 baud and 6.25 ms at 38400 baud.
 
-    If the line was idle, the read is at least 4 ms later.
+    The line was idle only if the time since the last read exceeds that time by 4 ms.
     """
     pauses = InterFrameGaps(10 / baudrate)
     pauses.read(pause_s, 24, 5, now=1.0)

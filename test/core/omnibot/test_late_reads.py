@@ -152,7 +152,10 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter's piece of 8 bytes may hold parts of two paused texts, and the silence between."""
+    """An adapter delivers pieces of 8 bytes, which may hold parts of two paused texts.
+
+    The board was silent between these texts. All texts are returned.
+    """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
     for number in range(0, len(texts), 8):
@@ -161,9 +164,10 @@ def test_pieces_that_straddle_a_silence_are_read() -> None:
 
 
 def test_where_the_line_was_cut_a_pause_still_tells() -> None:
-    """Parts of two frames have the length of one frame.
+    """The line is interrupted, so the end of one frame directly follows the beginning of another.
 
-    Only the pause between the parts shows this.
+    The two parts together have the length of a frame. They are rejected, because of the pause
+    between them.
     """
     ticks = [encode(ImuFrame((120 + n, -80, -16384), (1, 2, n))) for n in range(80)]
     for cut in range(3, 12):

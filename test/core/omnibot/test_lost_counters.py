@@ -30,7 +30,10 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("lost", [1, 2, 3, 5, 10, 25, 60, 100, 250, 300, 600])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, frame: str) -> None:
-    """The gap may be in a curve, and SEQ may wrap in it."""
+    """Up to 600 deltas are lost, perhaps in a curve, and SEQ may wrap in the gap.
+
+    After 1 s, odom is the board's own pose again.
+    """
     for seed in range(5):
         on = line(seed, frame=frame)
         lose(on, lost * PERIOD_S)
@@ -76,7 +79,10 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """After a gap, no step is faster than 2 m/s and 8 rad/s. The first step covers the gap."""
+    """Frames are lost. Afterwards no step of odom is faster than 2 m/s or 8 rad/s.
+
+    The first step has the motion and the duration of the whole gap.
+    """
     for seed in range(5):
         on = line(seed, frame=frame)
         before = on.estimates[-1]
@@ -89,9 +95,9 @@ def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str
 
 
 def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_faster() -> None:
-    """The robot reverses in a gap, so the interpolation is 0.5 m off.
+    """The robot reverses in a gap, so the interpolated pose is wrong by 0.5 m.
 
-    The fastest speed is 2 m/s.
+    Odom is corrected at the fastest possible speed of a robot, 2 m/s.
     """
     odometry, x, stamp_s = attached(), 0.0, 0.0
     estimates: list[OdometryEstimate] = []
@@ -118,7 +124,10 @@ def test_a_bridge_that_was_far_wrong_is_put_right_at_the_fastest_speed_and_no_fa
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", [26, 50, 100, 250])
 def test_after_a_long_gap_the_first_pose_out_of_it_is_the_right_one(lost: int) -> None:
-    """After the gap, displacements wait up to 0.2 s for a pose of the board."""
+    """Frames are lost for more than 1 s. Later displacements wait for a pose of the board.
+
+    They wait up to 0.2 s. The first published pose is then right.
+    """
     for seed in range(5):
         on = line(seed)
         lose(on, lost * PERIOD_S)
@@ -159,7 +168,10 @@ def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> N
 
 @pytest.mark.parametrize("lost", [2, 5, 10])
 def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
-    """A pose settles the gap. The covariance of the drift stays."""
+    """Frames are lost, so the covariance grows. The next pose of the board reduces it again.
+
+    It is then the covariance of a drive without losses.
+    """
     whole, torn = line(2), line(2)
     whole.run(lost * PERIOD_S)
     lose(torn, lost * PERIOD_S)
@@ -203,7 +215,7 @@ def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose:
 
 
 def test_a_board_that_sends_no_pose_is_bridged() -> None:
-    """The board sends no poses.
+    """The board sends no poses, and frames are lost. The odometry interpolates the gap.
 
     At constant speed in a constant curve, the interpolation is exact.
     """

@@ -38,9 +38,9 @@ def advice(board: BoardSettings, settings: OmniBotSettings, seconds: float = 6.0
 
 @pytest.mark.parametrize(("sent", "read"), [("big", "little"), ("little", "big")])
 def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
-    """The poses make sense only in the other byte order.
+    """The setting ``pose_byte_order`` is wrong, so the poses are impossible.
 
-    The driver advises to change that setting.
+    The driver advises to change this setting.
     """
     board = BoardSettings(running=True, pose_byte_order=sent)
     told = advice(board, OmniBotSettings(pose_byte_order=read))
@@ -62,7 +62,10 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: floa
 @pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
 @pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
 def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
-    """After 3 s, advice names the right period. A right setting gets no advice."""
+    """The setting ``delta_period`` is wrong. Within 3 s, the driver advises the right value.
+
+    There is no advice if the setting is right.
+    """
     board = BoardSettings(running=True, delta_period_s=sent_s)
     told = advice(board, OmniBotSettings(delta_period_s=read_s), 3.0)
     if sent_s == read_s:
@@ -77,9 +80,9 @@ def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> No
 @pytest.mark.parametrize("period_s", [0.04, 0.1])
 @pytest.mark.parametrize("lose", [0.001, 0.01, 0.05])
 def test_lost_bytes_do_not_pass_for_another_period(period_s: float, lose: float) -> None:
-    """Fewer IMU frames come between two deltas.
+    """The line loses bytes, so fewer IMU frames than usual come between two deltas.
 
-    The arrival times show that the setting is right.
+    The arrival times show that ``delta_period`` is right, so there is no advice.
     """
     sender = SimulatedBoard(BoardSettings(running=True, delta_period_s=period_s))
     driver = OmniBot(OmniBotSettings(delta_period_s=period_s))

@@ -24,7 +24,7 @@ HEARD = [happening for happening in Happening if happening.name.startswith("HEAR
 
 
 def tracker(mode: Mode) -> ModeTracker:
-    """Return a tracker that received frames have put in ``mode``."""
+    """Return a mode tracker that has received frames which show ``mode``."""
     made = ModeTracker()
     heard = {Mode.UNKNOWN: [], Mode.PAUSED: [PAUSED], Mode.NOMINAL: [DELTA]}
     for frame in heard.get(mode, [IMU] * 25):
@@ -40,7 +40,7 @@ def test_the_public_names_are_those_of_the_interface() -> None:
 
 
 def test_nothing_is_believed_before_anything_is_heard() -> None:
-    """On a new line, the mode is unknown."""
+    """On a new line, the mode is unknown until data arrives."""
     assert ModeTracker().mode is Mode.UNKNOWN
 
 

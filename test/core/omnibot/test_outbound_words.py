@@ -34,7 +34,10 @@ def words_of(counts: list[float]) -> tuple[int, ...]:
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """If the board misses the header, it reads the payload as commands."""
+    """No payload contains a letter or a header, whatever the command.
+
+    If the board misses a frame's header, it reads the payload as letters or as other frames.
+    """
     assert not re.search(rb"[SPR]|\xff\xfe", payload(*harmless(counts)))
 
 

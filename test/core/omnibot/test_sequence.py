@@ -22,23 +22,29 @@ def begun(count: int) -> Sequence:
 def test_a_gap_is_counted_over_any_wraps_also_when_the_line_is_late(
     count: int, lost: int, late_s: float
 ) -> None:
-    """The next delta's arrival time is wrong by up to 0.4 s."""
+    """Up to 1000 deltas are lost, and the next delta comes up to 0.4 s early or late.
+
+    The lost deltas are counted correctly, although the counter wraps.
+    """
     step = begun(count).delta((count + 1 + lost) % 256, 100.0 + 0.04 * (lost + 1) + late_s)
     assert step == Step(lost)
 
 
 @given(counts, st.floats(0.0, 5.0))
 def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: float) -> None:
-    """The host hangs for up to five seconds, and the next delta has the next count.
+    """The host hangs for up to 5 s. The next delta comes late, but has the next count.
 
-    No delta is lost.
+    No delta is counted as lost.
     """
     assert begun(count).delta((count + 1) % 256, 100.04 + late_s) == Step(0)
 
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The first delta's duration is unknown. A 0 after 255 may also be a restart."""
+    """The board is paused and continues with the next count. No delta is lost.
+
+    The first delta's duration is unknown. A count of 0 after 255 is taken for a restart.
+    """
     sequence = begun(count)
     sequence.pause()
     step = sequence.delta((count + 1) % 256, 100.0 + paused_s)
@@ -47,7 +53,10 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """After a pause, the explanation with fewer lost deltas is accepted. A tie is a restart."""
+    """After a pause, the count may show a restart or lost deltas of a board that ran on.
+
+    The explanation with fewer lost deltas is accepted. If both have equally many, it is a restart.
+    """
     sequence = begun(count)
     sequence.pause()
     goes_on = (lost - count - 1) % 256
@@ -57,9 +66,9 @@ def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) 
 
 @pytest.mark.parametrize("count", [20, 77, 150, 240])
 def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
-    """A delta has the count 0 two seconds after the last delta.
+    """A delta has the count 0 two seconds after the last delta. The board has restarted.
 
-    A continued count would not be 0.
+    Without a restart, the count would not be 0 after this time.
     """
     assert begun(count).delta(0, 102.0).restarted
 
@@ -70,7 +79,10 @@ def test_a_restart_without_a_word_shows_in_the_time(count: int) -> None:
 def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
     elapsed_s: float, drift: float, imus: int
 ) -> None:
-    """The serial line is unplugged for minutes. The board's clock is wrong by 1 %."""
+    """The serial line is unplugged for up to 400 s, and the board's clock is wrong by 1 %.
+
+    The driver counts the lost deltas, and does not assume a restart.
+    """
     sequence = begun(100)
     passed = round(elapsed_s / 0.04 * (1 + drift))
     step = sequence.delta((100 + passed) % 256, 100.0 + elapsed_s, imus=imus)
@@ -81,7 +93,10 @@ def test_a_long_gap_of_a_board_whose_clock_drifts_is_not_a_restart(
 
 
 def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
-    """A clock that is 1 % fast gives 30 more deltas in 120 s."""
+    """The board's clock is 1 % fast, so 3030 instead of 3000 periods pass in 120 s.
+
+    The 3029 lost deltas are counted correctly.
+    """
     sequence = Sequence()
     sequence.delta(100, 0.0)
     assert sequence.delta((100 + 3030) % 256, 120.0) == Step(3029)
@@ -98,7 +113,10 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 
 
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
-    """A pose shows that three deltas were lost. The next delta does not count them again."""
+    """A pose comes after every fifth delta, so it shows that three deltas before it are lost.
+
+    The next delta does not count these losses again.
+    """
     sequence = Sequence()
     for count in range(10):
         sequence.delta(count, count * 0.04)
@@ -126,7 +144,10 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """In 2 s, 50 lost deltas lead from 205 to 0. A continued pose counter would not be 0."""
+    """The board restarts. By chance, the count 0 fits the last count 205 and 50 lost deltas in 2 s.
+
+    The next pose has the count 0, too, which shows the restart.
+    """
     sequence = Sequence()
     for count in range(206):
         sequence.delta(count, count * 0.04)
@@ -140,9 +161,9 @@ def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_r
 
 
 def test_a_pose_of_another_rhythm_tells_nothing() -> None:
-    """The board sends a pose after every second delta.
+    """The board sends a pose after every second delta, not after every fifth.
 
-    Such a pose says nothing about lost deltas.
+    The count of a pose then shows no lost deltas.
     """
     sequence = Sequence()
     for count in range(20):
@@ -152,7 +173,10 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """If poses had been lost, the counter would have needed more time to wrap."""
+    """The board's pose counter begins at 0 again. No pose is counted as lost.
+
+    In 1 s, too few poses can be lost for the counter to wrap.
+    """
     sequence = Sequence()
     for count in range(25):
         sequence.delta(count, count * 0.04)
@@ -172,7 +196,7 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """A false delta comes too early, and the true delta has the same count.
+    """A false delta comes too early, and the next, true delta has the same count.
 
     No delta is counted as lost.
     """
@@ -184,7 +208,10 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """While the host's clock stood still, 100 deltas were lost."""
+    """The host's clock stands still while 100 deltas are lost, so the next count is far too high.
+
+    The driver counts the losses when the delta after that confirms the count.
+    """
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
     assert sequence.delta(111, 100.08, imus=4) == Step(100)
@@ -192,9 +219,9 @@ def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it
 
 
 def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
-    """A false delta has a count near zero.
+    """A false delta, made up of damaged bytes, has a count near zero.
 
-    The next true delta continues the old count, without losses.
+    The next true delta continues the old count. No delta is counted as lost.
     """
     sequence = begun(88)
     assert sequence.delta(1, 100.02, imus=1).restarted
@@ -203,9 +230,9 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """The decoder may have held a pose that shows a lost delta.
+    """A pose that the decoder held back shows that a delta was lost. The next delta comes at once.
 
-    The next delta then comes at once.
+    The lost delta is not counted again.
     """
     sequence = Sequence()
     for count in range(11):
@@ -220,7 +247,10 @@ def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
 
 
 def test_counters_that_begin_anew_after_a_silence_are_a_restart_all_the_same() -> None:
-    """A delta has the count 0 after 3 s of silence. A continued count would not be 0."""
+    """A delta has the count 0 after 3 s of silence. The board has restarted.
+
+    Without a restart, the count would not be 0 after this time.
+    """
     sequence = Sequence()
     sequence.delta(200, 10.0, imus=4)
     assert sequence.delta(0, 13.0, imus=4).restarted

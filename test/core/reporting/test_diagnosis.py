@@ -140,7 +140,10 @@ def test_each_fault_alone_raises_its_own_status(
 
 
 def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
-    """One port of the board is missing. The status says so, and does not call the board silent."""
+    """A board has several ports, and one is missing. The status names the missing port.
+
+    The status does not call the board silent.
+    """
     robot = Robot()
     robot.connect(trouble="the port 'front' is missing: unplugged")
     robot.set(state="connecting")
@@ -151,7 +154,10 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """Some boards have values of their own, such as an odometry rate. The diagnostics show them."""
+    """A board has its own diagnostic values, such as a version and the rate of its odometry.
+
+    The diagnostics show these values.
+    """
     robot = Robot()
     assert "Published odometry (Hz)" not in robot.statuses["Stream"].values
     robot.set(board=replace(robot.figures.board, own={"Version": "7"}, odom_hz=20.0))
@@ -187,9 +193,9 @@ def test_a_count_that_begins_anew_has_not_grown() -> None:
 
 
 def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_bad() -> None:
-    """If nothing is lost, the status is OK.
+    """The computer is busy, so the reader reads late. If nothing is lost, the status is OK.
 
-    If the rates are wrong, the status names the busy computer.
+    If too few readings arrive, the status names the busy computer, not a bad line.
     """
     robot = Robot()
     for second in range(12):
@@ -206,7 +212,10 @@ def test_a_reader_that_waits_for_the_processor_is_said_to_be_late_not_the_line_b
 
 
 def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
-    """A busy computer may cause such a skew for a minute, so the report comes after 70 s."""
+    """The clock skew is larger than that of any crystal. The driver reports this only after 70 s.
+
+    A busy computer may cause an equally large skew for a minute.
+    """
     robot = Robot()
     robot.set(skew_ppm=-119.0)
     robot.seconds(70)

@@ -30,20 +30,29 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """Only upper bounds are known. The fit follows the least delay and has the right slope."""
+    """Only upper bounds of the ticks' times are known.
+
+    The fitted clock follows the ticks with the least delay, and has the right slope.
+    """
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
     assert line.slope_s == pytest.approx(PERIOD_S * (1.0 + skew), rel=1e-6)
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """The bounds are 0.8 ms after and 0.1 ms before the truth. The fit is between, 0.3 ms after."""
+    """A tick is known to be between 0.1 ms before and 0.8 ms after its true time.
+
+    The fitted clock is near the middle, 0.3 ms after the true time.
+    """
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
 
 
 def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() -> None:
-    """For 8 s both bounds drift by 0.1 ms per second. The error of the fit stays below 0.5 ms."""
+    """For 8 s, both bounds of the ticks' times drift by 0.1 ms per second.
+
+    The error of the fitted clock stays below 0.5 ms.
+    """
     for skew in (1e-4, -1e-4):
         drift = [-skew * PERIOD_S * tick for tick in range(800)]
         start = 0.0 if drift[-1] > 0.0 else 0.87e-3

@@ -31,7 +31,7 @@ COUNTS = 16384 / STANDARD_GRAVITY
 class Stamped:
     """The stamps of a stream's samples and displacements.
 
-    Each is a tuple of tick, stamp in s and arrival in s.
+    Each entry has the tick, the stamp in s, and the arrival time in s.
     """
 
     board: Board
@@ -112,9 +112,9 @@ def run(
 def test_stamps_are_even_and_true_to_a_constant(
     chunker: Chunker, skew: float, imu_only: bool
 ) -> None:
-    """From 2 s on, stamps are uneven by less than 0.2 ms.
+    """From 2 s on, the steps between stamps differ from 10 ms by less than 0.2 ms (RMS).
 
-    Except for a constant error, 99 % are right within 0.5 ms.
+    Except for a constant error, 99 % of the stamps are right within 0.5 ms.
     """
     for seed in SEEDS:
         stamped = run(Board(seconds=20, skew=skew, imu_only=imu_only), chunker, seed)
@@ -128,7 +128,10 @@ def test_stamps_are_even_and_true_to_a_constant(
 def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
     skew: float, imu_only: bool
 ) -> None:
-    """The timer has a period of 16 ms. Arrival times may hide a delay of 0.8 ms for seconds."""
+    """An adapter sends every 16 ms, while the board's tick is 10 ms. The stamps are right.
+
+    The arrival times alone may hide a delay of 0.8 ms for seconds.
+    """
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
@@ -194,7 +197,10 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
 
 
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
-    """On a line without delay, each 10 ms of silence counts as one missing tick."""
+    """The board sends no displacements, so no counter shows which samples are lost.
+
+    Each 10 ms of silence counts as one missing sample.
+    """
     for seed in SEEDS:
         stamped = run(Board(seconds=40, skew=1e-4, loss=0.01, imu_only=True), bursts, seed)
         assert spread(stamped.errors()) < 0.5e-3
@@ -247,7 +253,10 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """The board is silent for five seconds, and SEQ does not show it. The clock is fitted again."""
+    """The board is silent for five seconds, and SEQ does not show it.
+
+    The fitted clock begins anew, and the stamps are right.
+    """
     clock = DeviceClock(0.01)
     run(Board(seconds=10), bursts, 1, clock=clock)
     after = run(Board(seconds=10, begins_at=1015.0055), bursts, 2, clock=clock)
