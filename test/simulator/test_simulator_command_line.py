@@ -83,7 +83,10 @@ def test_a_board_of_two_lines_prints_both_and_says_which_is_which(tmp_path: Path
 def test_the_hint_has_the_whole_path_of_a_link(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user gives a relative path. The hint works in a terminal with another folder."""
+    """The user gives a relative path for ``--link``. The program's hint contains the full path.
+
+    The hint therefore works in a terminal with another folder.
+    """
     monkeypatch.chdir(tmp_path)
     with toy("toy_lines", "--link", "toy") as process:
         line(process), line(process)

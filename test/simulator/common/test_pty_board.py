@@ -137,9 +137,9 @@ def test_waiting_for_what_does_not_come_ends_with_false() -> None:
 
 
 def test_a_dead_board_is_reported_to_whoever_waits_and_on_exit() -> None:
-    """The thread of a board fails. Waiting for the board and closing it raise RuntimeError.
+    """The thread of a board fails. Both waiting for the board and closing it raise RuntimeError.
 
-    The cause is the thread's exception.
+    The exception in the thread is the cause of this error.
     """
 
     class BrokenBoard(Ticker):

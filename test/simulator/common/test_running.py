@@ -16,7 +16,7 @@ LATE_S = 0.7
 class Motor:
     """A board that drives until it receives a stop.
 
-    ``driven``: the number of ticks until then.
+    ``driven``: how many ticks the board has driven.
     """
 
     channels, tick_s = (Channel(),), 0.01
@@ -40,7 +40,7 @@ class Motor:
 
 
 class LateBoard(RunningBoard[Motor]):
-    """A board whose thread does not run for ``LATE_S``, while a stop arrives."""
+    """A board whose thread a busy computer does not run for a while. A stop arrives meanwhile."""
 
     def __init__(self) -> None:
         super().__init__(Motor())

@@ -57,13 +57,19 @@ class Rig:
             self.say(DRIVE, f"fwl {text.split()[1]}")
 
     def ask(self, port: int, text: str) -> list[str]:
-        """Send a line, and return its port's replies within 10 ms, without periodic heartbeats."""
+        """Send a line to a port, and return the port's replies of the next 10 ms.
+
+        Heartbeats are left out, unless the line requests one.
+        """
         self.say(port, text)
         said = [answer for number, answer in self.run(0.01) if number == port]
         return said if text == "hbti" else [answer for answer in said if not BEAT.match(answer)]
 
     def drive(self, text: str, seconds: float) -> None:
-        """Send an ``rc`` line to both Teensys; run for ``seconds``, relaying the front angle."""
+        """Send an ``rc`` line to both Teensys, and run for ``seconds``.
+
+        Meanwhile the host relays the front angle.
+        """
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)
         self.say(DRIVE, text)

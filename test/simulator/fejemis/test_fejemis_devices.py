@@ -47,7 +47,7 @@ def test_the_band_and_single_leds() -> None:
 def test_distances_to_a_wall() -> None:
     """All sensors measure the distance to a wall at 0.5 m.
 
-    Without a wall: the end of the range, but 0 from the sonar.
+    Without a wall, the sonar reports 0, and the others the end of their range.
     """
     rig = Rig(front_m=0.5).booted()
     assert rig.ask(DRIVE, "tofdi") == ["tofd 0.500"]

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that the simulated robot moves by the manual's equations, not just as ``rc`` commands."""
+"""Tests that the simulated Fejemis moves by the manual's equations.
+
+This motion differs from the one that ``rc`` commands.
+"""
 
 from math import atan2, degrees, hypot, radians
 
@@ -31,9 +34,9 @@ def steered_degrees(v: float, w: float) -> float:
 def test_the_body_moves_by_the_equations_of_the_manual(
     v: float, w: float, speed: float, turn: float
 ) -> None:
-    """Speed and turn rate follow the manual's equations, calculated here by hand.
+    """``rc`` commands the velocities v and w, but the body moves with ``speed`` and ``turn``.
 
-    The v and w of the ``rc`` line are different.
+    These are calculated by hand from the manual's equations.
     """
     left, right = wheel_speeds(v, w, steered_degrees(v, w), B, F)
     assert (left + right) / 2 == pytest.approx(speed, abs=2e-4)
@@ -93,7 +96,10 @@ def test_no_command_ends_by_itself() -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
-    """Firmware that mirrors reverse drives steers the front wheel as for the same curve forward."""
+    """The robot drives a curve in reverse, with firmware that mirrors reverse drives.
+
+    The front wheel is steered as for the same curve forward.
+    """
     rig = Rig(firmware=Firmware(sums=False, reverse="mirrored")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth
@@ -108,7 +114,10 @@ def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
-    """In reverse, firmware that clamps the angle sets the front wheel to 90°. The robot spins."""
+    """The robot should drive in reverse, with firmware that limits the angle of the front wheel.
+
+    The front wheel turns to 90°, so the robot spins.
+    """
     rig = Rig(firmware=Firmware(sums=False, reverse="clamped")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)
     truth = rig.board.truth

@@ -30,7 +30,10 @@ def angle_line(rig: Rig) -> tuple[float, int, int]:
 
 
 def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
-    """After ``stop``, ``rc`` has no effect until ``start``. The heartbeats show the source -1."""
+    """After ``stop``, ``rc`` has no effect until ``start``.
+
+    In the meantime, the heartbeats report -1 as the source of commands.
+    """
     rig = Rig().booted()
     rig.say(DRIVE, "rc 2 0.3 0")
     rig.run(0.5)
@@ -46,7 +49,7 @@ def test_stop_stands_until_start_and_the_heartbeat_shows_it() -> None:
 
 
 def test_some_firmware_goes_on_after_start() -> None:
-    """Some firmware continues the last command after ``start``. The manual does not mention it."""
+    """After ``start``, some firmware continues the last command. The manual does not say this."""
     rig = Rig(firmware=Firmware(sums=False, start_resumes=True)).booted()
     rig.say(DRIVE, "rc 2 0.3 0", "stop")
     rig.run(0.5)
@@ -86,7 +89,7 @@ def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
 def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
     boot_s: float, *, says_start: bool
 ) -> None:
-    """A half ignores input until its boot ends, and then may send a start line.
+    """A half ignores input until its boot ends. Some firmware then sends a start line.
 
     The time in its lines begins with the boot.
     """
@@ -247,10 +250,7 @@ def test_a_sensor_that_is_frozen_absent_or_in_error() -> None:
 
 
 def test_the_offset_of_the_sensor_is_configured() -> None:
-    """``fwoffset`` sets the zero of the front angle.
-
-    If its second number is 1, it reverses the sign.
-    """
+    """``fwoffset`` sets the zero of the front angle. A 1 as its second number reverses the sign."""
     rig = Rig(sensor_zero_deg=7.0, angle_noise_deg=0.0).booted()
     assert angle_line(rig)[0] == 0.0
     rig.say(FRONT, "fwoffset 0 1")

@@ -99,7 +99,10 @@ def test_an_unknown_command_is_a_comment() -> None:
 
 @pytest.mark.parametrize("text", ["stop", "start"])
 def test_the_front_half_does_not_know_stop_and_start(text: str) -> None:
-    """Only the drive half has the commands ``stop`` and ``start``."""
+    """Only the drive half has the commands ``stop`` and ``start``.
+
+    The front half reports an unknown command.
+    """
     rig = Rig().booted()
     assert rig.ask(FRONT, text)[0].endswith(f"unhandled: '{text}'")
     assert rig.ask(DRIVE, text) == []
@@ -119,7 +122,7 @@ def test_an_upside_down_command_is_confirmed_by_newer_firmware_only() -> None:
 
 
 def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
-    """The host subscribes to a message. It comes in its period until the period is set to zero.
+    """The host subscribes to a message. It is sent periodically until the period is set to zero.
 
     The half does not acknowledge a subscription.
     """
@@ -132,7 +135,7 @@ def test_a_subscription_comes_in_its_period_until_it_is_set_to_zero() -> None:
 
 
 def test_leave_ends_all_of_them_the_heartbeat_too() -> None:
-    """``leave`` ends all subscriptions, also that of the heartbeat."""
+    """``leave`` ends all subscriptions, also the subscription to the heartbeat."""
     rig = Rig().booted()
     rig.say(DRIVE, "sub pose 20", "sub gyro 10", "leave")
     rig.run(0.01)
@@ -268,9 +271,9 @@ def test_bytes_to_the_boards_can_be_lost() -> None:
 
 
 def test_three_lost_characters_leave_a_valid_command() -> None:
-    """A command loses ``c``, ``2`` and ``1``. Modulo 99, these add 0 to the checksum.
+    """A command loses the characters ``c``, ``2`` and ``1``, which add 0 to the checksum modulo 99.
 
-    So the half obeys the command.
+    The checksum is still right, so the half obeys the command.
     """
     rig = Rig(firmware=SUMS).booted()
     whole, cut = "rc 2 0.250 11.459", "rc  0.250 1.459"
@@ -282,9 +285,9 @@ def test_three_lost_characters_leave_a_valid_command() -> None:
 
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_word_with_a_space_behind_it_is_unknown_to_some_firmware(*, exact: bool) -> None:
-    """The host sends ``stop`` with a space after it.
+    """The host sends ``stop`` with a space after the word.
 
-    Firmware that compares whole lines does not know it.
+    Firmware that compares whole lines reports an unknown command.
     """
     rig = Rig(firmware=Firmware(sums=False, exact_words=exact)).booted()
     rig.ask(DRIVE, "stop ")

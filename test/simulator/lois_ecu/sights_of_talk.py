@@ -126,9 +126,9 @@ def odometry_period_is_fixed(quirks: Quirks) -> bool:
 
 
 def terminal_mode_zeroes_correction(quirks: Quirks) -> bool:
-    """Return whether command 0x11 sets the short correction to zero.
+    """Return whether command 0x11, which sets the terminal mode, sets ``short_correction`` to zero.
 
-    Here the mode stays the same.
+    In this test, the command sets the mode that is already set.
     """
     rig = Rig(quirks)
     rig.run(2.1)
@@ -216,9 +216,9 @@ def _record(rig: Rig, kind: RecordKind, count: int, seconds: float) -> Record | 
 
 
 def records_in_100_us(quirks: Quirks) -> bool:
-    """Return whether records have times in units of 100 µs.
+    """Return whether the times in a record are in units of 100 µs.
 
-    At 20 RPM, ticks are then about 500 units apart.
+    Wheel ticks at 20 RPM are then about 500 units apart.
     """
     rig = Rig(quirks).booted()
     rig.drive(20, 20, 5.0)

@@ -49,7 +49,10 @@ def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
 
 
 def test_ticks_are_reported_as_they_are() -> None:
-    """The board reports its ticks. Other tests of this module rely on that."""
+    """The last report of wheel ticks can be found among the reports of a drive.
+
+    Other tests of this module rely on this.
+    """
     rig = Rig().booted()
     rig.drive(20, 20, 3.0)
     assert isinstance(ticks_in(rig.run(0.5))[-1], Ticks)

@@ -97,7 +97,10 @@ def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
     ],
 )
 def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
-    """A command has no distance. The server answers with a failure, which it spells in two ways."""
+    """A command has no distance, and the server refuses it.
+
+    The server misspells "missing" in the replies to TF and TB.
+    """
     assert Rig().ask(text) == answer
 
 
@@ -105,7 +108,7 @@ def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
 def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
     front_in: float, driven_in: float
 ) -> None:
-    """TF begins near an obstacle.
+    """TF begins near an obstacle, and fails after about 0.6 s.
 
     The robot moves 0.3 inches before the server reads the front sonar.
     """
@@ -126,7 +129,7 @@ def test_near_an_obstacle_tb_fails_likewise() -> None:
 
 @pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
 def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
-    """NCC and DOCK switch the obstacle check off, so the robot hits the wall."""
+    """The words NCC and DOCK in a TF switch the obstacle check off, so the robot hits the wall."""
     rig = Rig(front_m=20 * INCH_M)
     assert rig.ask(text, 60.0) == "ok 30"
     assert rig.server.hit_wall

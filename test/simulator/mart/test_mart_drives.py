@@ -110,7 +110,7 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """A motor is stuck. The first RM fails without a reason. After F, an RM fails with a reason."""
+    """A motor is stuck. RM fails without a reason, but after F, RM fails with "start timedout"."""
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)
@@ -190,9 +190,9 @@ def test_cs_5_minus_5_turns_left() -> None:
     ],
 )
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
-    """CS and RMCS cannot reverse a motor.
+    """CS and RMCS cannot reverse a motor. A motor that would be reversed is stopped instead.
 
-    If a motor is already at full speed, they slow down the other one instead.
+    If a motor would exceed full speed, the other motor becomes slower instead.
     """
     rig = Rig()
     rig.drive(start, 0.5)
@@ -281,10 +281,7 @@ def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str
 
 
 def test_an_obstacle_ends_rm_and_srm_tells() -> None:
-    """An obstacle ends RM. RMCS and SRM then fail with "insufficient clearance".
-
-    The reply to SM would spell it differently.
-    """
+    """An obstacle ends RM. RMCS and SRM then fail with "insufficient clearance"."""
     rig = Rig(front_m=45 * INCH_M)
     rig.drive("RM 30", 10.0)
     assert not rig.moving
@@ -329,7 +326,7 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 ) -> None:
     """The motors have no speed regulator.
 
-    The speed of a unit depends on the voltage and the motor.
+    The speed at a given command depends on the battery voltage and on the motor.
     """
     rig = Rig(volts=volts, motor_inequality=inequality)
     rig.drive("RM 40")

@@ -105,9 +105,9 @@ def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() ->
 
 
 def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
-    """While the IMU works, the angle of RMRA changes throughout a drive.
+    """While the IMU works, the reply to RMRA changes throughout a drive.
 
-    A constant one shows a dead IMU.
+    A constant reply shows that the IMU is dead.
     """
     for seed in range(8):
         rig = Rig(seed=seed)
@@ -144,7 +144,7 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 
 
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
-    """The server has given up a dead IMU, and the IMU works again.
+    """The server no longer uses a dead IMU. Then the IMU works again.
 
     The server uses it only after a successful RST IMU or SB.
     """

@@ -184,7 +184,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The controller has the facts that the console and the tests use, and they show its state."""
+    """The facts of the simulated controller, which the console shows, are those of its state."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

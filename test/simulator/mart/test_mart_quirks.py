@@ -88,7 +88,10 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether the first RM after a stop of 0.57 s fails at once. The second RM succeeds."""
+    """Return whether the first RM after a stop of 0.57 s fails at once.
+
+    If it fails, the second RM must succeed.
+    """
     rig = Rig(quirks)
     rig.drive("RM 66")
     assert rig.ask("SRM") == "ok"
@@ -211,7 +214,7 @@ def heading_starts_off(quirks: Quirks) -> bool:
 
 
 def corrects_after_stop(quirks: Quirks) -> bool:
-    """Return whether the robot creeps after one of forty straight moves has ended."""
+    """Return whether the robot still turns a little after one of forty straight moves has ended."""
     rig = Rig(quirks, dead_zone_units=0.0)
     for _ in range(40):
         assert rig.ask("TF 12").startswith("ok")

@@ -81,9 +81,9 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
-    """RMCS comes with one number, and the server refuses it.
+    """RMCS comes with one number instead of two. The server refuses it.
 
-    Other commands do not count their numbers.
+    For other commands, the server does not check the number of numbers.
     """
     rig = Rig()
     rig.drive("RM 30")
@@ -144,7 +144,7 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server restarts while the robot moves, and knows of no motion to stop.
+    """The server restarts while the robot moves. SRM fails, because no motion is in progress.
 
     Only a power cycle of the controller stops the motors.
     """
@@ -174,9 +174,9 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """Something is near the front sonar, which then measures three times.
+    """The sonar in front measures three times if an obstacle is near, so its reply takes longer.
 
-    So its reply takes longer.
+    The rear sonar measures once.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"
@@ -206,9 +206,9 @@ def test_sonars_turn_with_the_robot() -> None:
 def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
     changes: dict[str, float], bits: int
 ) -> None:
-    """Bits of MCSTAT: 4 and 8 are a trip, 16 and 32 a short circuit.
+    """The bits of MCSTAT show faults of the motor board.
 
-    64 is more than 30 V, and 128 less than 16 V.
+    4 and 8: a motor has tripped. 16 and 32: short circuit. 64: more than 30 V. 128: less than 16 V.
     """
     rig = Rig()
     rig.server.chassis.change(**changes)  # type: ignore[arg-type]
@@ -237,7 +237,7 @@ def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> No
 
 
 def test_an_unknown_reset_repeats_the_previous_reply() -> None:
-    """RST with an unknown word makes the server repeat its previous reply. RST MC is known."""
+    """RST with an unknown word makes the server repeat its previous reply. RST MC succeeds."""
     rig = Rig()
     assert rig.ask("RST x") is None
     assert rig.ask("RST MC") == "ok"

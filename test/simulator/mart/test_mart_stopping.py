@@ -99,9 +99,9 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """The stop port stops F, B or RM, and then SM or SRM comes.
+    """SL or SS on the stop port stops a motion. Then SM or SRM comes on the command port.
 
-    The command port hangs for ever, and the motors are off.
+    The command port hangs for ever. The motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -121,9 +121,9 @@ def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
 @pytest.mark.parametrize("stop", ["SL", "SS"])
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 30", "SRM")])
 def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str) -> None:
-    """A command on the stop port and SM or SRM come at the same time.
+    """SL or SS on the stop port and SM or SRM on the command port come at the same time.
 
-    The command port hangs, too.
+    The command port hangs for ever. The motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -189,7 +189,7 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
     """SL comes while a controlled move still measures the gyro's bias.
 
-    After 0.03 s, SL is ignored. After 0.1 s, SL ends the move late.
+    If it comes after 0.03 s, it is ignored. If it comes after 0.1 s, it ends the move late.
     """
     rig = Rig()
     rig.say("TF 24")
@@ -271,9 +271,9 @@ def test_the_stop_port_is_never_answered() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
-    """The server reports a stop of F that takes more than 0.75 s as failed.
+    """A stop of F takes more than 0.75 s. The server reports it as failed.
 
-    For RM, a stop of up to 1.88 s is ok.
+    A stop of RM is reported as ok, even if it takes up to 1.88 s.
     """
     rig = Rig()
     rig.ask("SLMP 1 60")

@@ -106,9 +106,9 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
 
 
 def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
-    """The gyro's bias walks at random.
+    """The gyro's bias changes at random.
 
-    After a second, its rms over sixty robots is as in the settings.
+    After a second, its RMS over sixty robots is the value in the settings.
     """
     ends = []
     for seed in range(60):

@@ -51,7 +51,7 @@ def test_a_paused_board_counts_once_a_second() -> None:
 
 
 def test_a_board_that_was_not_woken_misses_three_bytes() -> None:
-    """A board has booted. The first three bytes are lost, even if they are letters such as S."""
+    """A board has booted and is not awake. It loses the first three bytes, even the letter S."""
     board = booted(BoardSettings())
     board.receive(b"SSS")
     assert mode_of(board) is BoardMode.PAUSED
@@ -74,7 +74,7 @@ def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
 def test_p_pauses_and_unpauses() -> None:
     """The letter P pauses a board, and a second P starts it again.
 
-    Each pause begins with a text.
+    At the beginning of each pause, the board sends a paused text.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(b"P")
@@ -144,9 +144,9 @@ def test_a_motion_frame_to_a_paused_board_acts_by_its_letters() -> None:
 
 
 def test_a_motion_frame_to_a_sleeping_board_loses_its_header_to_the_wake_up() -> None:
-    """The first three bytes of the frame are lost, because they wake the board.
+    """A board that is not awake gets a motion frame, and loses the three bytes that wake it.
 
-    The board reads the rest as letters, here as a reset.
+    The board reads the other bytes as letters, here as a reset.
     """
     board = booted(BoardSettings())
     board.receive(velocity(0x52, 0, 0))
@@ -197,9 +197,9 @@ def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
 
 
 def test_a_pause_on_the_line_ends_half_a_frame_of_a_board_that_looks_for_it() -> None:
-    """A board that looks for pauses discards an incomplete frame after a pause.
+    """A board whose receiver looks for idle gaps discards an incomplete frame after a gap.
 
-    Without times from the caller, the ticks measure the pause.
+    If the caller gives no times, the gap is measured in ticks.
     """
     kind = ReceiverKind(framing="idle_gap")
     timed, ticking = (SimulatedBoard(BoardSettings(running=True, receiver=kind)) for _ in range(2))

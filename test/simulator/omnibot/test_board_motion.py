@@ -52,7 +52,10 @@ def test_the_scales_of_the_settings_are_the_units_of_commands() -> None:
 
 
 def test_a_wheel_command_drives_that_wheel_alone() -> None:
-    """The rim speeds of A, B and C follow CMD_A, CMD_B and CMD_C."""
+    """A command of one wheel's speed turns this wheel only.
+
+    The words CMD_A, CMD_B and CMD_C of a frame set the rim speeds of the wheels A, B and C.
+    """
     for wheel in range(3):
         board = SimulatedBoard(RUNNING)
         values = [0, 0, 0]
@@ -133,7 +136,7 @@ POSITION = BoardSettings(running=True, control="position")
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],
 ) -> None:
-    """On "position", a command is a pose in the earth frame, in mm and mrad.
+    """A board's switch is on "position", so a command is a pose in the earth frame, in mm and mrad.
 
     A heading of more than a full turn is driven in full.
     """

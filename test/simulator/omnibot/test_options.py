@@ -25,7 +25,10 @@ def board_from_url(url: str) -> tuple[SimulatedBoard, Line]:
 
 
 def test_every_option_reaches_the_board_and_its_line() -> None:
-    """A URL has all options. Each reaches the board or its line, and the seed reaches both."""
+    """A URL has all options of a simulated board. Each option reaches the board or its line.
+
+    The seed reaches both.
+    """
     board, line = board_from_url(
         "sim://?seed=7&imu_only&frame=body&delta_period=0.1&control=position&latching_estop&running"
         "&receiver=idle_gap&letters=anywhere&wakes_while_booting&ignore_estop"

@@ -83,7 +83,10 @@ def test_a_motors_delay_holds_its_effort_back() -> None:
 
 
 def test_the_controllers_gains_are_those_given() -> None:
-    """One tick after a step of 10, the effort is 5·10 + 2·10 + 1·10 by the given gains."""
+    """The commanded speed of a wheel jumps from 0 to 10, and the gains are 5, 2 and 1.
+
+    After one tick, the effort is 80: the sum of the gains, times 10.
+    """
     gains = WheelGains(feed_forward=5.0, proportional=2.0, integral=1.0)
     assert WheelController(gains).update(10.0, 0.0) == 80.0
 
@@ -102,9 +105,9 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """The accelerometer shows the robot's angle and that of its own mounting.
+    """The robot is held at an angle. The accelerometer shows this angle and its own mounting.
 
-    REP-103: pitch is negative if the front is up; roll is positive if the left is up.
+    REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
     """
     board = driven(b"", 0.1, imu_rpy_rad=mounted, accel_noise_g=0.0)
     board.hold(**held)

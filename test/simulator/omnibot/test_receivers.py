@@ -99,7 +99,7 @@ def test_letters_act_between_control_frames_and_not_within() -> None:
 
 
 def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
-    """On some boards a letter within a frame acts. The last byte still completes the frame."""
+    """On some boards, a letter within a frame acts at once. The frame is still completed."""
     assert understood("53 FF FE 01 00 50 00 52 00 53 50", kind=LETTERS_ANYWHERE) == [
         START,
         PAUSE,
@@ -188,7 +188,7 @@ def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
 
 
 def test_a_window_finds_a_header_within_a_frame() -> None:
-    """The value -2 in a frame has the bytes FF FE.
+    """A word of a frame has the value -2, so its bytes are FF FE, like a header.
 
     The window receiver finds a second frame there.
     """

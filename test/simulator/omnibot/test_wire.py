@@ -59,7 +59,10 @@ def test_the_pose_frame_is_laid_out_as_in_the_manual() -> None:
 
 
 def test_the_pose_frame_can_be_little_endian() -> None:
-    """The manual can also be read such that the bytes of each float in a pose are reversed."""
+    """The manual does not make clear in which order the bytes of a pose's floats come.
+
+    A setting selects the order with the least significant byte first.
+    """
     sent = pose_frame(1000.0, -2.5, 1.0, 7, "little")
     assert sent == bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 07")
 

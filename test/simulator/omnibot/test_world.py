@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the robot's geometry and true pose, and of errors that the board does not know."""
+"""Tests of the robot's geometry and true pose, and of errors that the board cannot measure."""
 
 from math import cos, pi, sqrt
 
