@@ -23,11 +23,14 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""Largest distance, in deltas, between a message's own delta and the delta at its timestamp."""
-LONGEST_STALL = 1000
-"""Largest distance, in IMU frames, from a message's own frame to the frame at its timestamp.
+"""How far to search for a message's delta, as a number of deltas.
 
-A stall of the computer may shift the timestamps.
+The search begins at the delta that fits the message's timestamp.
+"""
+LONGEST_STALL = 1000
+"""How far to search for a message's IMU frame, as a number of frames.
+
+The search begins at the frame that fits the timestamp, which a stall may shift.
 """
 
 Triple = tuple[float, float, float]
@@ -214,9 +217,10 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return each delta that the board sent, the pose after it, and the last IMU frame's index.
+    """Return three lists: the deltas of a board, the pose after each delta, and a frame number.
 
-    A pose may contain up to four rounded deltas.
+    The number is the index of the last IMU frame before the delta. Poses are exact after every
+    fifth delta. Between these, up to four rounded deltas are added.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []
@@ -246,7 +250,10 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return length (0.1 mm) and turn (0.1 mrad) of the displacement in a message's twist."""
+    """Return the length and the turn of the displacement in a message's twist.
+
+    The length is in 0.1 mm, and the turn in 0.1 mrad.
+    """
     twist = message.twist.twist
     turn = twist.angular.z * PERIOD_S
     shrink = math.sin(turn / 2) / (turn / 2) if turn else 1.0

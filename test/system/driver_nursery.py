@@ -107,7 +107,7 @@ def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
 def serve(descriptor: int) -> None:
     """Fork a driver for each request that arrives on the socket ``descriptor``.
 
-    The driver's exit code is written to the pipe from the request.
+    A request contains two pipes: one for the driver's output, and one for its exit code.
     """
     import omnibot_driver.node  # noqa: F401, which takes most of the time
     from omnibot_driver import boards

@@ -31,8 +31,8 @@ _nursery = Nursery()
 class Driver:
     """The driver as a separate process in a namespace, by default an unused one.
 
-    ``before``: Python code that runs before the driver, in a new interpreter. Without it, the
-    nursery forks.
+    ``before``: Python code that runs before the driver, in a new interpreter. Without such code,
+    the driver is forked from the nursery.
 
     ``more``: further ROS arguments.
     """

@@ -119,7 +119,7 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again, some seconds later.
 
-        The delay exceeds the driver's stall and ``WARN_EVERY_S``. So a second refusal is logged.
+        The driver has ended its stall by then, and can log a second refusal.
         """
 
         def publish() -> None:
@@ -165,7 +165,7 @@ class Probe:
     def client(self, kind: type, service: str) -> Any:
         """Return the client of a service. Each client is created only once.
 
-        The middleware never forgets a client.
+        The middleware would keep a destroyed client in memory.
         """
         if service not in self._clients:
             self._clients[service] = self.node.create_client(

@@ -117,7 +117,7 @@ def wire(drive: Drive, topic: str) -> list[bytes]:
 
 
 def test_the_wire_is_recorded_in_both_directions(drive: Drive) -> None:
-    """One raw topic has a message for each read of the port, and another one for each write."""
+    """Each read of the port is a message on one raw topic, and each write a message on another."""
     received, sent = (wire(drive, topic) for topic in RAW)
     assert b"\xff\xfa" in b"".join(received)
     assert b"Paused: 0 \n" in b"".join(received)

@@ -315,7 +315,7 @@ def test_a_signal_on_the_way_ends_it_cleanly(number: signal.Signals) -> None:
 
 
 def test_who_ends_it_before_it_drives_is_told_so() -> None:
-    """A signal ends the demo before the robot has driven. One line says so."""
+    """A signal ends the demo before the robot has driven. The demo prints one line about this."""
     with running_demo() as (process, mark):
         assert process.stdout is not None
         for line in process.stdout:
@@ -329,9 +329,9 @@ def test_who_ends_it_before_it_drives_is_told_so() -> None:
 
 
 def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
-    """The driver is killed during the demo.
+    """The driver is killed during the demo. The demo reports this and exits with code 1.
 
-    The demo says so, exits with 1 and ends the simulator.
+    The simulator ends, too.
     """
     with running_demo() as (process, mark):
         read_until_it_drives(process)
@@ -345,7 +345,7 @@ def test_the_end_of_the_driver_ends_the_demo_with_its_last_words() -> None:
 
 
 def test_a_killed_demo_leaves_nobody_behind() -> None:
-    """The demo is killed by SIGKILL. The simulator and the driver still end."""
+    """The demo is killed by SIGKILL. The simulator and the driver end by themselves."""
     with running_demo() as (process, mark):
         read_until_it_drives(process)
         process.kill()

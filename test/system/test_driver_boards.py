@@ -84,7 +84,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 ) -> None:
     """A user asks to delete an optional parameter. The driver refuses.
 
-    Every change reads all parameters, so it would fail without this one.
+    Otherwise every later change would fail, because a change reads all parameters.
     """
     probe: Probe = probe_of(start_plain(start_driver, start_board().path))
     deleted = [RosParameter(name="gain", value=ParameterValue())]
@@ -97,7 +97,7 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """The plain board drives, its wheels have their names, and its own service replies."""
+    """The plain board drives. Its joints have its wheels' names, and its own service replies."""
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))
     joints, odometry = probe.listen(JointState, "joint_states"), probe.listen(Odometry, "odom")

@@ -280,9 +280,9 @@ def test_a_publisher_whose_quality_of_service_does_not_fit_is_told(
 def test_a_goal_is_driven_to_with_the_switch_on_position_and_velocities_are_refused(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """Under positional control, the robot drives to a goal 0.25 m ahead in odom.
+    """The board is on positional control. The robot drives to a goal 0.25 m ahead in odom.
 
-    The board's frame has another origin. Velocity commands are refused.
+    The driver converts the goal to the board's frame. Velocity commands are refused.
     """
     board = start_board(
         control="position", running=True, initial_pose=BoardPose(1000.0, 2000.0, 1570.8)

@@ -223,7 +223,10 @@ def test_every_frame_is_prefixed_and_missing_tf_is_told_once(robot: Robot) -> No
 def test_a_prefix_without_its_slash_is_told_at_the_start(
     start_driver: Callable[..., Driver],
 ) -> None:
-    """The user forgets the slash of ``frame_prefix``, so frames are named ``robot1odom``."""
+    """The user sets a ``frame_prefix`` without a slash. The driver warns at its start.
+
+    The warning shows a resulting frame name, ``robot1odom``.
+    """
     driver = start_driver("/dev/null", publish_tf=False, frame_prefix="robot1")
     driver.wait_for_line("frame_prefix 'robot1' does not end with a slash")
 

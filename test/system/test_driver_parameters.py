@@ -64,7 +64,7 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     ],
 )
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
-    """An argument is unknown. The driver does not start, because it might open the wrong port."""
+    """An argument is unknown. The driver does not start, because it might use a wrong port."""
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -105,7 +105,10 @@ def test_a_forgotten_p_is_told_with_what_to_write(before: list[str], words: list
     ],
 )
 def test_an_error_text_of_ros_is_shortened_and_says_what_to_do(text: str, words: str) -> None:
-    """Places in the source code of ROS and its parser's terms do not help the user."""
+    """ROS reports a wrong argument with source lines and terms of its parser.
+
+    The driver shortens this text and adds what to do.
+    """
     assert in_plain_words(text) == words
 
 
@@ -121,7 +124,10 @@ def test_an_error_text_of_ros_is_shortened_and_says_what_to_do(text: str, words:
 def test_an_argument_that_ros_rejects_is_told_with_the_remedy(
     arguments: list[str], remedy: str
 ) -> None:
-    """The text of this computer's ROS is recognised."""
+    """The user gives an argument that ROS rejects. The driver's message says what to write.
+
+    The test uses the error texts of the installed ROS.
+    """
     command = [sys.executable, "-m", "omnibot_driver.driver", "--ros-args", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2
@@ -273,7 +279,8 @@ def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
 ) -> None:
     """A user sets ``max_linear_speed`` above ``fastest_linear_speed``, the limit of odometry.
 
-    Any such change is refused, also of the angular speeds. One request may raise both.
+    The driver refuses this, and also the same for the angular speeds. A request that raises both
+    parameters together is accepted.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))

@@ -136,9 +136,9 @@ def test_a_second_driver_on_the_same_port_is_refused_and_told_why(
 def test_a_port_that_cannot_be_opened_is_explained_and_the_node_lives(
     start_driver: Start, port: str, reason: str
 ) -> None:
-    """The port cannot be opened at present.
+    """The port cannot be opened now, but perhaps later. The driver logs the reason.
 
-    The driver logs the reason and keeps trying until SIGINT ends it.
+    It keeps trying until SIGINT ends it.
     """
     driver: Driver = start_driver(port)
     driver.wait_for_line(reason)
@@ -161,7 +161,10 @@ def test_a_port_that_cannot_be_opened_is_explained_and_the_node_lives(
 def test_a_port_that_can_never_be_opened_is_refused_at_the_start(
     start_driver: Start, board: str, port: str, reason: str
 ) -> None:
-    """No attempt can succeed. The driver says why and ends with 2, which systemd does not retry."""
+    """The given port can never be opened. The driver logs the reason and exits with code 2.
+
+    systemd does not restart a program that exits with this code.
+    """
     driver: Driver = start_driver(port, board=board)
     driver.wait_for_line(f"omnibot_driver cannot start: .*{reason}")
     assert driver.process.wait(60.0) == 2

@@ -289,9 +289,9 @@ def test_services_answer_with_a_reason_when_the_board_is_silent(
 
 
 def test_services_answer_at_once_without_a_port(start_driver: Start, probe_of: Start) -> None:
-    """The port does not exist.
+    """The port does not exist. Start, pause and reset fail at once.
 
-    Start, pause and reset fail at once, but the e-stop still latches.
+    The e-stop can still be latched.
     """
     probe: Probe = probe_of(start_driver("/dev/there_is_no_such_port"))
     for kind, service in [(Trigger, "start"), (SetBool, "pause"), (Trigger, "reset")]:

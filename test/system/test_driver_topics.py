@@ -94,9 +94,9 @@ def test_four_imu_messages_come_for_each_odometry(probe: Probe) -> None:
 def test_a_board_at_10_hz_needs_its_delta_period(
     start_board: Start, start_driver: Start, probe_of: Start, told_s: float
 ) -> None:
-    """A board sends displacements every 0.1 s. With this ``delta_period``, the twist is right.
+    """A board sends displacements every 0.1 s. With the right ``delta_period``, the twist is right.
 
-    Otherwise the driver names the right value.
+    With a wrong one, the driver names the right value.
     """
     board: PtyBoard = start_board(running=True, delta_period_s=0.1)
     driver: Driver = start_driver(board.path, delta_period=told_s)
@@ -178,9 +178,9 @@ def test_an_imu_only_board_is_shown_as_such(
 def test_frames_of_a_board_that_has_driven_before_begin_at_the_identity(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A board has driven before. Its own pose begins elsewhere, at a heading of 90°.
+    """A board has driven before, so its own pose is not zero, and its heading is 90°.
 
-    odom begins at the identity, and forward is along x.
+    odom nevertheless begins at the identity, with forward along x.
     """
     board = start_board(initial_pose=BoardPose(1000.0, 2000.0, 1570.8), running=True)
     probe: Probe = probe_of(start_driver(board.path))

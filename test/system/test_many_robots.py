@@ -97,9 +97,9 @@ def test_each_hears_only_its_own_commands(fleet: list[Robot]) -> None:
 
 
 def test_each_has_an_emergency_stop_of_its_own(fleet: list[Robot]) -> None:
-    """The e-stops of two robots are latched, and one is released.
+    """The e-stops of two robots are latched, and one of these is released.
 
-    The other robots keep their states.
+    No robot is affected by the e-stop of another one.
     """
     first, second, third = fleet
     for robot in (first, second):

@@ -39,7 +39,7 @@ def stands(board: SimulatedBoard) -> bool:
 def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
     """Press the key w until the robot drives and the test has received the command.
 
-    A stall may outdate a press. The subscription may be undiscovered.
+    One press may have no effect, because of a stall or an undiscovered subscription.
     """
     for _ in range(20):
         said.clear()
@@ -125,9 +125,9 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The user presses a key once. The monitor sends a motion, a few zero commands, then nothing.
+    """The user presses a key once. The monitor sends a motion command, then some zero commands.
 
-    Another zero command follows when the monitor ends.
+    It sends another zero command when it ends.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

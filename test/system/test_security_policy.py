@@ -36,7 +36,10 @@ QUALIFIERS: Final = {
 MOVES_OR_STOPS: Final = ("/cmd_vel", "/wheel_cmd", "/cmd_pose", "/estop")
 
 Rules = dict[str, set[str]]
-"""The names that a profile allows. The keys are the qualifiers, such as ``publish``."""
+"""The names of topics and services that a profile allows.
+
+The keys are the kinds of use: ``publish``, ``subscribe``, ``reply`` and ``request``.
+"""
 
 
 def profiles() -> dict[str, Element]:
@@ -103,9 +106,9 @@ def test_the_driver_may_do_what_it_does_and_nothing_else(
 
 
 def seen(graph: Node, home: str) -> Rules:
-    """Return the names that the driver uses, as the ROS graph shows them.
+    """Return the topics and services that the driver uses, as the ROS graph shows them.
 
-    The keys are qualifiers.
+    The keys are the kinds of use, such as ``publish``.
     """
 
     def names(found: list[tuple[str, list[str]]]) -> set[str]:

@@ -193,7 +193,7 @@ def test_whatever_ends_the_driver_stops_it(
 
 
 def test_jobs_answer(robot: TwoPorts, probe: Probe) -> None:
-    """The services for calibration and for saving and loading the configuration succeed."""
+    """The services that calibrate, and those that save and load the configuration, all succeed."""
     for service in ("calibrate_gyro", "calibrate_accelerometer", "save_configuration"):
         answer = probe.call(Trigger, service)
         assert answer.success, (service, answer.message)

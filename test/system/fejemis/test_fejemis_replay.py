@@ -22,7 +22,7 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets by which a replay recognises both Teensys (about 1 s).
+"""Number of packets after which a replay has recognised both Teensys. They take about 1 s.
 
 A recording may lack the answers to the driver's first questions.
 """

@@ -81,7 +81,7 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
             return action(self.board)
 
     def last(self) -> list[list[str]]:
-        """Return the last twelve lines that each of the two Teensys has executed: drive, front."""
+        """Return the last twelve lines that each Teensy has executed: drive first, then front."""
         halves = (self.board.drive, self.board.front)
         return [[obeyed.text for obeyed in list(half.commands)[-12:]] for half in halves]
 

@@ -39,9 +39,9 @@ def test_led_and_ball(ecu: Ecu, probe: Probe) -> None:
 def test_gps_time_and_heading_are_published_where_the_board_tells_them(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """The compass shows east, and the declination is 0.1 rad. The heading in ENU is -0.1 rad.
+    """The compass shows east, and the declination is 0.1 rad. The published heading is -0.1 rad.
 
-    GPS position and time are published, too.
+    This is in the ENU frame, in which east is 0. GPS position and time are published, too.
     """
     ecu = ecu_of("documented", stack, running=True)
     driver = start_driver(
@@ -96,9 +96,9 @@ def test_duties_are_commanded_in_duty_mode_alone(
 def test_a_duty_that_waited_while_the_driver_was_stalled_is_refused(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """A duty arrives while the driver is suspended. The driver refuses it when it runs again.
+    """A duty command arrives while the driver is suspended, and is refused when the driver resumes.
 
-    The refusal does not need the sender's clock.
+    The driver does not need the sender's clock for this.
     """
     ecu = ecu_of("firmware", stack)
     driver = start_driver(ecu.path, board="lois_ecu", drive_mode="duty")

@@ -206,7 +206,7 @@ def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe
 def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
     """The services calibrate the gyro, start the log, and download the last move and the log.
 
-    The MART server ends when the log is downloaded.
+    The download of the log ends the MART server.
     """
     with driven(probe, mart, 0.3, 0.0):
         pass
@@ -228,9 +228,10 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """A user changes ``range_maximum`` (by an integer) and ``dock_distance``.
+    """A user changes ``range_maximum``, by an integer, and ``dock_distance``, to 0.1 m.
 
-    For 0.1 m, 2 inches are requested: the robot may drive 1.6 times as far.
+    The driver publishes the new range. It requests only 2 inches, because the robot may drive 1.6
+    times as far as requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
