@@ -37,7 +37,7 @@ BOOT_S = 0.7123
 
 
 def ftdi_restarted(received: Received, random: Random) -> Chunks:
-    """Deliver like ``ftdi``, but the timer starts with the first byte of each packet."""
+    """Deliver bytes as an FTDI adapter does whose timer starts with each packet's first byte."""
     chunks: Chunks = []
     start, timer = 0, math.inf
     for at, time in enumerate(received.times_s):

@@ -23,9 +23,9 @@ LOSSES = (0.0, 1e-3, 1e-2)
 SCENARIOS = {"nominal": "driving", "IMU only": "IMU only, noisy gyro"}
 BLOCKS = "4096-byte blocks"
 BLOCKS_SETTLED_S = 6.0
-"""Time in s after which the driver's clock has settled with large blocks.
+"""Time in s after which the driver's clock has settled if data comes in large blocks.
 
-It is the time of two blocks.
+Two blocks arrive in this time.
 """
 LIMITS_S = (0.2e-3, 0.5e-3)
 
@@ -36,7 +36,7 @@ Figures = tuple[float, float]
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
-    """Measure one stream, in a process of the pool."""
+    """Stamp one stream, in a process of the pool. Return its cell and its figures."""
     (line, loss, mode, event), seed = job
     skew = SKEWS[seed % len(SKEWS)]
     stamped = stamp(line, SCENARIOS[mode], loss, skew, seed, seconds, event)
@@ -61,7 +61,7 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
 
 
 def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
-    """Measure all streams of all cells, on all processors."""
+    """Stamp all streams of all cells, on all processors. Return the figures of each cell."""
     jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
     found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
     with Pool(os.cpu_count()) as pool:

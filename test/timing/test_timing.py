@@ -56,9 +56,9 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) 
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """The clocks of the board and of an FTDI adapter run equally fast.
+    """The clocks of the board and of an FTDI adapter run equally fast, so their phase is constant.
 
-    After 2 s, all stamps are late by a frame's duration, within 0.5 ms.
+    After 2 s, all stamps are late by the duration of a frame, within 0.5 ms.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver knows it only to within 2 ms minus the
@@ -71,9 +71,10 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
 @pytest.mark.parametrize("reader", [name for name in BUSY if "parts" not in name])
 @pytest.mark.parametrize("scenario", ["driving", "IMU only, noisy gyro"])
 def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str) -> None:
-    """A reader is late because the computer is busy. The stamps are as accurate as usual.
+    """The computer is busy, so the reader is late. The stamps are as accurate as usual.
 
-    Readers in parts are left out: they misplace some stamps by a tick.
+    Readers that read in parts are not tested here, because some of their stamps are wrong by a
+    tick.
     """
     for seed, skew in enumerate([1e-4, -1e-4]):
         stamped = stamp(reader, scenario, 0.0, skew, seed, 15.0)

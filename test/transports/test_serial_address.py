@@ -32,7 +32,10 @@ from omnibot_driver.transports.serial_address import check_address
     ],
 )
 def test_a_name_that_is_no_address_is_refused(url: str) -> None:
-    """No path and no URL of pyserial. The text names the parameter and gives examples."""
+    """The port is neither a path nor a URL of pyserial, so it is refused.
+
+    The message names the parameter and shows a valid port.
+    """
     with pytest.raises(ParameterError) as refusal:
         check_address(url, "front_port")
     assert str(refusal.value).startswith(f"front_port '{url}' is not valid: give the whole path of")
@@ -54,12 +57,15 @@ def test_a_name_that_is_no_address_is_refused(url: str) -> None:
     ],
 )
 def test_what_may_appear_later_is_not_refused(url: str) -> None:
-    """A missing device may be plugged in later, and an unknown host may come to the network."""
+    """The device is missing, or the host is unknown. The port is accepted.
+
+    Both may appear later.
+    """
     check_address(url)
 
 
 def test_a_file_and_a_folder_are_refused(tmp_path: Path) -> None:
-    """The path leads to something that is not a device, also through a symbolic link."""
+    """The path is that of a folder or a file, or of a link to one. It is refused."""
     link = tmp_path / "link"
     link.symlink_to(tmp_path)
     for path in (str(tmp_path), str(link), __file__):
@@ -68,7 +74,7 @@ def test_a_file_and_a_folder_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_link_whose_device_is_unplugged_is_not_refused(tmp_path: Path) -> None:
-    """A symbolic link leads nowhere, as after an adapter was unplugged."""
+    """The port is a symbolic link to a device that is unplugged. It is accepted."""
     link = tmp_path / "omnibot"
     link.symlink_to("/dev/no-such-device")
     check_address(str(link))
@@ -76,7 +82,10 @@ def test_a_link_whose_device_is_unplugged_is_not_refused(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("url", ["loop://", "rfc2217://localhost:5000"])
 def test_a_port_without_descriptor_is_refused_for_a_board_with_several(url: str) -> None:
-    """Several lines are polled together, so each of them needs a file descriptor."""
+    """A board has several lines, and one port has no file descriptor. It is refused.
+
+    The driver polls all lines together, and needs a descriptor for this.
+    """
     check_address(url)
     with pytest.raises(ParameterError, match="does not work for a board with several ports"):
         check_address(url, pollable=True)
@@ -84,12 +93,15 @@ def test_a_port_without_descriptor_is_refused_for_a_board_with_several(url: str)
 
 @pytest.mark.parametrize("url", ["/dev/ttyACM0", "socket://localhost:5000", "spy:///dev/ttyACM0"])
 def test_a_port_with_a_descriptor_is_accepted_for_a_board_with_several(url: str) -> None:
-    """These kinds of ports have file descriptors when they are open."""
+    """A board has several lines. Ports that have a file descriptor when open are accepted."""
     check_address(url, pollable=True)
 
 
 def test_a_check_opens_nothing() -> None:
-    """The terminal would be exclusive, and a board might restart, if the check opened the port."""
+    """The driver checks the address of a port without opening the port.
+
+    If the check opened the port, the terminal would be exclusive, and a board might restart.
+    """
     ours, theirs = os.openpty()
     try:
         before = os.listdir("/proc/self/fd")

@@ -73,10 +73,7 @@ def test_a_peer_that_reads_nothing_ends_a_write_with_an_error() -> None:
 
 
 def test_a_board_behind_a_socket_is_served_as_well() -> None:
-    """The port has the URL ``socket://HOST:PORT``, one of those that pyserial knows.
-
-    The port works like a local one.
-    """
+    """The port has a URL of pyserial, ``socket://HOST:PORT``, and works like a local port."""
     server = socket.create_server(("127.0.0.1", 0))
     port = SerialPort(f"socket://127.0.0.1:{server.getsockname()[1]}", 115200)
     far, _ = server.accept()
@@ -95,9 +92,9 @@ def test_a_board_behind_a_socket_is_served_as_well() -> None:
 
 
 def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
-    """The peer breaks the connection off.
+    """The peer breaks the connection off. The port closes its socket.
 
-    The port closes its socket, which pyserial itself leaves open.
+    pyserial itself would leave the socket open.
     """
     with socket.create_server(("127.0.0.1", 0)) as server:
         descriptors = len(os.listdir("/proc/self/fd"))
@@ -112,7 +109,7 @@ def test_a_peer_that_broke_off_leaves_no_socket_open() -> None:
 
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name)")  # pyserial 3.5
 def test_a_board_behind_rfc2217_is_served_as_well() -> None:
-    """The port is behind a server by RFC 2217, here pyserial's example server.
+    """The port is on a server that uses RFC 2217, here pyserial's example server.
 
     The port works like a local one.
     """

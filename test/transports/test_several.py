@@ -77,7 +77,7 @@ def next_packets(lines: Several, count: int) -> set[Packet]:
 
 
 def test_what_is_read_and_written_keeps_its_channel(ends: Ends, lines: Several) -> None:
-    """Both lines are used at the same time. The bytes keep their channels."""
+    """Both lines are used at the same time. All bytes keep their channel, in both directions."""
     os.write(ends.far[0], b"drive")
     os.write(ends.far[1], b"front")
     assert next_packets(lines, 2) == {(0, b"drive"), (1, b"front")}
@@ -99,7 +99,7 @@ def changed(lines: Several) -> dict[int, str]:
 
 
 def test_a_line_that_is_lost_keeps_the_other_from_nothing(ends: Ends, lines: Several) -> None:
-    """One line is lost. The other one still carries stops to the board, and data from the board."""
+    """One of two lines is lost. The remaining line still carries stops and data."""
     ends.hang_up(0)
     lines.write(((0, b"stop"), (1, b"stop")))
     assert os.read(ends.far[1], 99) == b"stop"
@@ -161,7 +161,7 @@ def test_a_line_is_missing_as_soon_as_a_write_finds_it_full_for_too_long(
 def test_a_full_line_is_not_shared_so_that_it_can_be_opened_again(
     ends: Ends, lines: Several, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A full line is not given to the guard.
+    """A line's buffer is full. The line is not shared with the guard.
 
     The guard's lock would prevent the driver from opening this line again.
     """
@@ -234,6 +234,6 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 
 
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
-    """One of the lines is a port without a file descriptor. LinkError is raised."""
+    """One of two lines is a port without a file descriptor. Opening them raises LinkError."""
     with pytest.raises(LinkError, match="does not work for a board with several ports"):
         Several([partial(SerialPort, "loop://", 115200)])

@@ -43,9 +43,9 @@ def read(transport: SimulatedTransport, wanted: int, channel: int = 0) -> bytes:
 
 
 def test_it_needs_no_guard_and_no_kernel() -> None:
-    """A simulated board ends with the driver's process.
+    """A simulated board ends with the driver's process, so it needs no guard.
 
-    So it has no descriptors and no overruns.
+    The transport has no file descriptors and counts no overruns.
     """
     with closing(SimulatedTransport("sim://", TOY)) as transport:
         assert transport.ends_with_us
@@ -84,9 +84,9 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 
 
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
-    """The driver does not read.
+    """The driver does not read. A channel keeps as many bytes as a terminal would.
 
-    A channel keeps as many bytes as a terminal, and drops later ones.
+    Later bytes are dropped and counted.
     """
     served = InProcessBoard(toy_lines.ToyLines())
     taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
@@ -98,9 +98,9 @@ def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
-    """The driver does not read.
+    """The driver does not read. A channel keeps as many whole datagrams as a socket would.
 
-    A channel keeps as many datagrams as a socket, whole, even empty ones.
+    Empty datagrams count, too. Later datagrams are dropped.
     """
     served = InProcessBoard(ToyServer())
     taken = [served._send(0, data) for data in [b"", *[b"ok 1"] * UNREAD_DATAGRAMS]]

@@ -97,9 +97,9 @@ def test_what_comes_from_another_address_is_not_heard(host: Host, transport: Udp
 def test_a_host_that_is_away_is_silent_and_hears_the_first_datagram_when_it_is_back(
     host: Host, transport: UdpPorts
 ) -> None:
-    """The host is away, so a datagram causes an error. Then the host comes back.
+    """The host is away, and a datagram to it causes an error in the kernel. Then the host is back.
 
-    The error does not prevent the next datagram from being sent.
+    In spite of the error, the next datagram reaches the host.
     """
     address = host.ports[0].getsockname()
     host.ports[0].close()
@@ -159,15 +159,15 @@ def test_a_url_that_means_no_place_is_refused(url: str) -> None:
 
 @pytest.mark.parametrize("host", ["no-such-host.invalid", "192.168.1.50", "[::1]", "robot.local."])
 def test_a_host_that_may_appear_later_is_not_refused(host: str) -> None:
-    """The host may be unknown until it is on the network, so the check asks no resolver."""
+    """A host name is unknown until the host is on the network. The check of the URL accepts it."""
     check_address(f"udp://{host}:65534", 2)
 
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
-    """The host is lost.
+    """The host of a URL with an IPv6 address is lost, on the second channel.
 
-    The error has its IPv6 address in brackets, and the port of the second channel.
+    The error has the address in brackets, and the port of the second channel.
     """
     lost = pytest.raises(LinkError, match=re.escape("lost udp://[::1]:5001: "))
     with contextlib.closing(UdpPorts("udp://[::1]:5000", 2)) as transport, lost:
