@@ -60,7 +60,7 @@ class Line:
 
 
 def children() -> list[int]:
-    """Return the ids of our child processes, zombies included."""
+    """Return the ids of the child processes of this process, zombies included."""
     found = []
     for directory in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):

@@ -29,7 +29,7 @@ LAST_WORDS = (packed(STOP), packed(EMERGENCY_STOP + STOP))
 
 
 class Listener:
-    """Keeps what a link delivers and reports, and wakes the test that waits for it."""
+    """A listener of a link. It keeps the link's events and reports, and wakes a waiting test."""
 
     def __init__(self) -> None:
         self.events: list[Event] = []

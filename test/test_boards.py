@@ -50,7 +50,7 @@ def imported(path: Path) -> set[str]:
     ids=lambda path: str(path.relative_to(PACKAGE)),
 )
 def test_common_code_imports_no_board(path: Path) -> None:
-    """Session, link, node and all other common code import no module of a particular board."""
+    """All common code, such as session, link and node, imports no module of a particular board."""
     known = {
         f"omnibot_driver.{place}.{name}" for place in ("core", "boards") for name in boards.PROFILES
     }
@@ -61,7 +61,7 @@ def test_common_code_imports_no_board(path: Path) -> None:
 def test_every_profile_makes_its_board_of_the_defaults(name: str) -> None:
     """Every profile makes its board from the default parameters.
 
-    The kinematics has as many joints as the board has wheels.
+    The board's kinematics has one joint for each of its wheels.
     """
     values = boards.check_all({"board": name})
     profile = boards.load(name)
@@ -92,7 +92,10 @@ def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: obj
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_every_profile_has_a_table_of_its_own(name: str) -> None:
-    """In a profile's table, names are unique, and ``board`` can only have the profile's name."""
+    """In the parameter table of a profile, all names are unique.
+
+    The parameter ``board`` has only one valid value, the name of the profile.
+    """
     table = boards.load(name).PARAMETERS
     assert sum(map(len, table.sections.values())) == len(table.rows)
     assert (table.board, table.by_name["board"].choices) == (name, (name,))
@@ -101,7 +104,10 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 
 @pytest.mark.parametrize("name", boards.PROFILES)
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
-    """The parameter ``baudrate`` exists exactly for boards whose ``traits.baudrate`` is true."""
+    """A board has the parameter ``baudrate`` exactly if its messages mention a baud rate.
+
+    The board's ``traits.baudrate`` decides this.
+    """
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))
     assert ("baudrate" in profile.PARAMETERS.by_name) is board.traits.baudrate
@@ -130,9 +136,9 @@ def refuse_far_docks(values: Mapping[str, Any]) -> None:
 
 
 def test_a_table_has_what_the_board_can_use_and_its_own() -> None:
-    """A board has its own parameters, and only the common parameters that it can use.
+    """A board has its own parameters, and only those common parameters that it can use.
 
-    The board's profile may change common defaults.
+    The board's profile may change the defaults of common parameters.
     """
     own = table(
         "few",
@@ -170,7 +176,7 @@ def test_a_row_that_the_driver_reads_cannot_be_dropped(name: str) -> None:
 
 
 def test_what_may_be_dropped_is_asked_for_by_a_default() -> None:
-    """Some boards lack some of the parameters.
+    """Some boards lack some of the common parameters.
 
     Common code reads these parameters with a default value, never by indexing.
     """

@@ -53,10 +53,7 @@ def message_name(message: object) -> str:
 
 @st.composite
 def settings(draw: st.DrawFn) -> MessageSettings:
-    """Draw message settings with any noise and with frame names of any length.
-
-    The length decides how the numbers after the name are aligned.
-    """
+    """Draw message settings with any noise and with frame names of any length."""
     values: dict[str, Any] = boards.check_all({})
     values |= {name: draw(frames) for name in ("odom_frame", "base_frame", "imu_frame")}
     values |= {name: draw(st.floats(1e-6, 10.0)) for name in values if name.endswith("stddev")}
@@ -122,7 +119,10 @@ def test_two_wheels_are_two_joints_with_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("length", range(21))
 def test_no_frame_length_is_refused_at_start(length: int) -> None:
-    """The driver can use its own serializer for frame names of any length, so for any alignment."""
+    """The driver can use its own serializer, whatever the length of a frame name.
+
+    The length decides how the numbers after the name are aligned.
+    """
     values = boards.check_all({"imu_frame": "i" * length or "x", "odom_frame": "o" * 7})
     assert difference(MessageSettings.from_parameters(values, omnibot.kinematics(values))) == ""
 
@@ -168,7 +168,7 @@ def test_a_velocity_is_read_from_its_bytes_in_either_byte_order(
 @pytest.mark.parametrize("place", range(6))
 @pytest.mark.parametrize("nonsense", [float("nan"), float("inf"), float("-inf")])
 def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense: float) -> None:
-    """One of the six axes has NaN or infinity. The command is refused.
+    """A Twist has NaN or infinity in one of its six axes. The driver refuses it.
 
     This also applies to axes along which the robot cannot move.
     """
@@ -180,10 +180,7 @@ def test_bytes_that_say_nonsense_of_one_axis_are_no_command(place: int, nonsense
 
 @pytest.mark.parametrize("length", range(52))
 def test_bytes_that_are_too_few_for_a_velocity_are_no_command(length: int) -> None:
-    """A message has too few bytes for a velocity and is refused.
-
-    A middleware may deliver such messages.
-    """
+    """A middleware delivers a Twist with too few bytes. The driver refuses it."""
     data = cdr.LITTLE_ENDIAN + struct.pack("<6d", *[0.1] * 6)
     with pytest.raises(CommandRefused, match="not a valid Twist"):
         cdr.twist(data[:length])

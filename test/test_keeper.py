@@ -17,7 +17,10 @@ from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 EARLY_S = -1000.0
-"""A time of simulated heartbeats, in s. The clock, which begins near 0 at boot, is always later."""
+"""Time of a simulated heartbeat, in s, which is always in the past.
+
+The clock begins near 0 at boot, so its time is never negative.
+"""
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
@@ -102,9 +105,9 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard hangs and cannot be killed.
+    """A guard hangs and cannot be killed. The driver starts another guard at once.
 
-    The driver starts another at once, and reaps the first later.
+    The driver does not wait for the end of the first guard.
     """
     monkeypatch.setattr("subprocess.Popen.wait", lambda *_: pytest.fail("a beat waits"))
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -128,7 +131,10 @@ def test_a_guard_that_does_not_die_never_holds_up_a_beat(
 
 
 def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Guards hang and cannot be killed. After ``MOST_DYING`` of them, the driver starts no more."""
+    """Guards hang and cannot be killed. The driver starts no more guards after a limit.
+
+    The limit is ``MOST_DYING``.
+    """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     stopped: set[int] = set()
     with monkeypatch.context() as undying:

@@ -40,9 +40,9 @@ def test_measurements_are_delivered_on_the_reader_thread(board: PtyBoard) -> Non
 
 
 def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyBoard) -> None:
-    """The pacer repeats one command, and stops the robot after the timeout.
+    """The caller's thread may hang after a command. The pacer, another thread, repeats the command.
 
-    The caller's thread may hang.
+    After the timeout, the pacer stops the robot.
     """
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
@@ -61,9 +61,9 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard gets heartbeats at a fixed rate, although the pacer runs more often.
+    """The guard gets ten heartbeats per second, although the pacer runs more often.
 
-    The number of unread heartbeats shows that a guard hangs.
+    The rate is fixed because the number of unread heartbeats shows that a guard hangs.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -119,9 +119,9 @@ def test_closing_writes_stop_and_ends_the_threads(
 def test_every_read_and_every_write_can_be_listened_to(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``on_read`` and ``on_write`` get exactly the bytes on the line, also those of the final Stop.
+    """The functions ``on_read`` and ``on_write`` get all bytes that the link reads and writes.
 
-    What the board sent earlier is discarded.
+    The written bytes include the final Stop. Bytes from before the link's start are discarded.
     """
     end_patiently(monkeypatch)
     read, written = [], []
@@ -163,7 +163,7 @@ def test_an_estop_is_written_before_the_call_returns(
 
 
 def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
-    """A refused command raises an error in the caller, and the link continues to work."""
+    """A command is refused. The caller gets an exception, and the link continues to work."""
     listener, ours = Listener(), session()
     link = link_to(board.path, listener, ours)
     link.start()
@@ -176,7 +176,7 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """No guard can share the port. The driver reports this once.
+    """The port, here ``loop://``, cannot be shared with a guard. The driver reports this once.
 
     Without a guard, only the driver itself can stop the robot.
     """

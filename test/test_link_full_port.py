@@ -47,10 +47,7 @@ def test_after_a_failed_write_the_opening_sequence_comes_before_anything_else(
 
 
 def at_rest(terminal: Terminal) -> tuple[Link, Session]:
-    """Return a link that has opened this port, and its session.
-
-    The link writes nothing to the board by itself.
-    """
+    """Return a link that has opened this port, and its session. The link has nothing to write."""
     ours = session(run=False)
     link = link_to(terminal.path, Listener(), ours)
     link.start()
@@ -71,9 +68,9 @@ def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> No
 
 
 def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: Terminal) -> None:
-    """The port is full when the e-stop is pressed. The link says that it is blocked.
+    """The port is full when the e-stop is latched. The link reports that its output is blocked.
 
-    Later, the link writes the e-stop first.
+    When there is room, the link writes the e-stop first.
     """
     link, _ours = at_rest(terminal)
     reader, may_open = link._reader, threading.Event()
@@ -94,7 +91,7 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
-    """A defect ends the driver while its port is full. The guard sends the final Stop."""
+    """A defect ends the driver while its port is full. The guard sends Stop when there is room."""
     link, ours = at_rest(terminal)
     terminal.fill()
     closed, session_closed = ours.closed, threading.Event()

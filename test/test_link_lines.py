@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a link to a board with two lines. One line appears late, disappears and comes back."""
+"""Tests of a link to a board with two lines, of which one appears late, is lost or comes back."""
 
 import os
 from collections.abc import Iterator

@@ -37,9 +37,9 @@ def test_a_port_that_comes_late_is_opened(tmp_path: Path) -> None:
 def test_attempts_are_made_less_and_less_often_up_to_a_limit(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The port is missing. The link tries to open it, and waits longer before each new attempt.
+    """The port is missing, so the link tries again and again to open it.
 
-    Wait: 1.5 times the previous one, up to a limit.
+    Each wait is 1.5 times the wait before, up to a limit.
     """
 
     class Timed(Listener):
@@ -124,9 +124,9 @@ def test_a_port_that_is_opened_while_the_link_is_closed_gets_the_last_stop_too()
 
 
 def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_path: Path) -> None:
-    """The port is lost during a drive. At the driver's end, the port is opened again for a Stop.
+    """The port is lost during a drive, and appears again while the driver ends.
 
-    Nothing confirms this Stop, as the driver knows.
+    The driver sends Stop. It does not report that the robot stands, because no data confirms this.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()
@@ -149,7 +149,7 @@ def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_pat
 def test_a_robot_that_was_lost_while_it_drove_is_known_not_to_be_stopped() -> None:
     """The cable is unplugged during a drive, and the driver ends.
 
-    The driver knows that the robot is not stopped.
+    The link reports that it could not stop the robot.
     """
     listener, ours = Listener(), session()
     with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:

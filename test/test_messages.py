@@ -63,9 +63,9 @@ def goal(
 def test_a_goal_has_the_yaw_of_its_quaternion_whatever_its_length(
     yaw_rad: float, length: float
 ) -> None:
-    """The length of a goal's quaternion does not change its yaw.
+    """A goal's yaw does not depend on the length of its quaternion.
 
-    Some senders do not normalize it.
+    Some senders do not normalize the quaternion.
     """
     turn = (0.0, 0.0, length * math.sin(yaw_rad / 2), length * math.cos(yaw_rad / 2))
     pose = messages.goal_pose(goal(1.0, -2.0, turn), "odom")
@@ -101,9 +101,9 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 
 
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
-    """A late reading of one clock does not change the estimated offset.
+    """The offset between two clocks is estimated from readings of both.
 
-    A step of a clock changes it.
+    A late reading does not change it. If one clock is stepped, the offset follows.
     """
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002
@@ -146,9 +146,9 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 
 
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
-    """An unknown twist is zero with a large variance.
+    """An unknown twist is published as zero with a large variance.
 
-    After a pause, for example: the first displacement contains all motion of the pause.
+    After a pause, for example, the first displacement has all motion of the pause.
     """
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS

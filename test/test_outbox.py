@@ -26,7 +26,7 @@ def in_threads(*works: Callable[[], object]) -> None:
 
 
 class Held:
-    """A delivery that lasts until ``let_go`` is called."""
+    """A thread that delivers an event until ``let_go`` is called."""
 
     def __init__(self, outbox: Outbox) -> None:
         self._begun, self._over = threading.Event(), threading.Event()
@@ -103,9 +103,9 @@ def test_nobody_claims_what_is_not_next() -> None:
 
 
 def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
-    """One thread delivers. Another thread brings events and returns at once.
+    """One thread delivers. Another thread puts events into the outbox and returns at once.
 
-    The other thread's events leave after the current delivery.
+    Its events leave after the current delivery.
     """
     outbox = Outbox()
     left: list[str] = []
@@ -120,7 +120,10 @@ def test_nobody_waits_for_a_delivery_of_another_thread() -> None:
 
 
 def test_a_delivery_that_fails_ends_the_one_who_made_it_and_no_other() -> None:
-    """A delivery raises an error in its thread. The other events leave with the next delivery."""
+    """A delivery raises an error in the thread that delivers.
+
+    The events that still wait leave with the next delivery.
+    """
     outbox = Outbox()
     left: list[int] = []
 
@@ -146,7 +149,10 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """The outbox is full, so a thread waits. Otherwise the queue would grow without limit."""
+    """The outbox is full, so a thread that puts an event into it waits.
+
+    Otherwise the outbox would grow without limit.
+    """
     outbox = Outbox()
     left: list[int] = []
     held = Held(outbox)

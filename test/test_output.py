@@ -29,9 +29,9 @@ def taken(pipe: int) -> None:
 
 
 def test_a_line_that_a_full_disk_refuses_is_lost_and_the_next_is_not() -> None:
-    """A full disk refuses a line, which is lost.
+    """The disk is full, so a line of output is lost.
 
-    The next line is written when there is room again.
+    When there is room again, the next line is written.
     """
     (source, pipe), (heard, room) = os.pipe(), os.pipe()
     disk = os.open("/dev/full", os.O_WRONLY)
@@ -73,9 +73,9 @@ with UnblockedOutput():
 
 @pytest.mark.parametrize("lines", [16, 100])
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
-    """The output is not read. Python prints a traceback after the context, and this does not block.
+    """The output is not read. At the program's end, Python prints a message, and does not block.
 
-    The pipe is exactly full (16 lines) or too small (100).
+    The pipe is exactly full after 16 lines. 100 lines are more than it can hold.
     """
     program = f"""
 import contextlib, os, time

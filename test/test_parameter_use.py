@@ -37,9 +37,9 @@ class Watched(Mapping[str, Any]):
 
 @cache
 def strings(file: Path) -> list[str]:
-    """Return patterns of the strings in a module, without the names of parameters' rows.
+    """Return the strings of a module as patterns, but not the names that define parameters.
 
-    An f-string such as ``f"{kind}_minimum"`` is a pattern that matches every kind.
+    An f-string such as ``f"{kind}_minimum"`` is a pattern that matches every ``kind``.
     """
     found, rows = [], set[int]()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -73,7 +73,10 @@ def own_files(board: str) -> Iterator[Path]:
 
 @pytest.mark.parametrize("board", boards.PROFILES)
 def test_every_parameter_is_read(board: str) -> None:
-    """Each parameter is a setting of the board, or the driver's code has its name elsewhere."""
+    """Every parameter of a board has an effect.
+
+    It is a setting of the board, or its name occurs in the driver's code outside its definition.
+    """
     profile = boards.load(board)
     watched = Watched(boards.check_all({"board": board}))
     profile.settings(watched)

@@ -222,7 +222,7 @@ ANY = Parameter("any", ["x"], "", "One word.")
 def test_a_list_may_have_any_length_that_its_row_allows(
     parameter: Parameter, value: object, taken: object
 ) -> None:
-    """A list of numbers or strings may have any length that the parameter's row allows."""
+    """A list parameter accepts any number of items from its minimum to its maximum length."""
     assert parameter.check(value) == taken
 
 
@@ -241,16 +241,16 @@ def test_a_list_may_have_any_length_that_its_row_allows(
 def test_a_wrong_list_is_refused_with_what_it_may_be(
     parameter: Parameter, wrong: object, sentence: str
 ) -> None:
-    """The message for a wrong list has the allowed number, type and range of the elements."""
+    """A list has a wrong number, type or range of items. The message says what is allowed."""
     with pytest.raises(ParameterError) as refused:
         parameter.check(wrong)
     assert str(refused.value).startswith(f"parameter '{parameter.name}' {sentence}")
 
 
 def test_what_the_board_keeps_is_unset_until_it_is_given() -> None:
-    """Some parameters are stored by the board. Such a parameter is None until the user gives it.
+    """Some parameters are stored by the board. Their value is None until the user sets them.
 
-    Its default only says its type.
+    Their default value only determines their type.
     """
     gain = Parameter("gain", 1.0, "1", "A gain.", low=0.0, high=9.0, unset=True)
     assert gain.initial is None

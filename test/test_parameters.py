@@ -179,9 +179,9 @@ def test_odom_and_base_must_be_different_frames() -> None:
 def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_control(
     signs: list[int],
 ) -> None:
-    """Position control refuses axis signs whose yaw is not the product of x and y.
+    """With position control, axis signs are refused if the yaw sign is not the product of x and y.
 
-    Velocity control accepts them.
+    With velocity control, these signs are accepted.
     """
     assert check_all({"axis_signs": signs})
     with pytest.raises(ParameterError, match="'axis_signs'"):
@@ -190,9 +190,9 @@ def test_axis_signs_whose_yaw_is_not_the_product_are_refused_for_position_contro
 
 
 def test_values_reach_the_core_under_their_meaning() -> None:
-    """The value of each parameter arrives in the setting that has the same meaning.
+    """The value of each parameter reaches the setting with the same meaning.
 
-    No value is a default, so the test finds misplaced ones.
+    All values differ from the defaults, so the test finds misplaced values.
     """
     values = check_all(
         {

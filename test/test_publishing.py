@@ -64,7 +64,10 @@ def session_with(node: Node) -> tuple[Session, Publishing]:
 
 
 def test_a_command_waits_for_no_events_of_publishers() -> None:
-    """No publisher has event handlers, because the executor would spend time on each of them."""
+    """No publisher has event handlers.
+
+    The executor would spend time on each handler, and commands would have to wait.
+    """
     script = (
         "import rclpy\n"
         "from omnibot_driver.node import OmniBotDriver\n"
@@ -84,7 +87,7 @@ def test_a_command_waits_for_no_events_of_publishers() -> None:
 def test_stamps_follow_simulated_time_while_there_is_any(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stamps are in simulated time while it is active, and in system time afterwards."""
+    """Stamps are in simulated time while this is active. Otherwise they are in system time."""
     published: list[bytes] = []
 
     def published_at_s() -> float:
@@ -112,7 +115,7 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 ) -> None:
     """Measurements are published only after the simulated clock has begun.
 
-    Their stamps increase between its steps, too. If the clock jumps back, the stamps follow.
+    Stamps increase even between two steps of the clock. If the clock jumps back, stamps do, too.
     """
     node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
     session, publishing = session_with(node)
@@ -154,9 +157,9 @@ def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
 def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user changes the wheel parameters while the robot stands.
+    """The user changes the parameters for the sizes of the wheels while the robot stands.
 
-    The joint angles do not change.
+    The published joint angles do not change.
     """
     _, publishing = session_with(node)
     published: list[bytes] = []
@@ -173,9 +176,9 @@ def test_joints_do_not_jump_when_the_wheels_are_said_to_be_of_another_size(
 def test_a_state_that_was_passed_through_within_one_read_is_not_latched(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The board pauses and resumes in one read. Another thread publishes the state "paused".
+    """The data of one read shows a pause and then data frames. Another thread publishes "paused".
 
-    The last published state is still the one after the read.
+    The last published state is nevertheless "nominal", the state after the read.
     """
     session, publishing = session_with(node)
     published: list[str] = []

@@ -158,7 +158,10 @@ def test_without_the_library_it_says_what_to_install(
 
 
 def test_a_bag_that_is_damaged_later_ends_with_a_sentence(tmp_path: Path) -> None:
-    """A bag is damaged after it was opened. Reading it raises an error with a message."""
+    """A bag is damaged after the replay has opened it. The next read raises an error.
+
+    The error says that the bag cannot be read any further.
+    """
     recording = open_recording(f"replay://{bag(tmp_path / 'bag', RX)}")
     (tmp_path / "bag" / "metadata.yaml").unlink()
     with pytest.raises(LinkError, match="cannot be read any further"):

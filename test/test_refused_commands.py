@@ -63,9 +63,9 @@ class Sender:
 def test_a_sender_of_refused_commands_does_not_pause(
     refused: Action, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion monitor has stopped the robot, and the sender sends invalid or late commands.
+    """The motion monitor has stopped the robot. The sender then sends invalid or late commands.
 
-    Only silence for the timeout, not these commands, allows motion again.
+    These do not count as silence of the sender, which alone allows motion again.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -79,9 +79,9 @@ def test_a_sender_of_refused_commands_does_not_pause(
 def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a stop by the motion monitor, a stall makes the driver refuse commands.
+    """The motion monitor has stopped the robot. Then a stall makes the driver refuse commands.
 
-    Refused commands are not a pause of their sender.
+    A sender of refused commands does not count as silent.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

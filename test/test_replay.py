@@ -142,15 +142,15 @@ def test_every_replay_is_the_same() -> None:
 
 
 def test_the_pace_makes_no_difference() -> None:
-    """A faster replay has the same events."""
+    """Replays of one recording at different speeds have the same events."""
     tape = Tape(BAD_LINE[:100])
     assert play(replace(tape, speed=5.0)).events == play(tape).events
 
 
 def test_time_passes_as_it_did() -> None:
-    """The recording has a silence of 2 s.
+    """The recording has a silence of 2 s. The state is then ``connecting``, whatever the speed.
 
-    The replay notices it at any speed, and also notices the end.
+    At the end of the recording, the state is ``disconnected``.
     """
     heard = play(Tape(simulated(600, silent=range(200, 400))))
     assert heard.states == [
@@ -181,7 +181,7 @@ def test_stamps_are_times_of_the_recording() -> None:
 
 
 def test_a_recording_can_be_left_before_its_end() -> None:
-    """A replay is closed before its recording begins, or in the middle. Closing does not wait."""
+    """A replay is closed before its recording begins, or in the middle. The close does not wait."""
     for tape in (Tape(BAD_LINE, speed=1e-3), Tape(BAD_LINE, delay_s=3600.0)):
         replay, heard = start(tape)
         if tape.delay_s == 0.0:
@@ -193,9 +193,9 @@ def test_a_recording_can_be_left_before_its_end() -> None:
 
 
 def test_commands_and_requests_go_nowhere_and_hang_nobody() -> None:
-    """A request waits when the recording ends.
+    """A request is pending when the recording ends. Its answer says that the port was lost.
 
-    It is answered, and later requests find the port closed.
+    Later requests are refused, because the port is not open.
     """
     endless = ((EPOCH_NS + n * TICK_NS, data) for n, (_, data) in enumerate(itertools.cycle(TAPE)))
     stop = threading.Event()

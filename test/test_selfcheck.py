@@ -33,7 +33,7 @@ def test_an_adapter_that_keeps_bytes_is_told_of_with_the_remedy(tmp_path: Path) 
 
 
 def test_a_link_leads_to_the_adapter(tmp_path: Path) -> None:
-    """A port may be a link to the adapter, such as /dev/omnibot."""
+    """The port is a symbolic link to an adapter, such as /dev/omnibot. The adapter is found."""
     sysfs = adapter(tmp_path / "sys", "ttyUSB7", "16\n")
     (tmp_path / "ttyUSB7").touch()
     link = tmp_path / "omnibot"
@@ -78,13 +78,16 @@ def test_simulated_time_on_a_port_of_the_real_world_is_told_of(
 
 @pytest.mark.parametrize("prefix", ["", "robot1/", "robot1_", "a/b/"])
 def test_a_prefix_that_ends_with_a_separator_is_left_alone(prefix: str) -> None:
-    """The name of a frame is easy to tell from its prefix."""
+    """A frame prefix is empty or ends with a slash or an underscore. There is no warning."""
     assert selfcheck.prefix_advice(prefix) == ""
 
 
 @pytest.mark.parametrize("prefix", ["robot1", "a/b"])
 def test_a_prefix_without_its_slash_is_told_of_with_the_remedy(prefix: str) -> None:
-    """The warning shows the name of a frame, and what to give instead."""
+    """A frame prefix ends without a slash. The warning shows a resulting name such as robot1odom.
+
+    It also says what to set instead.
+    """
     advice = selfcheck.prefix_advice(prefix)
     assert f"is named {prefix}odom;" in advice
     assert advice.endswith(f"set frame_prefix to {prefix}/")
@@ -101,9 +104,9 @@ def test_a_prefix_without_its_slash_is_told_of_with_the_remedy(prefix: str) -> N
     ],
 )
 def test_simulated_time_that_has_not_begun_is_told_of(port: str, now_ns: int, warned: bool) -> None:
-    """Measurements wait for /clock, which is not published. The driver says so.
+    """The driver warns that measurements wait for /clock, which is not published.
 
-    A recording has its own stamps, so its replay does not wait.
+    There is no warning for a replay, because a recording has its own stamps.
     """
     assert ("nothing publishes /clock" in selfcheck.waiting_advice(port, now_ns)) == warned
 
@@ -133,9 +136,9 @@ def publisher(name: str, kind: str) -> SimpleNamespace:
 
 
 def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
-    """The warning names only publishers of the wrong message type.
+    """Some publishers of cmd_vel use the wrong message type. The warning names only these.
 
-    Each of the two types can be wrong.
+    Depending on a parameter, either type can be the wrong one.
     """
     teleop, nav = publisher("teleop", "Twist"), publisher("nav", "TwistStamped")
     assert selfcheck.type_conflict([teleop], stamped=False) == ""

@@ -101,9 +101,9 @@ def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() 
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command that seems to be sent right after a stall is not fresh.
+    """A command seems to be sent 1 ms after the end of a stall. It is not fresh.
 
-    The clock of a sender is known only to within a transit time.
+    The driver knows the sender's clock only to within a transit time.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
@@ -113,7 +113,7 @@ def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_fro
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
     """A command is sent during a stall and arrives seconds later. It is not fresh.
 
-    Ten seconds after the stall, the detector suspects nothing more.
+    Ten seconds after the stall, all commands are fresh again.
     """
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
@@ -146,9 +146,9 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """The sender's clock is wrong.
+    """The sender's clock is wrong by days. Its commands are not fresh right after a stall.
 
-    Its commands are not fresh right after a stall, and fresh later.
+    A second later, its commands are fresh again.
     """
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)

@@ -184,7 +184,7 @@ def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() 
 
 
 def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> None:
-    """After an outage, reliable transport delivers all commands at once.
+    """After an outage of the network, all commands of the outage arrive at once.
 
     Only the old ones are refused.
     """
@@ -199,7 +199,7 @@ def test_a_burst_of_what_an_outage_had_kept_is_refused_as_far_as_it_is_old() -> 
 def test_two_senders_with_clocks_of_their_own_are_both_heard(
     one_s: float, other_s: float, turns: list[int]
 ) -> None:
-    """The driver accepts commands of two senders whose clocks differ by hours."""
+    """Two senders have clocks that differ by hours. The driver accepts the commands of both."""
     receiver, senders, now_s = Receiver(), (Sender(one_s, sent=1000), Sender(other_s)), 100.0
     for sender in senders:
         receiver.hear(sender, now_s, 0.01)
@@ -219,7 +219,10 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 
 
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
-    """Commands of ``ros2 topic pub --once`` are accepted, even if the sender's clock is behind."""
+    """A sender sends a single command, like ``ros2 topic pub --once``. The driver accepts it.
+
+    Its clock may be behind.
+    """
     receiver = Receiver()
     for number in range(20):
         assert not refused(receiver.hear(Sender(), 100.0 + number, 0.01))
@@ -249,7 +252,8 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
     """A sender's first message is 0.5 s late, so the sender's clock seems to be behind.
 
-    The driver also estimates by the sender's clock, here rightly.
+    For the next message, the driver estimates two send times. The one by the sender's clock is
+    right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -259,9 +263,9 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the driver has only one estimate of the next send time.
+    """After ten messages of a sender, the driver estimates only one send time for each message.
 
-    An offset of the sender's clock has no effect.
+    The offset of the sender's clock has no effect.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

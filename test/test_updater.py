@@ -14,7 +14,7 @@ from omnibot_driver.diagnostics import _through_updater
 
 
 class Wrapper:
-    """The wrapper that the library gives to each task."""
+    """An imitation of the object in which a task of diagnostic_updater writes a status."""
 
     def __init__(self) -> None:
         self.values: dict[str, str] = {}
@@ -27,9 +27,9 @@ class Wrapper:
 
 
 class Updater:
-    """An imitation of the library's updater.
+    """An imitation of diagnostic_updater's ``Updater``.
 
-    It runs its tasks when forced to, and keeps the ``reports``.
+    ``force_update`` runs all tasks, and appends their statuses to ``reports``.
     """
 
     def __init__(self, node: object, period_s: float) -> None:
@@ -51,7 +51,7 @@ class Updater:
 
 
 def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without diagnostic_updater the driver publishes the same message, so it gives no warning."""
+    """Without diagnostic_updater, the driver publishes the diagnostics without a warning."""
     monkeypatch.setitem(sys.modules, "diagnostic_updater", None)
     assert _through_updater(SimpleNamespace(), "/dev/omnibot") is None
 
@@ -59,7 +59,7 @@ def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch)
 def test_with_the_updater_each_status_is_a_task_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Each status becomes one task, which fills in each report.
+    """diagnostic_updater gets one task for each status, which fills in the newest values.
 
     The library sets the period of the reports.
     """

@@ -72,7 +72,10 @@ def opened_session() -> Session:
 def most_calls(
     work: Callable[[bytes, float], object], rest: Callable[[float], None] = lambda _now: None
 ) -> dict[int, float]:
-    """Return the mean number of calls for each kind of tick of a running board."""
+    """Run ``work`` for each tick of a running board, and count its calls of Python functions.
+
+    Return the mean count for each kind of tick. The keys are the lengths of the ticks in bytes.
+    """
     board = SimulatedBoard(BoardSettings(seed=3, running=True))
     counted: dict[int, list[int]] = {}
     for tick in range(SETTLED + TICKS):
