@@ -16,7 +16,7 @@ PACKET: Final = 62
 DRIFT: Final = 1.0002
 """Rate of the adapter's clock, relative to the board's clock.
 
-Within 8 s, the drift makes the packets end at all phases of the board's tick.
+Within 8 s, this difference makes the packets end at all phases of the board's tick.
 """
 
 Handed = tuple[float, bytes]
@@ -26,7 +26,7 @@ Adapter = Callable[[Ticks, Random], Iterator[Handed]]
 
 
 def whole(ticks: Ticks, _random: Random) -> Iterator[Handed]:
-    """Deliver all bytes of a tick at its beginning, which is earlier than any real adapter can."""
+    """Deliver all bytes of a tick at its beginning. No real adapter can deliver them this early."""
     yield from ticks
 
 

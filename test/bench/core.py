@@ -30,7 +30,7 @@ BYTES_PER_S = 1700.0
 CHUNKS = (1, 14, 64, 4096)
 SECONDS = 120.0
 SETTLED = 400
-"""Number of ticks before a measurement begins."""
+"""Number of simulated ticks before a measurement begins, so that the decoder has settled."""
 OTHERS_BYTES = 24 << 20
 """Number of bytes to overwrite before a measurement, so that the caches contain nothing else."""
 FAULTY = "1 byte in 100 lost"
@@ -41,7 +41,7 @@ _IMU, _DELTA, _POSE = (struct.Struct(form).unpack_from for form in (">6h", ">3hB
 
 
 def trust(data: bytes) -> list[Frame]:
-    """Decode without checks, as floor.py does: all bytes that look like a header begin a frame."""
+    """Decode frames without checks: all bytes that look like a header begin a frame."""
     frames: list[Frame] = []
     at, size = 0, len(data) - 15
     while at < size:
@@ -144,9 +144,9 @@ def cold(ticks: int) -> str:
 
 
 def memory(hours: float = 1.0) -> str:
-    """Play a long stream to a session as fast as possible.
+    """Give a session the stream of ``hours`` of driving as fast as possible.
 
-    Return the memory in use as a sentence.
+    Return a sentence about the memory in use.
     """
     session = _session()
     data, now, events = stream(SECONDS), 0.0, 0

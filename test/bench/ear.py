@@ -2,11 +2,11 @@
 
 """A subscriber in its own process. It records the time of each message until stdin is closed.
 
-The arguments are namespaces. The output is a JSON object. By namespace, it has:
+The arguments are namespaces. The output is a JSON object with two arrays for each namespace:
 
 ``heard``: for each Imu, the steady clock's time in s, and the acceleration along x.
 
-``odometries``: for each Odometry, an array with only the time.
+``odometries``: for each Odometry, an array that contains only the time.
 """
 
 import json

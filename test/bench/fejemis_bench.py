@@ -45,8 +45,8 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
     """Run both simulated Teensys in real time; then send a list of delays in s to ``results``.
 
-    Each delay is from the front Teensy's report of an angle to the driver's line for the drive
-    Teensy. The wheel swings, so that successive angles differ.
+    A delay begins when the front Teensy reports an angle. It ends when the drive Teensy receives
+    this angle from the driver. The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()
     drive, _ = masters
@@ -111,7 +111,7 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return how long each angle took, in ms and sorted, while ``busy`` other processes compute."""
+    """Return the delays of all angles in ms, sorted, while ``busy`` other processes compute."""
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)

@@ -40,7 +40,7 @@ class Stage:
 
     ``paths``: names of the terminals.
 
-    ``heard``: by board, its reads of commands as (time, bytes).
+    ``heard``: for each board, the commands that it has read, as (time, bytes).
     """
 
     def __init__(self, boards: int) -> None:

@@ -2,8 +2,8 @@
 
 """The floor for a MART: the smallest program with the same output, without any checks.
 
-``HOST PORT NAMESPACE``: ask for encoder and heading 16 times a second. Publish an Odometry and a
-JointState for each count. Send RM or RMCS for every cmd_vel.
+``HOST PORT NAMESPACE``: query encoder and heading 16 times a second. Publish an Odometry and a
+JointState for each encoder count. Send RM (start) or RMCS (change of speed) for every cmd_vel.
 """
 
 import socket
@@ -39,7 +39,7 @@ class Relay:
         self._units = units
 
     def ask(self) -> None:
-        """Ask for the encoder and for the heading in turn."""
+        """Query the encoder and the heading in turn."""
         while True:
             for word in (b"ENC", b"RMRA"):
                 self._socket.send(word)

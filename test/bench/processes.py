@@ -47,7 +47,7 @@ class Program:
         return self.process.stdout.readline()
 
     def result(self) -> Any:
-        """Close the process's input, and return the value that it then prints as JSON."""
+        """Close the process's input; return the value that the process then prints as JSON."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return json.loads(self.line())

@@ -36,7 +36,7 @@ class Figure:
 
     @property
     def row(self) -> str:
-        """Return the row of the table for this measurement."""
+        """Return the row of the Markdown table for this measurement."""
         low, high = min(self._ratios), max(self._ratios)
         if len(self._ratios) > 3:
             low, _, high = quantiles(self._ratios, n=4, method="inclusive")
@@ -51,7 +51,7 @@ class Figure:
 
 
 def table(figures: Sequence[Figure]) -> list[str]:
-    """Return the complete table."""
+    """Return the lines of a Markdown table with a row for each measurement."""
     return [
         "| figure | ours | floor | ratio (median) | quartiles | goal |",
         "|---" * 6 + "|",
@@ -68,14 +68,11 @@ def alternate(
     times: int,
     goal: float | None = None,
 ) -> Figure:
-    """Measure the driver, then the floor. Do this ``times`` times."""
+    """Measure the driver, then the floor, and repeat both ``times`` times; return the results."""
     pairs = [(ours(), floor()) for _ in range(times)]
     return Figure(name, unit, [pair[0] for pair in pairs], [pair[1] for pair in pairs], goal)
 
 
 def short(value: float) -> str:
-    """Return a number as text with three digits.
-
-    From 100 on, all digits before the point are shown.
-    """
+    """Return a number as text with three significant digits, or as a whole number from 100 on."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"

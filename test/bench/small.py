@@ -31,7 +31,7 @@ STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
 """Time in s to wait for a Stop after the last command.
 
-It is a fixed time, so that it is the same for all shares.
+The measurement waits for this fixed time, so that all shares of a core have the same duration.
 """
 
 
@@ -59,9 +59,9 @@ class Group:
 
     @contextmanager
     def joined(self) -> Iterator[None]:
-        """Move this process into the group during the context.
+        """Move this process into the group within a ``with`` block.
 
-        Processes that this process starts join the group, too.
+        Processes that are started in the block belong to the group, too.
         """
         self._members.write_text(str(os.getpid()))
         try:
@@ -70,7 +70,7 @@ class Group:
             self._root.write_text(str(os.getpid()))
 
     def give(self, part: float) -> None:
-        """Give the group this share of one core, where 1 is the whole core."""
+        """Limit the group to the share ``part`` of one core, where 1 is the whole core."""
         run_us, period_us = round(1e6 * RUN_S), round(1e6 * RUN_S / part)
         if self._is_first:
             self._write("cpu.cfs_quota_us", -1)
@@ -86,7 +86,9 @@ class Group:
 def table(parts: Sequence[float] = PARTS, seconds: float = MEASURED_S) -> list[str]:
     """Return the rows of a table: driver and floor for each share of one core.
 
-    ``seconds``: for each share. Without cgroups, return one sentence.
+    ``seconds``: duration of the measurement for each share.
+
+    If cgroups cannot be used, return a sentence that gives the reason.
     """
     try:
         return _table(parts, seconds)

@@ -28,9 +28,9 @@ IMU_BYTES = 14
 DELTA_BYTES = 9
 POSE_BYTES = 15
 TURN = 4000
-"""Largest number in IMU frames. The numbers count up from 0 to TURN, and down again."""
+"""Largest number in IMU frames. The numbers count up from 0 to ``TURN``, and down again."""
 NOISE = 997
-"""Number of different noise values. After these, the noise repeats."""
+"""Number of ticks after which the random noise of the gyro and of the acceleration repeats."""
 
 
 _IMU, _DELTA, _POSE = (struct.Struct(form) for form in (">BB6h", ">BB3hB", ">BB3fB"))
@@ -42,7 +42,10 @@ def number_of(tick: int) -> int:
 
 
 def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
-    """Return what a board sends in this tick: an IMU frame, often a delta, sometimes a pose."""
+    """Return what a board sends in this tick.
+
+    It is an IMU frame, followed by a delta in every fourth tick and a pose in every twentieth.
+    """
     u, v, w, x, y = noise[tick % NOISE]
     data = _IMU.pack(0xFF, 0xFA, number_of(tick), 30 * x, 16384 + 8 * y, u, v, w)
     if tick % 4 == 3:
@@ -53,7 +56,10 @@ def tick_bytes(tick: int, noise: list[list[int]]) -> bytes:
 
 
 def imu_ends() -> Iterator[int]:
-    """Yield for each tick how many bytes the board has sent by the end of its IMU frame."""
+    """Yield for each tick the number of bytes that a board has sent up to the end of the IMU frame.
+
+    The number counts from the first tick.
+    """
     begun = 0
     for tick in count():
         yield begun + IMU_BYTES
@@ -65,9 +71,9 @@ class Stage:
 
     ``paths``: the names of the terminals, one for each board.
 
-    ``said[n]``: by tick, when board n delivered the IMU frame's last byte.
+    ``said[n]``: for each tick, the time at which board n delivered the last byte of the IMU frame.
 
-    ``heard[n]``: board n's reads of commands, as (time, bytes).
+    ``heard[n]``: the commands that board n has read, as (time, bytes).
     """
 
     def __init__(self, boards: int, adapter: Adapter = pieces) -> None:

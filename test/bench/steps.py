@@ -74,9 +74,9 @@ class Relay:
                 self._joints.publish(self._make.joint_state(self._wheels, stamp_ns))
 
     def trust(self, data: bytes) -> None:
-        """Publish all that looks like a frame, without checks.
+        """Publish a message for all bytes that look like a frame, without checks.
 
-        Only the first word of a frame is read.
+        Only the first number in a frame is decoded.
         """
         estimates: Estimates = []
         at, data = 0, self._begun + data

@@ -43,7 +43,8 @@ GOALS: Final[dict[str, tuple[float | None, ...]]] = {
 }
 """Largest allowed ratios of driver to floor, for each adapter. None: unlimited.
 
-Latency (median, 99th percentile), processor time, latency of cmd_vel.
+The ratios are those of the median and the 99th percentile of the latency, of the processor time,
+and of the latency of cmd_vel.
 """
 MPS2_PER_COUNT = 9.80665 / 16384
 

@@ -2,7 +2,7 @@
 
 """Write the kernel's number and the name of each thread to the file in the variable NAMES.
 
-The driver's process runs this before the driver starts.
+The driver's process imports this module before the driver starts.
 """
 
 import os

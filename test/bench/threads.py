@@ -13,7 +13,7 @@ from stage import Stage
 from system import SETTLING_S
 
 LEAST_MS: Final = 0.05
-"""Processor time in ms per second. A thread with less than that has no row of its own."""
+"""Least processor time, in ms per second, with which a thread has its own row in the table."""
 
 Counts = dict[str, tuple[float, int]]
 """For each name of a thread, the processor time in s and the number of wake-ups."""

@@ -30,12 +30,12 @@ def cut(_data: bytes) -> bytes:
 
 
 def losing(rate: float, random: Random) -> Damage:
-    """Return a damage that loses single bytes, each with the probability ``rate``."""
+    """Return a function that loses single bytes of the line, each with the probability ``rate``."""
     return FaultyLine(LineFaults(lose=rate), random.getrandbits(32)).carry
 
 
 def losing_bursts(rate: float, random: Random) -> Damage:
-    """Return a damage that loses 1 to 200 bytes in a row.
+    """Return a function that loses 1 to 200 bytes of the line in a row.
 
     ``rate``: the probability that a loss begins at a byte.
     """
@@ -43,7 +43,7 @@ def losing_bursts(rate: float, random: Random) -> Damage:
 
 
 def gaining(rate: float, random: Random) -> Damage:
-    """Return a damage that inserts bytes of any value.
+    """Return a function that inserts bytes of any value into the line.
 
     ``rate``: the probability that a byte is inserted at a place.
     """
@@ -60,17 +60,17 @@ def gaining(rate: float, random: Random) -> Damage:
 
 
 def noise(random: Random) -> Damage:
-    """Return a damage that replaces all bytes by random ones, as many as the line can carry.
+    """Return a function that replaces all bytes by random ones, as a wrong baud rate does.
 
-    For example, a wrong baud rate does so.
+    It returns as many bytes as the line can carry in a tick.
     """
     return lambda _data: random.randbytes(BYTES_PER_TICK)
 
 
 def late(ticks: int) -> Damage:
-    """Return a damage that keeps all bytes for this number of ticks, as some adapters do.
+    """Return a function that collects bytes for this number of ticks, as some adapters do.
 
-    Then it delivers all of them at once.
+    The function then delivers all collected bytes at once.
     """
     held: list[bytes] = []
 
@@ -86,9 +86,9 @@ def late(ticks: int) -> Damage:
 
 
 class BreakableLine:
-    """A board behind a damaged line.
+    """A simulated board behind a line that can be damaged.
 
-    ``sent``: what the board sent, before damage.
+    ``sent``: the frames that the board sent, without the damage.
 
     ``driven_at``: the last tick in which the motors had a command to turn.
     """

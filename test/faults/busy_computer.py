@@ -22,20 +22,20 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""If the simulated board pauses for this time or longer, in s, the driver may blame the cable."""
+"""Pause of the simulated board, in s, from which on the driver may warn about the cable."""
 TRANSIT: Final = 200
 """Number of frames that are possibly still on their way when the comparison of messages begins."""
 REACH: Final = 200
-"""A message is compared with this number of frames after the previous message's frame.
+"""Number of frames, after that of the previous message, among which a message's frame is searched.
 
-The message is wrong if none of these is equal.
+If none of these frames is equal to the message, the message is wrong.
 """
 
 
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
-    ``silent_s``: its longest pause so far, in s.
+    ``silent_s``: the longest pause of the board so far, in s.
     """
 
     silent_s = 0.0
@@ -53,7 +53,7 @@ class PiecesTerminal(Terminal):
 
 
 class PiecesRig(Rig):
-    """A rig whose board is behind a ``PiecesTerminal``."""
+    """A rig whose terminal delivers a few bytes at a time."""
 
     def _make_terminal(self) -> Terminal:
         return PiecesTerminal(self.line, self.port)  # type: ignore[arg-type]
@@ -65,7 +65,10 @@ def _known(keys: Iterable[Key | None]) -> list[Key]:
 
 @contextmanager
 def busy_loops() -> Iterator[None]:
-    """Run busy loops as processes, so that the driver gets only a share of the computing time."""
+    """Run busy loops in other processes, so that the driver gets only a part of the computing time.
+
+    The loops end with the ``with`` block.
+    """
     loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(LOOPS)]
     try:
         yield
@@ -79,7 +82,8 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages were never sent, and how many sent frames have no message.
 
-    Equal frames are frequent, so the best of several starts counts.
+    The first message often equals several frames. The comparison begins at each of these frames,
+    and the result with the fewest errors is returned.
     """
     starts = [n for n, key in enumerate(sent) if same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

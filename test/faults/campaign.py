@@ -39,8 +39,7 @@ ROUNDS: Final = 2
 WALKS, GOAL_WALKS, STEPS = 4, 2, 30
 FUZZ: Final = 10_000
 LOSSES: Final = 30
-"""Number of drivers for each group of stops in ``LIVES``. The line from the driver to the board
-loses bytes."""
+"""Number of drivers that are tested with each group of stops on a line that loses bytes."""
 LOSSES_AT_ONCE: Final = 10
 SOAK_STEPS: Final = 30
 BUSY: Final = ("busy_computer", ())
@@ -48,7 +47,7 @@ BUSY: Final = ("busy_computer", ())
 
 @dataclass(slots=True)
 class Row:
-    """One row of the table: the result of all runs of one case."""
+    """One row of the campaign's table: the result of all runs of one fault."""
 
     name: str
     tried: int = 0
@@ -62,7 +61,7 @@ class Row:
 
 @dataclass(slots=True)
 class Outcome:
-    """Result of some pieces of the campaign.
+    """Result of some pieces (independent parts) of the campaign.
 
     ``published``: number of messages that were compared with what the board sent.
 
@@ -75,7 +74,7 @@ class Outcome:
     wrong: int = 0
 
     def add(self, more: "Outcome") -> None:
-        """Add another result. Rows with the same name become one row."""
+        """Add another result. Rows with the same name are combined into one row."""
         mine = {row.name: row for row in self.rows}
         for row in more.rows:
             if (same := mine.get(row.name)) is None:
@@ -117,7 +116,7 @@ class Campaign(Outcome):
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
-        """Run a case once and collect its complaints.
+        """Run a case once. Add its result to ``row``, and collect its complaints.
 
         ``again``: whether the robot must obey a fresh command afterwards.
         """
@@ -202,7 +201,9 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test stops on a line that loses bytes to the board, until the last stop has been judged.
 
-        ``number_of_life``: index in LIVES. ``numbers``: one per driver.
+        ``number_of_life``: index of the group of stops that each driver performs.
+
+        ``numbers``: one number for each driver, which selects the lost bytes.
         """
         life = LIVES[number_of_life]
         rows = {name: self.row(f"1 or 5 bytes in 100 lost to the board: {name}") for name in life}
@@ -270,7 +271,7 @@ Piece = tuple[str, tuple[Any, ...]]
 def losses() -> list[Piece]:
     """Return the pieces of the campaign that lose bytes on the line from the driver to the board.
 
-    Each piece runs ``LOSSES_AT_ONCE`` drivers, one after the other.
+    Each piece runs ten drivers, one after the other.
     """
     starts = range(0, LOSSES, LOSSES_AT_ONCE)
     return [
@@ -281,9 +282,9 @@ def losses() -> list[Piece]:
 
 
 def pieces() -> list[Piece]:
-    """Return the pieces in the order of the table.
+    """Return all pieces of the campaign except the busy computer, in the order of the table.
 
-    The busy computer is not among them: it runs alone.
+    The test on a busy computer must run alone.
     """
     return [
         ("faults_of_the_line", ()),
@@ -313,9 +314,9 @@ def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
 
 
 def side_by_side(board: str, wanted: list[Piece], processes: int) -> Outcome:
-    """Run those of the pieces that apply to the board, in parallel.
+    """Run in parallel those pieces in ``wanted`` that apply to the board.
 
-    Return the sum of their results in the order of ``wanted``.
+    Return their results as one ``Outcome``, with rows in the order of ``wanted``.
     """
     total, without = Outcome(), load(board).without
     wanted = [piece for piece in wanted if without.isdisjoint((piece[0], *map(str, piece[1])))]

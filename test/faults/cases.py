@@ -2,7 +2,7 @@
 
 """Scripted faults: each occurs while a commander drives the robot, and the robot must then stop.
 
-A case is a function of a rig, whose robot is at rest before and after it.
+A case is a function whose argument is a rig. The robot is at rest before and after the case.
 """
 
 import signal
@@ -25,11 +25,11 @@ Case = Callable[[R], object]
 
 NONSENSE: Final = (float("nan"), float("inf"), -float("inf"))
 HANGS_S: Final = 1.0
-"""Time in s within which the robot must stop if the driver hangs. The guard stops it."""
+"""Time in s within which the guard must stop the robot if the driver hangs."""
 DAMAGED_S: Final = 1.1
 """Time in s within which a robot on a damaged line must stop after the last command.
 
-A grace time is added.
+The rig adds its grace time.
 """
 UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
 """Pattern of the log lines that a driver should print if the board does not receive Stop."""
@@ -99,7 +99,7 @@ def flood_of_commands(rig: Rig) -> None:
 def damaged(to_board: Damage | None, from_board: Damage | None, seconds: float, rig: Rig) -> None:
     """Damage the bytes on the line while the robot drives for ``seconds``.
 
-    The damage outlasts the commands until the robot must be at rest.
+    The damage continues after the last command, until the robot must be at rest.
     """
     rig.drive()
     rig.line.to_board = to_board or rig.line.to_board

@@ -13,7 +13,7 @@ from std_srvs.srv import SetBool
 
 DRIVE_HZ: Final = 20.0
 FAR_M: Final = 10.0
-"""Distance of a goal for each commanded m/s, in m. It is so far that no test reaches it."""
+"""Distance of a goal, in m for each commanded m/s. No test drives far enough to reach the goal."""
 
 
 class Hand(Protocol):
@@ -45,7 +45,7 @@ class Stick:
             self._thread.start()
 
     def leave(self) -> None:
-        """Stop publishing. When this returns, the last command has been published."""
+        """Stop publishing. No command is published after the return of this method."""
         if self._thread is not None:
             self._left.set()
             self._thread.join()
@@ -79,6 +79,6 @@ class Navigator:
         self._goals.publish(goal)
 
     def leave(self) -> None:
-        """Discard the goal, which has no timeout. For this, latch and release the e-stop."""
+        """Latch and release the e-stop, to discard the goal. A goal has no timeout."""
         for data in (True, False):
             self._probe.call(SetBool, "estop", data=data)

@@ -20,8 +20,9 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return time limits that even a busy machine keeps.
+    """Return time limits of the rig, in s, that the tests keep even on a busy machine.
 
-    ``make faults`` uses 0.1 s and 2 s instead.
+    The limits are the grace time for a stop and the time for the driver's end. ``make faults`` uses
+    0.1 s and 2 s.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0}

@@ -58,9 +58,9 @@ class Ending:
 
     ``allowed_s``: how long the robot may still drive.
 
-    ``late_s``: additional time for the process.
+    ``late_s``: additional time within which the driver's process must end, in s.
 
-    ``full``: whether old commands fill the port.
+    ``full``: whether the driver's port is full of old commands.
 
     ``read``: whether the driver ends only when it next reads data.
     """
@@ -76,7 +76,7 @@ class Ending:
     def __call__(self, rig: Rig) -> None:
         """End the driver while the robot drives.
 
-        Check the robot, the exit code and the last bytes.
+        Check that the robot stops, the exit code, and that the board received Stop last.
         """
         rig.drive()
         self.end(rig)
@@ -90,7 +90,7 @@ class Ending:
 
 
 def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Return an ending that sends these signals to the driver, one after the other."""
+    """Return a function that sends these signals to the driver, one after the other."""
 
     def end(rig: Rig) -> None:
         for number in numbers:
@@ -100,9 +100,9 @@ def by_signals(*numbers: signal.Signals) -> Callable[[Rig], None]:
 
 
 def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
-    """Return an ending that signals the driver's process group, as a shell or a launcher does.
+    """Return a function that signals the driver's process group, as a shell or a launcher does.
 
-    The signals follow without pauses.
+    The signals follow each other without pauses.
     """
 
     def end(rig: Rig) -> None:
@@ -115,7 +115,7 @@ def by_signals_to_its_group(*numbers: signal.Signals) -> Callable[[Rig], None]:
 def by_topic(rig: Rig) -> None:
     """Publish on the topic ``estop``, whose callback ends the driver.
 
-    The Python code of ``Ending.before`` has replaced the usual callback.
+    The code in ``Ending.before`` has replaced the driver's usual callback of this topic.
     """
     publisher = rig.probe.publisher(Bool, "estop")
     publisher.publish(Bool(data=True))

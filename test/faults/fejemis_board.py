@@ -17,14 +17,16 @@ from omnibot_driver.simulator.common.board import Packet
 from omnibot_driver.simulator.fejemis import CHANNELS, FejemisSettings, SimulatedFejemis
 
 TICKS: Final = 5
-"""Ticks of the simulated boards in one tick of the rig."""
+"""Number of ticks of the simulated boards in one tick of the campaign."""
 SILENCE_S: Final = 1.6
 ANGLE_S: Final = 0.2
 MOTION: Final = re.compile(rb"^(?:;\d\d)?((?:rc|stop|start)[^\n]*?) *(\n)", re.MULTILINE)
 
 
 class Pair:
-    """Both Teensys, with the interface of a single board. Its ticks are those of the rig.
+    """Both simulated Teensys, with the interface of a single board.
+
+    ``tick``: number of the campaign's ticks so far.
 
     ``received``: motion commands to the drive board, without checksums and padding.
     """
@@ -66,7 +68,7 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 
 
 def half_restarts(half: str) -> Any:
-    """Make a case in which one Teensy restarts.
+    """Make a case in which one Teensy (``half``) restarts.
 
     The commander leaves before the restart, because a restarted Teensy obeys at once.
     """
@@ -83,9 +85,11 @@ def half_restarts(half: str) -> Any:
 
 
 def half_is(half: str, what: str, allowed_s: float) -> Any:
-    """Make a case in which one Teensy has the fault ``what``. Meanwhile, commands have no effect.
+    """Make a case in which one Teensy (``half``) has the fault ``what`` while the robot drives.
 
-    ``allowed_s``: longest further drive, in s. 0: no limit.
+    Commands must have no effect during the fault.
+
+    ``allowed_s``: time in s within which the robot must stop. 0: no limit.
     """
 
     def case(rig: Rig) -> None:
@@ -123,7 +127,7 @@ CASES: Final = {
 
 
 def cases(seed: int) -> dict[str, Case[Rig]]:
-    """Return the cases of a serial line and the cases of each Teensy. The keys are their names."""
+    """Return the cases of any serial line and those of the Teensys. The keys are their names."""
     return {**survivable(seed), **CASES}
 
 

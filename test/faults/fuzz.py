@@ -19,7 +19,7 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""The least share of readings that the driver must publish during random input and 2 s after."""
+"""Least share of the readings that the driver must publish during random input and in 2 s after."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
@@ -53,7 +53,7 @@ def pose(random: Random) -> PoseStamped:
 
 
 def no_message(random: Random) -> bytes:
-    """Draw random bytes in place of a serialized message. By chance they may be a valid message."""
+    """Draw random bytes in place of a serialized message. They may happen to be a valid message."""
     return CDR_LITTLE_ENDIAN + random.randbytes(random.randrange(64))
 
 

@@ -24,13 +24,13 @@ ESTOPPED_S: Final = 0.3 - GRACE_S
 ENDED_S: Final = 0.5 - GRACE_S
 RATES: Final = (1e-2, 5e-2)
 GUARD_S: Final = 1.5
-"""Additional time in s for a stop by the guard, which repeats Stop after the driver's end."""
+"""Additional time in s for the guard, which repeats Stop after the end of the driver."""
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
-    """Return a rig with a new driver. Its line is still undamaged.
+    """Return a rig with a new driver and a still undamaged line.
 
-    ``number``: selects the settings of the board, for example its receiver.
+    ``number``: selects the settings of the board, for example how its receiver finds frames.
     """
     return Rig(folder, kind, settings=kind.lossy(number), **more)
 

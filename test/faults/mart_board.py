@@ -2,7 +2,8 @@
 
 """The MART controller in the fault campaign: datagrams on request, and blocking motions.
 
-The names of some cases say that the network is worse than the driver assumes.
+Some networks are worse than the driver assumes. The names of these cases begin with "beyond what
+is assumed".
 """
 
 import socket
@@ -34,7 +35,10 @@ BLIND_S: Final = 2.0
 The time of slow exchanges is included.
 """
 NETWORK_S: Final = 90.0
-"""Longest wait for a start on a bad network, in s. The driver must first see that the IMU works."""
+"""Longest time in s until a robot on a bad network begins to drive.
+
+The driver must first verify that the IMU works.
+"""
 STRAY_S: Final = 2.5
 """Longest time in s until the driver must stop a robot that another program drives."""
 
@@ -52,9 +56,9 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty, so that the last bytes are not compared with a stop.
+        """Always empty, so that the last bytes from the driver are not compared with a stop.
 
-        After its last stop, the driver still polls.
+        A driver of a MART still sends queries after its last stop.
         """
         return b""
 
@@ -74,7 +78,7 @@ class MartLine:
         self.network(NetworkFaults())
 
     def network(self, faults: NetworkFaults) -> None:
-        """Give the network these faults from now on."""
+        """Simulate these faults of the network from now on."""
         self._paths = [FaultyNetwork(faults, f"{self.board.tick} {n}") for n in (0, 1)]
 
     @property
@@ -116,7 +120,10 @@ def line_of(rig: Rig) -> Any:
 
 
 def on_a_network(faults: NetworkFaults, allowed_s: float, rig: Rig) -> None:
-    """Stop publishing while the robot drives. A bad network may delay the stop by ``allowed_s``."""
+    """Stop publishing commands while the robot drives on a bad network with these faults.
+
+    The network may delay the stop by ``allowed_s``.
+    """
     line_of(rig).network(faults)
     for twist in ((0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)):
         rig.hand.hold(twist[0], 0.0, twist[1])
@@ -191,9 +198,9 @@ def another_client(said: bytes, rig: Rig) -> None:
 
 
 def imu_dies(rig: Rig) -> None:
-    """Let the IMU die while the robot drives by the command RM.
+    """Let the IMU fail while the robot drives by the command RM, which starts both motors.
 
-    The stop then hangs the server, which is restarted.
+    The robot must stop. The stop makes the controller's server hang, so the case restarts it.
     """
     rig.drive()
     rig.wait_ticks(100)

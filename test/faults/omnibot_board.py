@@ -46,9 +46,9 @@ def never_sent(
 
 
 def lossy(number: int) -> BoardSettings:
-    """Return settings for a line that loses bytes.
+    """Return settings of a board behind a line that loses bytes.
 
-    Each number selects another receiver of the board.
+    ``number``: selects how the board finds frames, and whether it obeys an emergency stop.
     """
     receiver = RECEIVERS[number % len(RECEIVERS)]
     return BoardSettings(receiver=receiver, obeys_estop=number // len(RECEIVERS) % 2 == 0)

@@ -29,13 +29,15 @@ TIMEOUT_S: Final = 0.5
 """The driver's ``cmd_vel_timeout``, in s."""
 GRACE_S: Final = 0.1
 REST_TICKS: Final = round(1.0 / TICK_S)
-"""A robot whose motors are off for this number of ticks is at rest for good."""
+"""Number of ticks for which the motors must be off until a robot is regarded as at rest."""
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
-"""``NEW_VARIANCE``: largest variance of x just after a reset of odometry, in m².
+"""Limits for the check of the odometry.
 
-``GAP_MPS2``: assumed acceleration in a gap of data, in m/s².
+``NEW_VARIANCE``: largest variance of x just after a reset of odometry, in m².
+
+``GAP_MPS2``: largest acceleration in a gap of data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
 """If one byte in 100 is lost, at most one published message in this number may be wrong."""
@@ -66,13 +68,13 @@ class Findings:
 
 
 class Rig:
-    """Context manager of a driver and its board, at a symbolic link as udev makes it.
+    """Context manager of a driver and its simulated board, whose port is a symbolic link.
 
     ``before``: Python code that runs in the driver's process before the driver.
 
-    ``grace_s``: additional time for the robot to rest.
+    ``grace_s``: time that is added to each time limit of a stop.
 
-    ``ends_within_s``: longest time for a driver's end.
+    ``ends_within_s``: time within which the driver must end.
 
     ``parameters``: further parameters of the driver.
     """
@@ -156,7 +158,7 @@ class Rig:
             self._terminal, self._unplugged_at_s = None, time.monotonic()
 
     def plug(self) -> None:
-        """Make a new terminal, with another name, behind the same link."""
+        """Make a new terminal. It has another name, but the same symbolic link."""
         if self._unplugged_at_s is not None:
             for _ in range(round((time.monotonic() - self._unplugged_at_s) / TICK_S)):
                 self.line.advance()
@@ -195,9 +197,9 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect the motors to be off soon after ``since_tick``, and then for ``REST_TICKS``.
+        """Expect the motors to be off soon after ``since_tick``, and to stay off for 1 s.
 
-        ``allowed_s``: longest time until then, without the grace time.
+        ``allowed_s``: longest time from ``since_tick`` to rest, without the grace time.
         """
         allowed = since_tick + round(allowed_s / TICK_S)
         latest = allowed + round(self._grace_s / TICK_S)

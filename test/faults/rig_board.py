@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the fault campaign must know of each kind of board.
+"""The properties of a kind of board that the fault campaign needs.
 
 The values are in ``<board>_board.py``.
 """
@@ -18,7 +18,7 @@ Sent = Callable[[Any], list[bytes]]
 class RigBoard:
     """A kind of board in the campaign.
 
-    ``ports``: takes the terminal's link. Returns the parameters of the board's ports.
+    ``ports``: returns the driver's port parameters for the symbolic link of the board.
 
     ``old_command``: the bytes of a motion command.
 
@@ -30,9 +30,9 @@ class RigBoard:
 
     ``off_within_s``: longest time from a stop until the motors are off.
 
-    ``old_bytes_s``: time to receive all old commands from a full port.
+    ``old_bytes_s``: time that the board needs to receive all old commands from a full port.
 
-    ``ends_later_s``: additional time for the end of the driver.
+    ``ends_later_s``: additional time within which the driver must end.
 
     ``deaf_s``: longest time for which the board may ignore its input.
 
@@ -46,7 +46,7 @@ class RigBoard:
 
     ``lossy``: returns the settings of the n-th board behind a lossy line.
 
-    ``line``, ``serve``: None means a breakable line of bytes, on a terminal.
+    ``line``, ``serve``: make the board's line and its server. None: a serial line on a terminal.
 
     ``cases``: returns the faults of the n-th round. None: those of a serial line.
 

@@ -16,9 +16,11 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive while the adapter holds back the driver's data. Later, all of it arrives at once.
+    """Drive while the adapter holds back the driver's data. Later, all data arrives at once.
 
-    ``seconds``: time with commands; 1 s without follows. ``mute``: whether the board's data is cut.
+    ``seconds``: time with commands. Then the commands stop, and the data is held for 1 s more.
+
+    ``mute``: whether the board's data is cut meanwhile.
     """
     rig.drive()
     rig.terminal.deaf = True

@@ -17,7 +17,10 @@ LEFT_OUT = {
     "the kernel's buffer is full, and the board silent",
     "TwistStamped where Twist is expected",
 }
-"""Cases that are similar to others and are not tested here. ``make faults`` runs all cases."""
+"""Cases that are not tested here, because they are similar to others.
+
+``make faults`` runs all cases.
+"""
 CASES = {name: case for name, case in survivable(seed=0).items() if name not in LEFT_OUT}
 
 

@@ -22,7 +22,10 @@ SOME = (
     "SIGKILL, the port full",
     "a segmentation fault",
 )
-"""The endings that are tested here. test_driver_endings and test_driver_guard test others."""
+"""Names of the endings that this module tests.
+
+test_driver_endings and test_driver_guard test other endings.
+"""
 
 
 @pytest.mark.parametrize("ending", [ENDINGS[name] for name in SOME], ids=SOME)

@@ -19,9 +19,9 @@ SOME_GOALS = (
     "a goal, and e-stop and release",
     "a goal, and the driver hangs and goes on",
 )
-"""The cases that run here. test_position_control tests others without a port.
+"""Names of the cases that this module tests. ``make faults`` runs all cases.
 
-``make faults`` runs all cases.
+test_position_control tests other cases without a real port.
 """
 
 

@@ -2,8 +2,8 @@
 
 """Faults in random order, several of them at the same time, under random commands.
 
-Every few steps the commander leaves. Only a loss of bytes to the board continues. The robot must
-rest, and then obey a fresh command.
+Every few steps, the commands and the faults end, except a loss of bytes to the board. The robot
+must come to rest, and then obey a fresh command.
 """
 
 from collections.abc import Callable
@@ -19,7 +19,8 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-A driver without data must see the motion first.
+The time is longer than the command timeout, because a driver that had no data must first detect
+the motion.
 """
 
 

@@ -32,14 +32,17 @@ class Bound:
     chunkers: tuple[str, ...] = tuple(CHUNKINGS)
 
     def one_wrong_in(self, chunker: str) -> int | None:
-        """Return N of the limit "at most one wrong frame in N". None means no wrong frame."""
+        """Return the number N in "at most one decoded frame in N may be wrong".
+
+        None means that no frame may be wrong.
+        """
         visible = chunker in GAPS_VISIBLE
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden
 
     def share(self, chunker: str) -> float:
         """Return the least share of the intact frames that must be decoded.
 
-        It is smaller if adapter and reader are both late.
+        The share is smaller with chunkings in which adapter and reader are both late.
         """
         return min(self.delivered, 0.999) if chunker in BUSY_LOOPS else self.delivered
 

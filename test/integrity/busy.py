@@ -77,9 +77,9 @@ def read(
     most: Callable[[], int],
     delay_s: Callable[[Random, float], float] = delay_s,
 ) -> Chunks:
-    """Return the chunks of a late reader.
+    """Return the chunks that a late reader makes of the bytes that arrive in ``pieces``.
 
-    One read takes at most ``most()`` of the waiting bytes.
+    One read returns at most ``most()`` of the waiting bytes.
     """
     ends, times = zip(*pieces, strict=True)
     chunks: Chunks = []
@@ -96,9 +96,9 @@ def read(
 
 
 def few_bytes_straddling(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of 1 to 8 bytes, each when its last byte arrives.
+    """Deliver pieces of 1 to 8 bytes. Each piece is delivered when its last byte arrives.
 
-    A piece may contain a pause.
+    A piece may contain a pause of the line.
     """
     chunks, at = [], 0
     while at < len(received.times_s):
@@ -113,7 +113,7 @@ def all_at_once(pieces: Chunker) -> Chunker:
 
 
 def in_parts(received: Received, random: Random) -> Chunks:
-    """Deliver single bytes. A late reader reads 1 to 8 of those that have arrived."""
+    """Deliver single bytes. A late reader reads 1 to 8 of the bytes that have arrived."""
     pieces = CHUNKERS["single bytes"](received, random)
     return read(pieces, random, lambda: random.randint(1, 8))
 

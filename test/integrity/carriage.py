@@ -107,7 +107,7 @@ def receive(truth: Truth, fault: Fault, random: Random) -> Received:
 
 
 Chunks = list[tuple[int, float]]
-"""The end of each chunk, and the time in s at which the host gets the chunk."""
+"""For each chunk, the index after its last byte, and the time in s of its arrival at the host."""
 Chunker = Callable[[Received, Random], Chunks]
 
 

@@ -4,8 +4,8 @@
 
     PYTHONPATH=test/core .venv/bin/python test/integrity/detection_times.py
 
-A reaction begins when the velocity is 0.05 m/s or 0.15 rad/s beyond rest or the command. The
-reaction ends with Stop.
+A reaction time begins when the velocity differs from the command by 0.05 m/s or 0.15 rad/s. It
+ends when the driver sends Stop.
 """
 
 from collections.abc import Callable
@@ -29,9 +29,10 @@ PERIODS_S = 0.04, 0.1
 
 
 def robot(**settings: object) -> Callable[[float], Bench]:
-    """Return a function that makes a bench with a resting robot of these settings.
+    """Return a function that makes a test bench: a driver's session and a resting robot.
 
-    The function's argument is the period of the displacements, in s.
+    ``settings``: settings of the robot. The function's argument is the period of the displacements,
+    in s.
     """
     return lambda period_s: started(
         BoardSettings(running=True, delta_period_s=period_s, **settings)  # type: ignore[arg-type]
@@ -39,7 +40,7 @@ def robot(**settings: object) -> Callable[[float], Bench]:
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Force ``motion`` on a robot that obeys ``command``.
+    """Make a robot that obeys ``command`` move with the velocity ``motion`` instead.
 
     Return the time in s until the driver sends Stop.
     """
@@ -64,9 +65,9 @@ def row(
     time_s: Callable[[Bench], float],
     make: Callable[[float], Bench],
 ) -> None:
-    """Print a row: the shortest and the longest reaction time.
+    """Print a row of the table: the shortest and the longest reaction time.
 
-    There is one trial for each tick between two displacements at which the motion can begin.
+    The motion begins at each possible tick between two displacements, in one trial each.
     """
     shown = []
     for period_s in PERIODS_S:

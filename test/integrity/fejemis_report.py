@@ -28,27 +28,30 @@ from omnibot_driver.parameters import session_settings
 from omnibot_driver.simulator.fejemis import FejemisSettings, Firmware, SimulatedFejemis
 
 TICKS: Final = 5
-"""Ticks of the simulated boards for each read."""
+"""Number of ticks of the simulated boards between two reads."""
 READ_S: Final = 0.01
 SETTLED_S: Final = 3.0
 STEER_EVERY_S: Final = 1.0
 SUMS: Final = (True, False)
 BOUNDS: Final = {"1 byte in 1,000 lost": (0.9, 0), "1 byte in 100 lost": (0.5, 10_000)}
-"""Limits with checksums, by fault: the least share of values, and N.
+"""For each fault, two limits on lines with checksums.
 
-At most one value in N may be wrong. N = 0: none.
+They are the least share of the values that must be published, and N: at most one value in N may be
+wrong. N = 0 means that no value may be wrong.
 """
 ASTRAY_M: Final = 0.02
 
 Stream = list[dict[int, bytes]]
-"""The bytes of each read. The keys are the channels."""
+"""For each read, the bytes from each channel. The keys are the numbers of the channels."""
 
 
 @dataclass(slots=True)
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``, ``out``: number with undamaged and with damaged lines.
+    ``sent``, ``out``: numbers of values with undamaged and with damaged lines.
+
+    ``wrong``: number of wrong values with damaged lines.
 
     ``odometry``: number of compared odometry messages.
 

@@ -13,9 +13,9 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""A match that skips more intact frames than this needs a second match shortly behind.
+"""Largest number of intact frames that a match of a decoded frame may skip without proof.
 
-A false frame may equal a much later true frame.
+Beyond it, the next decoded frame must match, too. A false frame may equal a much later true frame.
 """
 REACH_BYTES = 600
 """The search for a decoded frame begins this number of bytes before the current read."""

@@ -2,8 +2,8 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board shares no code with the driver. A right report equals a true report after the
-previous right one.
+The simulated board shares no code with the driver. A decoded report is right if it equals a true
+report that follows the previous right one.
 """
 
 from collections import Counter
@@ -81,7 +81,7 @@ def decode(stream: Stream) -> tuple[list[Report], int]:
 
 
 def score(truth: list[Report], lines: int, stream: Stream) -> Score:
-    """Count the reports of a damaged stream, and the wrong ones among them (see the module)."""
+    """Count the reports of a damaged stream, and the wrong reports among them."""
     found, lines_out = decode(stream)
     result = Score(lines=lines, lines_out=lines_out, sent=len(truth), out=len(found))
     left = Counter(map(repr, truth))

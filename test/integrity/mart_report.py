@@ -64,7 +64,7 @@ Otherwise the robot might reach the wall.
 class Score:
     """Counts of published messages of each kind. Scores can be added.
 
-    ``stood``: number of drives at whose end the robot stood.
+    ``stood``: number of drives at whose end the robot was at rest.
     """
 
     published: Counter[str] = field(default_factory=Counter)

@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""How often does the motion monitor stop robots that obey? Hours of driving are simulated.
+"""Count how often the motion monitor stops robots that obey, in hours of simulated driving.
 
     PYTHONPATH=test/core .venv/bin/python test/integrity/no_false_trips.py --hours 10
 
-``--first``: seed of the first robot. ``--period``: of the displacements, in s. The exit code is 1
-when a robot was stopped.
+``--first``: seed of the first robot. ``--period``: period of the displacements, in s. The exit code
+is 1 when a robot was stopped.
 """
 
 import argparse

@@ -35,7 +35,7 @@ class Bound:
 
     ``share``: largest share of the driving time with an uncommanded set-point.
 
-    ``long_in``: least number of frames per uncommanded set-point of over 2 ms.
+    ``long_in``: least number of control frames for each uncommanded set-point of over 2 ms.
 
     ``overdue``: whether a robot that still drives is an error.
     """
@@ -45,7 +45,7 @@ class Bound:
     overdue: bool = True
 
     def missed(self, score: Score) -> list[str]:
-        """Return the names of the numbers that exceed these limits."""
+        """Return the names of the errors in ``score`` that exceed these limits."""
         found = {
             "stray motion": score.strayed,
             "false letters": score.false_letters,

@@ -22,8 +22,8 @@ class Understood:
 
     ``held``: the bytes that the receiver holds after each write.
 
-    ``alike_until``: for each write, the index of the next different one. A misunderstood write is
-    different, and so is a first or last motion.
+    ``alike_until``: for each write, the index of the next write of another kind. The two kinds are
+    motions and other writes. A write that the receiver misunderstands also ends a series.
     """
 
     held: list[bytes]
@@ -44,9 +44,9 @@ class Course:
         self._understood: dict[ReceiverKind, Understood] = {}
 
     def when(self, tick: int, shown: Shown) -> "Course":
-        """Return the course that continues this one when the board shows another state.
+        """Return the course that results if the board shows another state from ``tick`` on.
 
-        The board shows ``shown`` from ``tick`` on.
+        ``shown``: the other state of the board.
         """
         other = self._others.get((tick, shown))
         if other is None:
@@ -62,7 +62,7 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """How often the session ran for this course and for all courses that continue it."""
+        """Number of runs of the session for this course and for all courses that continue it."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

@@ -32,7 +32,7 @@ STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
 """Time between two readings of the clock, in s."""
 History = tuple[tuple[int, Shown], ...]
-"""The states that the board shows. Each comes with the tick from which the board shows it."""
+"""The states that the board shows in a scene, each with the tick at which the state begins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class Scene:
 
     ``still_by_s``: the robot must be at rest at this time.
 
-    ``begins``: the state that the board shows at first.
+    ``begins``: the state that the board shows at the beginning.
 
     ``run``: whether the driver starts the board.
 

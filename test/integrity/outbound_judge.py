@@ -27,17 +27,19 @@ _LONGEST: Final = ("stray_s", "longest_s")
 class Score:
     """Counts and times of trials, in s. Scores can be added. The module defines the terms.
 
-    ``strayed``: trials with stray motion. ``stray_s``: the longest one.
+    ``strayed``: number of trials with stray motion. ``stray_s``: duration of the longest one.
 
-    ``overdue``: trials in which the robot was driven when it had to rest.
+    ``overdue``: number of trials in which the robot still drove when it had to be at rest.
 
-    ``for_good``: trials in which the robot was driven at the end.
+    ``for_good``: number of trials in which the robot still drove at the end.
 
     ``frames``: number of control frames in ``driving_s``.
 
     ``uncommanded_s``: total time of the ``uncommanded`` set-points.
 
-    ``long``: those above LONG_S. ``longest_s``: the longest one.
+    ``long``: number of the ``uncommanded`` set-points of over 2 ms.
+
+    ``longest_s``: duration of the longest ``uncommanded`` set-point.
     """
 
     trials: int = 0
@@ -121,7 +123,7 @@ class Judge:
     def frame(self, frame: ControlFrame, at_s: float) -> str:
         """Record a control frame that the board understands.
 
-        Return the name of its error, or "".
+        Return the name of the error that this frame is, or "".
         """
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
@@ -145,7 +147,7 @@ class Judge:
     def letter(self, letter: int, at: int) -> str:
         """Record a letter on which the board acts. Return the name of its error, or "".
 
-        ``at``: position in the write. Negative: added or changed by the line.
+        ``at``: position of the letter in the write. It is negative if the line added or changed it.
         """
         if at < 0:
             self.score.added_letters += 1

@@ -25,8 +25,8 @@ class Line(Protocol):
     """The damaged line of one trial.
 
     ``whole``: number of bytes before the next fault. A write of at most this length arrives
-    undamaged: the caller only subtracts its length from ``whole``. For a longer write, the caller
-    must call ``carry``.
+    undamaged, and the caller only subtracts the write's length from ``whole``. For a longer write,
+    the caller must call ``carry``.
     """
 
     whole: int

@@ -22,9 +22,10 @@ from omnibot_driver.simulator.omnibot.receivers import FRAMINGS, ReceiverKind
 SCRIPTS: Final = 6
 """Number of scripts for each scene. Each script has other commands."""
 NEEDED: Final = 10_000
-"""Number of trials for each receiver and each loss. The scenes that end a drive share it.
+"""Least number of trials for each receiver and each rate of lost bytes.
 
-Each of ``HURRIES`` has this number at ``AT_HURRIES``.
+The trials are shared among all scenes that end a drive. With 1 byte in 100 lost, each scene in
+``HURRIES`` has this number of trials.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -49,7 +50,7 @@ Scores = dict[tuple[str, str, str], Score]
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
     """Yield the kinds of board on which a scene runs, all with this receiver.
 
-    Each comes with the name under which its scores are added.
+    Each item is a name and the kind of board. The scores are added under the name.
     """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):
@@ -74,7 +75,9 @@ def one(
 ) -> tuple[Scores, int]:
     """Run one script with each fault on all boards.
 
-    Return the scores, and how often the session ran.
+    Return the scores, and the number of runs of the session.
+
+    ``share``: share of the usual number of trials. ``job``: name and seed of the scene.
     """
     scene, seed = job
     course = Course(SCENES[scene](Random(f"{scene} {seed}")))
@@ -114,7 +117,10 @@ def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> 
 
 
 def run(share: float, scripts: int, kinds: tuple[str, ...] = tuple(SCENES)) -> tuple[Scores, int]:
-    """Run all trials on all processors. Return the scores, and how often the session ran."""
+    """Run all trials on all processors. Return the scores, and the number of runs of the session.
+
+    ``share``: share of the usual number of trials. ``scripts``: number of scripts for each scene.
+    """
     jobs = [(scene, seed) for seed in range(scripts) for scene in kinds]
     total: Scores = {}
     rehearsals = 0

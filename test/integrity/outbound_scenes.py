@@ -21,7 +21,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time in s from which the board runs and the driver knows this."""
+"""Time in s from which the board runs, and the driver has received this state."""
 STANDS_S: Final = 1.2
 """Time in s from the last command until the robot must be at rest."""
 ESTOPPED_S: Final = 0.3
@@ -30,7 +30,7 @@ DRIVE_S: Final = 1.5
 DRIVE_RATES_HZ: Final = (20.0, 50.0, 100.0)
 RATES_HZ: Final = (10.0, 20.0, 30.0, 50.0, 100.0)
 AWKWARD_LSB: Final = (-1, -2, -6, 80, 82, 83, -176, -174, -173, 250, 0)
-"""Yaw rates in LSB. Some bytes of their frames are FF, FE or letters."""
+"""Yaw rates, in LSB of a command, whose frames contain letters or the header bytes FF and FE."""
 
 
 def _twist(random: Random) -> BodyTwist:

@@ -3,7 +3,7 @@
 """A minimal simulation of what a board sends, without any code of the driver.
 
 A moving robot has the twist of the last motion that the driver wrote, even if the line damaged this
-command. So the driver cannot see the damage in the readings.
+command. The driver therefore cannot detect the damage by the readings.
 """
 
 import math

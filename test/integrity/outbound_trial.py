@@ -2,8 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board shows a moving robot during a drive or with a motion as the set-point. Changes are visible
-after one or two ticks.
+The board reports a moving robot while the driver drives, or while a motion is the set-point. The
+driver can see a change after one or two ticks.
 """
 
 import math
@@ -32,10 +32,11 @@ MEMO: Final = 100_000
 
 Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
-"""Results for one kind of receiver on a running board.
+"""Cached results of a receiver on a running board.
 
-Key: held bytes, whether a pause follows, new bytes. Value: held bytes, frames by their last byte.
-None: a letter.
+The key is the bytes that the receiver held, whether a pause preceded the new bytes, and the new
+bytes. The value is the bytes that it then holds, and each found frame with the position of its last
+byte. The value is None if the bytes contain a letter.
 """
 
 
@@ -132,10 +133,7 @@ class Trial:
     # The line
 
     def _skip(self) -> None:
-        """Skip the writes that arrive undamaged and change nothing.
-
-        The last of them is not skipped.
-        """
+        """Skip the writes that arrive undamaged and change nothing, except the last of these."""
         course, receiver, begin = self._course, self._receiver, self._number
         before = begin - 1
         if (

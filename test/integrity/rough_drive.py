@@ -27,7 +27,7 @@ HARDEST_BUMP_PWM: Final = 600.0
 HARDEST_PUSH_PWM: Final = 150.0
 """Greatest effort of a push against a driving robot, in PWM steps."""
 FASTEST_CARRY_MPS: Final = 0.5
-"""Greatest speed at which people carry a robot at rest, in m/s."""
+"""Greatest speed at which people carry a robot whose motors are at rest, in m/s."""
 SECONDS_BETWEEN_HANDS: Final = 20.0
 
 HANDS: Final = ("push", "bump", "hold", "carry")
@@ -40,11 +40,13 @@ BEGUN_S: Final = 1000.0
 class Outcome:
     """Result of a drive.
 
-    ``trips``: how and when the motion monitor stopped the robot.
+    ``seconds``: duration of the drive.
 
-    ``said``: how often the driver sent each message.
+    ``trips``: for each stop by the motion monitor, a text with its time and cause.
 
-    ``happened``: how often people did each of HANDS to the robot.
+    ``said``: how often the driver logged each warning, and how often it refused a command.
+
+    ``happened``: how often people pushed, bumped, held or carried the robot.
     """
 
     seconds: float = 0.0
@@ -124,7 +126,10 @@ class RoughDrive(Bench):
         self._last_hands, self._to_be_carried = "none", False
 
     def settle(self) -> None:
-        """Count the session's notices. Deliver its writes to the board after the line's delay."""
+        """Count the notices of the session, and deliver the driver's writes that are due.
+
+        The writes reach the board after the line's delay.
+        """
         for event in self.session.take_events():
             if isinstance(event, Notice):
                 self._hear(event.text)

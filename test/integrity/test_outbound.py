@@ -81,9 +81,9 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
 
 def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None:
-    """The last byte of a motion frame is lost. The next write's zeros complete the frame.
+    """The last byte of a motion frame is lost, so the zeros of the next write complete the frame.
 
-    The frame after these zeros replaces it.
+    This wrong command lasts only until the next frame, for less than 1.5 ms.
     """
     course = Course(DRIVES["drive 20"](Random("a byte")))
     moving = next(
@@ -105,9 +105,9 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
 
 
 def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
-    """Two Stops follow each other, and the first lacks a byte.
+    """Two Stops follow each other, and the first one has lost a byte.
 
-    The board understands 255 LSB for wheel C. The judge calls this stray motion.
+    The board understands a wheel command of 255 LSB. The judge reports stray motion.
     """
     judge = Judge()
     judge.write(parse(STOP), 0.0)
@@ -120,9 +120,9 @@ def test_the_judge_finds_motion_that_was_made_of_a_stop() -> None:
 
 
 def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
-    """The board still follows the set-point of the previous write. This is right.
+    """The board still follows the set-point of the previous write. The judge reports no error.
 
-    A set-point with a changed bit is an error.
+    A set-point with a changed bit is reported as uncommanded.
     """
     first = bytes.fromhex("FF FE 01 00 20 00 00 00 00")
     second = bytes.fromhex("FF FE 01 00 10 00 00 00 00")
@@ -141,9 +141,9 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 
 
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
-    """The board acts on letters. A letter that was sent is right, a payload byte is "false".
+    """The board acts on three letters. The judge accepts a letter that the driver sent.
 
-    A letter from the line is "added".
+    It reports a byte of a frame as a "false" letter, and counts a byte from the line as "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
@@ -171,7 +171,7 @@ def test_a_cut_line_leaves_the_robot_driving_and_the_judge_says_so() -> None:
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
-    """Skipping the undamaged writes gives the same score as playing every write."""
+    """A trial that skips undamaged writes has the same score as a trial that plays every write."""
 
     class Slow(Trial):
         def _skip(self) -> None:

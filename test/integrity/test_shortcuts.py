@@ -46,7 +46,7 @@ TRUTHS = {name: generate(scenario, 11, SECONDS) for name, scenario in SCENARIOS.
 
 
 def outcome(chunks: Chunks, *, quick: bool) -> Outcome:
-    """Return what the decoder finds in each chunk: frames, counts, and the incomplete frame.
+    """Return the decoder's result for each chunk: frames, counts, and the bytes not yet decoded.
 
     ``quick``: whether the decoder may use its shortcuts.
     """
@@ -117,9 +117,9 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Requests are made while a stream arrives.
+    """The session receives requests, such as a pause, while a stream arrives.
 
-    Shortcuts change neither the board's readings nor its mode.
+    The decoder's shortcuts change neither the board's readings nor its mode.
     """
     chunks = chunks_of(scenario, fault, chunker, 2)
 
@@ -144,9 +144,9 @@ def test_readings_come_out_alike(
 
 
 def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most reads use the shortcut for single IMU frames.
+    """Most reads use the decoder's shortcut for single IMU frames.
 
-    Otherwise the other tests would prove nothing.
+    Otherwise, the other tests would not test this shortcut.
     """
     fed = []
     feed = FrameDecoder.feed
@@ -164,7 +164,10 @@ def test_an_imu_frame_that_comes_alone_is_not_fed(monkeypatch: pytest.MonkeyPatc
 
 
 def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The stream is calm. The quick loop handles more than 90 % of its IMU frames."""
+    """The stream of a driving robot is undamaged.
+
+    The quick loop of the decoder handles more than 90 % of its IMU frames.
+    """
     weighed = []
     weigh = decoder.Expectation.weigh
 
@@ -180,9 +183,9 @@ def test_calm_streams_take_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The readings jump, are odd for a moment, and jump back.
+    """The readings jump, stay at the new values for a moment, and jump back.
 
-    The quick loop handles all of this.
+    The quick loop of the decoder handles all these frames.
     """
     rest = ImuFrame((120, -80, -16384), (1, 2, 3))
     shock = [ImuFrame((9000, -80, -16384), (1, 2, 3)), ImuFrame((120, 7000, -16384), (1, 9000, 3))]
@@ -201,7 +204,7 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
     """The decoder can restore its state after any frame.
 
-    For this, it weighs at most 6 frames again.
+    To restore it, the decoder evaluates at most 6 frames again.
     """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
@@ -222,9 +225,9 @@ def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None
 
 
 def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Most edges of the trellis are left out.
+    """The decoder's shortcut omits most edges of the trellis.
 
-    Otherwise the tests would compare two complete searches.
+    Otherwise, the other tests would compare two complete searches.
     """
     edges = {True: 0, False: 0}
     pieces = trellis._Search.pieces

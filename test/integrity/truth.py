@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Generator of true streams: what a board sends, by frame and byte, with arrival times in s.
+"""Generator of true streams: the frames and bytes that a board sends, with arrival times in s.
 
-The layouts are the manual's, without code of the driver. The noise of an MPU6050 with its filter
-on: 46 LSB (acceleration), 6.5 LSB (gyro).
+The generator uses the layouts in the manual, and no code of the driver. The noise is that of an
+MPU6050 with its filter on: 46 LSB (acceleration), 6.5 LSB (gyro).
 """
 
 import math
@@ -23,7 +23,8 @@ Key = tuple[object, ...]
 class Truth:
     """A true stream: its bytes, their times of arrival in s, and its frames.
 
-    A frame is its content, its first byte's index, and the index after its last byte.
+    An item of ``frames`` is the frame's content, the index of its first byte, and the index after
+    its last byte.
     """
 
     data: bytearray = field(default_factory=bytearray)

@@ -19,7 +19,10 @@ STANDS_AFTER_S = 1.0
 
 
 class BenchRobot:
-    """A replacement for the ``Robot`` of a calibration. ``bench.board`` has the true motion."""
+    """A replacement for the ``Robot`` of a calibration, which drives in simulated time.
+
+    ``bench.board``: the simulated board, with the true motion of the robot.
+    """
 
     def __init__(self, **settings: Any) -> None:
         self.bench = Bench(BoardSettings(running=True, **settings))

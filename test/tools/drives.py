@@ -40,7 +40,7 @@ def message(kind: str, *values: Any) -> Any:
 
 @dataclass
 class Topic:
-    """The messages of one topic. Each message arrives ``late_s`` (in s) after its timestamp."""
+    """The messages of one topic. A message arrives ``late_s`` seconds after its timestamp."""
 
     stamp_s: Array
     values: Array
@@ -103,7 +103,7 @@ class Drive:
             self.statuses.append((at_s, "omnibot_driver: Stream", 0, "complete", lost))
 
     def told(self, times_s: Array) -> Array:
-        """Return the commanded vx, vy (m/s) and yaw rate (rad/s) at these times."""
+        """Return the commanded vx, vy (m/s) and yaw rate (rad/s) at these times, (n, 3)."""
         on = (times_s >= REST_S) & (times_s < self.seconds - REST_S)
         wave = np.sin(2 * np.pi * (times_s - REST_S) / 6.0)
         return np.column_stack([0.25 + 0.0 * wave, 0.1 * wave, 0.4 + 0.0 * wave]) * on[:, None]

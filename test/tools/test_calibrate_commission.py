@@ -41,9 +41,9 @@ def told(capsys: pytest.CaptureFixture[str]) -> str:
 def test_the_whole_walk_finds_what_was_planted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The tool finds reversed axes, another delta frame and a turned IMU. A driver loads the file.
+    """The robot has reversed axes, another delta frame and a turned IMU.
 
-    The user's first answer is impossible, so the tool asks again.
+    The tool finds them, although the user's first answer is impossible. A driver loads the file.
     """
     with rig(
         tmp_path,

@@ -32,7 +32,7 @@ def failing(_figure: Any) -> None:
 
 
 def failing_late(figure: Any) -> None:
-    """Set a title with a broken formula. Matplotlib notices this only when it saves the picture."""
+    """Draw a title with an invalid formula. Matplotlib rejects the title when it saves the file."""
     figure.subplots().set_title("$\\frac{$")
 
 
@@ -111,7 +111,7 @@ def test_a_broken_pipe_loses_nothing(
 def test_what_is_to_be_copied_stands_on_one_line(
     ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Text for copying is on one line. A shell would read a wrapped path as two arguments."""
+    """A parameter that the user should copy is printed on one line, even if its path is long."""
     folder = tmp_path / ("a_long_name_" * 12)
     assert ending(folder=folder) == 0
     assert f"  -p calibration_file:={folder}/robot.yaml" in capsys.readouterr().out.splitlines()

@@ -53,7 +53,7 @@ def paths() -> list[tuple[str, Column, bool]]:
 
 
 def readings(factors: Column, base: float, random: np.random.Generator) -> list[Reading]:
-    """Return noisy tape readings of a robot with slip.
+    """Return noisy tape readings of all drives of a robot with slip.
 
     ``factors``, ``base``: the robot's true sizes, relative to the sizes that the tool assumes.
     """
@@ -91,7 +91,7 @@ def test_any_geometry_is_found_within_what_is_claimed(
 def test_claimed_uncertainties_are_the_true_ones() -> None:
     """The sizes of 60 robots with slip are fitted. The claimed uncertainties are true.
 
-    Error / claimed uncertainty has a standard deviation near 1.
+    An error divided by its claimed uncertainty has a standard deviation near 1.
     """
     scores = []
     for seed in range(60):
@@ -134,7 +134,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
 ) -> None:
     """``calibrate geometry`` finds the sizes of a robot in simulated time.
 
-    Slip shortens distances as smaller wheels do. The driver's sizes have no effect.
+    Slip has the effect of smaller wheels. The result does not depend on the driver's parameters.
     """
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}

@@ -46,7 +46,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback. Each of its calls later than ``AFTER_S`` seconds calls ``action``."""
+    """Return a callback that calls ``action`` each time, from ``AFTER_S`` after the start on."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 
@@ -243,7 +243,7 @@ def test_an_odometry_of_nan_moves_no_robot(robot: Robot, rigged: Rig) -> None:
 
 
 def test_three_tenths_of_a_second_of_silence_are_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After 0.3 s without data, a topic counts as silent.
+    """A topic without data for 0.3 s is reported as silent.
 
     Only the topics that a motion needs are checked.
     """

@@ -72,9 +72,9 @@ def test_any_scale_is_found_within_what_is_claimed(
 def test_what_is_commanded_is_a_whole_count_of_the_board(
     units: float, top: float, levels: int
 ) -> None:
-    """Planned commands are whole counts of the board, and are not above ``top``.
+    """Planned commands are whole counts of the board, and do not exceed the speed ``top``.
 
-    Exception: one count is always allowed.
+    Only a command of one count may exceed this speed.
     """
     for _seconds, command in plan((top, top, top), (units, units, units), levels, 1.0):
         counts = [value * units for value in command]
@@ -83,9 +83,9 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 
 
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
-    """While one speed is measured, the commands pause.
+    """The commands pause while one speed is measured, so the driver may have stopped the robot.
 
-    The driver may have stopped the robot meanwhile. So the tool does not use this speed.
+    The tool does not use this speed.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))
@@ -114,7 +114,7 @@ def test_axes_that_disagree_are_told() -> None:
 def test_what_cannot_be_measured_is_an_error() -> None:
     """A log has no steady speed. In another log, the robot drives against its commands.
 
-    Each of them is an error.
+    The tool reports an error for each of these logs.
     """
     with pytest.raises(ToolError, match="no steady speed"):
         speeds(Log(), ASSUMED, UP, NO_BIAS)
@@ -127,7 +127,7 @@ def test_planted_scales_are_found_and_applied(
 ) -> None:
     """``calibrate scale`` finds the board's unusual scales, and ``--apply`` sets them.
 
-    The driver takes stamped commands.
+    The driver accepts only commands with timestamps.
     """
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:

@@ -23,7 +23,7 @@ SLUGGISH = MotorConstants(pwm_per_count=35.0, time_constant_ticks=10.0, delay_ti
 def test_a_planted_motor_is_found(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Wheel B has another motor. ``calibrate step`` finds its constants, right within 5 %.
+    """Wheel B has another motor. ``calibrate step`` finds the motor's constants within 5 %.
 
     The tolerance allows for a busy test machine.
     """

@@ -48,7 +48,10 @@ def rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
 
 
 def postures(mounted: np.ndarray, nose_rad: float, left_rad: float) -> list[np.ndarray]:
-    """Return "up" as the mounted sensor measures it: level, nose raised, left side raised."""
+    """Return the upward direction in the axes of the mounted sensor, for three postures.
+
+    The postures are level, front raised by ``nose_rad``, and left side raised by ``left_rad``.
+    """
     bodies = (
         (0.0, 0.0, 1.0),
         (math.sin(nose_rad), 0.0, math.cos(nose_rad)),
@@ -236,7 +239,10 @@ def test_a_turn_by_hand_is_to_the_left_by_enough() -> None:
 
 
 def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
-    """A trembling hand, a wrong gravity and a record without readings are each rejected."""
+    """The robot is not held still, or the gravity is wrong, or no reading was received.
+
+    Each of these measurements is rejected.
+    """
     shaking = resting((0.0, 0.0, 9.8), (0.0, 0.0, 0.0), 1.0)
     shaking.rate_radps[::2] = 0.5
     with pytest.raises(Contradiction, match="not held still"):
@@ -321,7 +327,8 @@ def test_the_wrong_frame_turns_with_the_robot(
 def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
     """A turn on the spot shows whether the driver interprets the deltas correctly.
 
-    By hand: 0.5 rad/s is 20 mrad in 40 ms, or 24 counts of each wheel.
+    The expected values are for a turn at 0.5 rad/s. In a delta of 40 ms, the robot turns by 20 mrad
+    and each wheel by 24 counts.
     """
     rim = math.tau * 0.029 / 1560
     as_displacements = steady(24e-4 / 0.04, 24e-4 / 0.04, 24e-4 / 0.04)
@@ -332,7 +339,7 @@ def test_a_turn_on_the_spot_shows_what_deltas_are() -> None:
 
 
 def test_a_drift_is_of_its_time_alone() -> None:
-    """``drift`` uses only the data between two times. If this data is missing, that is an error.
+    """``drift`` uses only the data between two times. Missing data is an error.
 
     A robot that does not move is an error, too.
     """

@@ -22,7 +22,7 @@ def test_a_driver_is_a_node_with_a_state_and_an_estop() -> None:
 
 
 def test_one_that_is_only_listened_to_does_not_run() -> None:
-    """A tool waits for a driver and subscribes to its topics, so the topics exist without a driver.
+    """A tool has subscribed to a driver's topics, so these topics exist although no driver runs.
 
     Only topics with publishers show that a driver runs.
     """

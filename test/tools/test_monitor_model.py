@@ -24,7 +24,7 @@ waits_s = st.lists(st.floats(0.0, 3.0), max_size=300)
 def test_a_steady_stream_has_its_own_rate(hz: float, seconds: float, began_s: float) -> None:
     """Messages arrive at a constant rate.
 
-    The measured rate differs from it by at most one message per window.
+    The measured rate differs from the true one by at most one message in the measuring time.
     """
     rate = Rate(began_s)
     for number in range(math.ceil(seconds * hz)):
@@ -53,7 +53,10 @@ def test_no_arrival_is_lost_or_made_up(waits: list[float]) -> None:
 
 @given(waits_s, st.floats(WINDOW_S + 0.01, 1e4))
 def test_what_has_ceased_has_no_rate(waits: list[float], silence_s: float) -> None:
-    """The messages end. After a window the rate is 0, and the history continues with zeros."""
+    """No more messages arrive. After the measuring time, the rate is 0.
+
+    The history continues with zeros.
+    """
     rate, now_s = Rate(0.0), 0.0
     for wait_s in waits:
         now_s += wait_s

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of bags for the report: it reads every storage format without ROS.
+"""Tests that the report reads bags of every storage format without ROS.
 
-It rejects what it cannot read.
+The report rejects a file that it cannot read.
 """
 
 import os

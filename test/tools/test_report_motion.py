@@ -126,7 +126,7 @@ def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
 def test_the_lag_of_the_robot_is_found(drive: Drive) -> None:
     """The robot follows its commands with a lag. The report finds the lag.
 
-    Tolerance: one step of the search plus half a step of the odometry.
+    The tolerance is one step of the search plus half a period of the odometry.
     """
     text = said(drive, "Commands", "follows").text
     lag_s = float(text.split("lag of ")[1].split(" ms")[0]) / 1e3

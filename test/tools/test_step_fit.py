@@ -24,7 +24,7 @@ TOLERANCE = 0.01
 
 
 def made_up(model: Model, values: tuple[float, ...], seed: int) -> list[Step]:
-    """Return eight steps of a wheel that follows the model exactly, with measurement noise."""
+    """Return eight steps of a wheel that behaves like the model, with measurement noise."""
     random = np.random.default_rng(seed)
     steps = []
     for number in range(8):
@@ -89,9 +89,9 @@ def test_a_command_seen_a_tick_off_is_put_right() -> None:
 
 
 def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
-    """Some commands are up to 0.15 s late, and the fit corrects this.
+    """Some commands are up to 0.15 s late, and in one step the wheel is blocked.
 
-    It omits a step in which the wheel was blocked.
+    The fit corrects the delays and omits the blocked step.
     """
     planted = (1.0, 46.0, 0.06, 0.01)
     steps = made_up(motor_model(MANUAL), planted, 2) + made_up(motor_model(MANUAL), planted, 3)
@@ -125,9 +125,9 @@ def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
     ],
 )
 def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
-    """The motor's constants are found within 1 %, and its delay within 1 ms.
+    """A motor is simulated with encoder, friction and the firmware's control loop.
 
-    The simulation includes the encoder, friction and the control loop of the firmware.
+    The motor's constants are found within 1 %, and its delay within 1 ms.
     """
     steps = steps_of(*steps_to_and_fro(planted), 0, LEVELS)
     motor = fit_wheel("A", steps, MANUAL).motor
@@ -137,9 +137,9 @@ def test_the_simulated_boards_motor_is_found(planted: MotorConstants) -> None:
 
 
 def test_other_gains_must_be_told() -> None:
-    """The firmware has other gains than the manual's.
+    """The gains in the firmware differ from those in the manual.
 
-    Only a fit with the firmware's gains is good.
+    The model fits well only with the gains in the firmware.
     """
     gains = WheelGains(feed_forward=15.0, proportional=40.0, integral=5.0)
     steps = steps_of(*steps_to_and_fro(MotorConstants(), gains), 0, LEVELS)

@@ -128,7 +128,10 @@ def _check(turned, parameters, times_s, response, delay_s) -> None:  # type: ign
 
 
 def test_two_equal_poles_are_no_exception() -> None:
-    """The damping is 1, so both poles are equal. The response is between those at 0.99 and 1.01."""
+    """The damping is 1, so both poles are equal.
+
+    The response lies between the responses with dampings of 0.99 and 1.01.
+    """
     low, mid, high = (
         second_order(np.array([10.0, damping, 0.0, 0.0]), np.array([0.2]))
         for damping in (0.99, 1.0, 1.01)

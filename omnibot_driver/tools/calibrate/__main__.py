@@ -3,7 +3,7 @@
 """Run a calibration: ``python -m omnibot_driver.tools.calibrate imu|scale|geometry|...``.
 
 Each subcommand is a module of this package that has a function ``run(robot, console, arguments)``.
-This function returns a ``Result``.
+The function returns a ``Result``.
 """
 
 import argparse
@@ -20,9 +20,11 @@ LIBRARIES: Final = ("numpy", "scipy", "rich", "matplotlib")
 
 
 def main(argv: Sequence[str] | None = None, read: Callable[[str], str] = input) -> int:
-    """Run the subcommand; return the exit code.
+    """Run the subcommand on the command line; return the exit code.
 
-    0: success, 1: failure, 2: wrong usage, 130: interrupted.
+    Exit codes: 0 success, 1 failure, 2 wrong usage, 130 interrupted.
+
+    ``argv``: the command line without the program, by default that of the process.
 
     ``read``: asks the user a question and returns the answer.
     """

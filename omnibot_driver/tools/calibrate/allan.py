@@ -15,9 +15,9 @@ from scipy.optimize import nnls
 from omnibot_driver.tools.calibrate.log import Column
 
 FEWEST_CLUSTERS: Final = 9
-"""Least number of averages in an Allan deviation, each over one averaging time.
+"""Least number of averages from which an Allan deviation is computed.
 
-So the longest averaging time is one ninth of the record.
+The longest averaging time is therefore one ninth of the record.
 """
 FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 60.0
@@ -26,9 +26,13 @@ WALK_FROM_S: Final = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Allan:
-    """Allan deviations in the unit of the readings, by averaging time in s. Shapes: (n,).
+    """Allan deviations of a sensor. All arrays have the shape (n,).
 
-    ``sigma``: standard deviation of ``deviation``.
+    ``tau_s``: averaging times, in s.
+
+    ``deviation``: the Allan deviation for each averaging time, in the unit of the readings.
+
+    ``sigma``: standard deviation of each value in ``deviation``.
     """
 
     tau_s: Column
@@ -40,7 +44,9 @@ class Allan:
 class Noise:
     """Noise terms of a sensor whose readings have the unit U.
 
-    ``density``: white noise, in U/√Hz. ``sigma`` is its standard deviation.
+    ``density``: white noise, in U/√Hz.
+
+    ``sigma``: standard deviation of ``density``.
 
     ``instability``: bias instability (flicker noise), in U.
 
@@ -79,9 +85,9 @@ def allan(readings: Column, period_s: float) -> Allan:
 
 
 def noise(curve: Allan) -> Noise:
-    """Return the noise terms that fit the curve best.
+    """Return the noise terms that fit the Allan deviations in ``curve`` best.
 
-    If the recording is shorter than ``WALK_FROM_S``, the tool fits white noise only.
+    If the recording is shorter than 60 s (``WALK_FROM_S``), only white noise is fitted.
     """
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]

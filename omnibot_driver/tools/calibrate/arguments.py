@@ -19,7 +19,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter. A board has this parameter if it records encoder ticks and accepts gains."""
+"""Name of a parameter that only boards with recorded encoder ticks and settable gains have."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -33,9 +33,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""What each subcommand needs: one of these parameters of the driver.
+"""For each subcommand, parameters of the driver and a text.
 
-The text is for the error message: it names what the board lacks.
+The subcommand needs at least one of these parameters. If the driver has none, the error message
+contains the text, which names what the board lacks.
 """
 
 

@@ -31,7 +31,7 @@ class Client:
 
     ``driver``: the full name of the driver's node.
 
-    ``parameters``, ``table``: values and descriptions of its parameters, by name.
+    ``parameters``, ``table``: values and descriptions of the driver's parameters, by name.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -120,7 +120,7 @@ class Client:
         self.parameters.update(values)
 
     def apply(self, values: Mapping[str, Value]) -> None:
-        """Set those of ``values`` that may change while the driver runs. Ignore the others."""
+        """Set those parameters in ``values`` that may change while the driver runs."""
         changeable = {
             name: value for name, value in values.items() if not self.table.by_name[name].fixed
         }
@@ -152,7 +152,7 @@ class Client:
             self._node.destroy_client(client)
 
     def _wait(self, done: Callable[[], object], seconds: float) -> bool:
-        """Wait up to ``seconds`` until ``done`` returns a true value; return whether it did."""
+        """Wait up to ``seconds`` until ``done`` returns a true value; return False on timeout."""
         deadline_s = time.monotonic() + seconds
         while not (held := done()) and time.monotonic() < deadline_s:
             self._spin(0.05)

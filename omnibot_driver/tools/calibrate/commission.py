@@ -144,9 +144,9 @@ class Walk:
         )
 
     def _mode_switch(self, slow_mps: float) -> tuple[Drift, Drift, ControlMethod]:
-        """Return the motions in the slow and in the fast drive, and the control method.
+        """Drive at ``slow_mps``, then twice as fast; return both motions and the control method.
 
-        The fast drive has twice the speed ``slow_mps``.
+        The control method is that of the board: velocity or position.
         """
         for _ in range(TRIES):
             log = self._drive(
@@ -300,8 +300,8 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the pattern in the user's answer; None if the answer is not valid.
+    """Return the directions of the wheels in the user's answer; None if the answer is not valid.
 
-    An empty pattern means ``r``: show the motion again.
+    An empty tuple means that the user typed ``r``, to see the motion again.
     """
     return () if answer == "r" else understand(answer)

@@ -76,7 +76,7 @@ class Console:
     def ask(self, question: str, understand: Callable[[str], T | None], otherwise: str) -> T:
         """Ask until ``understand`` accepts the answer; return what ``understand`` returned.
 
-        None means not accepted. The tool then prints ``otherwise`` and asks again.
+        If ``understand`` returns None, the tool prints ``otherwise`` and repeats the question.
         """
         while (meant := understand(self._answer(f"{question} "))) is None:
             self.say(otherwise)
@@ -88,9 +88,9 @@ class Console:
 
     @contextmanager
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show the progress of a task while the context lasts.
+        """Show the progress of the task ``what`` within a ``with`` block.
 
-        The caller reports the completed fraction, 0 to 1, to the context's function.
+        The block gets a function. It calls the function with the completed fraction, 0 to 1.
         """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")
@@ -123,7 +123,7 @@ class Console:
 
 
 def digits(finding: Finding) -> tuple[str, str, str]:
-    """Return value, uncertainty and previous value as text.
+    """Return value, uncertainty and previous value of a finding, as texts.
 
     All three texts end at the second significant digit of the uncertainty.
     """

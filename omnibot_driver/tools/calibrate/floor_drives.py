@@ -38,9 +38,11 @@ def measured(
 ) -> list[Measured]:
     """Run each drive and let the user measure it; return the measurements.
 
-    ``go``: returns a drive's odometry poses. ``measure``: asks the user about them.
+    ``go``: makes a drive, and returns its odometry poses.
 
-    Raises ToolError if a drive fails, or if the user denies that there is room.
+    ``measure``: asks the user for the end of the drive, and returns the measurement.
+
+    Raises ToolError if a drive fails, or if the user answers that there is not enough room.
     """
     console.confirm(
         f"The robot will make {len(drives)} drives at up to {arguments.speed:g} m/s. Each drive"
@@ -55,7 +57,7 @@ def measured(
 
 
 def speeds(robot: Any, arguments: argparse.Namespace) -> tuple[float, float]:
-    """Return the speed in m/s and the yaw rate in rad/s, within the driver's limits.
+    """Return the user's speed in m/s and yaw rate in rad/s, reduced to the driver's limits.
 
     Raises ToolError if the speed or the rate is 0.
     """
@@ -82,7 +84,9 @@ def driven(
 ) -> Column:
     """Drive the robot by ``law``; return the poses of the odometry, (n, 3), in m, m and rad.
 
-    ``turn_rad``: size of the whole turn. Raises ToolError if the drive fails.
+    ``turn_rad``, ``seconds``: expected size of the whole turn, and duration of the drive.
+
+    Raises ToolError if the drive fails.
     """
     speed, turning = speeds(robot, arguments)
     bounds = Bounds(

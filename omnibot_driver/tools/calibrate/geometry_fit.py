@@ -47,13 +47,13 @@ class Reading:
 class Geometry:
     """The robot's sizes, as ratios to the assumed sizes.
 
-    ``wheels``: of the wheels' mean radius. ``base``: of the base radius.
+    ``wheels``: ratio of the mean radius of the wheels. ``base``: ratio of the base radius.
 
-    ``unlike``: relative deviation of each wheel from the mean, (3,).
+    ``unlike``: relative deviation of each wheel's radius from the mean, (3,).
 
-    ``covariance``: of ``wheels``, ``base``, ``unlike[:2]``.
+    ``covariance``: covariance of ``wheels``, ``base``, ``unlike[:2]``, (4, 4).
 
-    ``excess``: residuals / expected residuals, at least 1.
+    ``excess``: residuals divided by the expected residuals, at least 1.
     """
 
     wheels: float
@@ -75,7 +75,7 @@ class Geometry:
 
     @property
     def unlike_sigma(self) -> Column:
-        """Standard deviation of each wheel's difference from the mean."""
+        """Standard deviation of each value in ``unlike``, (3,)."""
         slopes = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, -1, -1]], dtype=float)
         return np.array([_sigma(slope, self.covariance) for slope in slopes])
 
@@ -83,9 +83,9 @@ class Geometry:
 def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geometry:
     """Return the geometry that explains the readings best.
 
-    ``drift``: standard deviation of a wheel's distance of 1 m by slip, in m.
+    ``drift``: standard deviation, in m, that slip causes in a wheel's distance of 1 m.
 
-    Raises ToolError if the fit fails, or if a radius differs by more than ``UNKNOWN``.
+    Raises ToolError if the fit fails, or if a radius differs by more than 20 % (``UNKNOWN``).
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -114,13 +114,13 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the poses, (n, 3), of the same wheel rotations with other radii.
+    """Return the poses that the same wheel rotations give with other radii, (n, 3).
 
-    ``path``: poses by the assumed radii. The result begins at the origin.
+    ``path``: poses that were computed with the assumed radii. The result begins at the origin.
 
-    ``factors``: new/assumed radius of each wheel, (3,), or by step, (n - 1, 3).
+    ``factors``: new radius / assumed radius of each wheel, (3,), or for each step, (n - 1, 3).
 
-    ``base``: new/assumed base radius.
+    ``base``: new base radius / assumed base radius.
     """
     rims = rims_of(path, base_radius_m) * factors
     body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
@@ -142,7 +142,7 @@ def rims_of(path: Column, base_radius_m: float) -> Column:
 
 
 def _weights(reading: Reading, base_radius_m: float, drift: float) -> Column:
-    """Return the matrix by which the errors of a reading become independent, with unit variance."""
+    """Return the matrix that makes a reading's errors independent, with a variance of 1."""
     path = reading.path
     x, y, yaw = np.linalg.inv(_rims(base_radius_m))
     middle = (path[:-1, 2] + path[1:, 2]) / 2

@@ -23,7 +23,10 @@ class Interrupted(ToolError):
 
 
 class Interruption:
-    """A context manager that handles ``SIGNALS``. Outside the main thread it does nothing."""
+    """A context manager that handles SIGINT, SIGTERM and SIGHUP.
+
+    Outside the main thread it does nothing.
+    """
 
     def __init__(self) -> None:
         self._requested = self._asking = self._deferred = False
@@ -44,7 +47,7 @@ class Interruption:
             signal.signal(number, handler)
 
     def check(self) -> None:
-        """Raise Interrupted if a signal was received and is not deferred."""
+        """Raise Interrupted if a signal was received, except in a ``deferred`` context."""
         if self._requested and not self._deferred:
             raise Interrupted("interrupted: the robot is stopped, and nothing was written")
 

@@ -37,7 +37,7 @@ LATCHED: Final = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCA
 class Listener(Client):
     """A client that records the robot's data in ``log``.
 
-    Each motion, and each rest, begins a new log.
+    ``log`` has only the data of the current motion or rest.
     """
 
     def __init__(self, node: Node, context: Context, interruption: Interruption) -> None:
@@ -155,7 +155,7 @@ class Listener(Client):
 
 
 def silent(heard_s: Mapping[str, float], wanted: Sequence[str], now_s: float) -> list[str]:
-    """Return those of the topics ``wanted`` that were silent for more than ``LOST_S``.
+    """Return those of the topics ``wanted`` that had no message for 0.3 s (``LOST_S``).
 
     ``heard_s``: time of the last message of each topic, in s.
     """

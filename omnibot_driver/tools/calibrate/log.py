@@ -67,7 +67,7 @@ class Commands:
 
 @dataclass(slots=True)
 class Log:
-    """The received data and the sent commands, as rows in order of time.
+    """The received data and the sent commands, as rows of numbers in order of time.
 
     The properties return the rows as columns.
     """

@@ -28,7 +28,7 @@ Early and late: the two halves of a drive.
 DOUBLED, UNCHANGED = (1.6, 2.5), 1.25
 """Limits of the speed ratio when the command doubles. They allow for friction and rounding.
 
-``DOUBLED``: the speed has doubled. ``UNCHANGED``: largest ratio of equal speeds.
+``DOUBLED``: range of a doubled speed. ``UNCHANGED``: largest ratio of an unchanged speed.
 """
 PURE_TURN: Final = 0.5
 """Largest accepted ratio of sideways speed to rim speed in a turn on the spot.
@@ -87,9 +87,11 @@ def require_motion(odometry: Odometry) -> None:
 
 
 def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod | None:
-    """Return how the board interprets commands, from motions at ``slow_mps`` and at twice that.
+    """Return how the board interprets commands: as velocities or as positions.
 
-    None if the motions fit neither method, e.g. because a busy computer delayed commands.
+    ``slow``, ``fast``: motions with the command ``slow_mps`` and with twice this command.
+
+    None if the motions fit neither method, for example because a busy computer delayed commands.
     """
     # In velocity control the speed is constant, and doubles with the command. In positional control
     # the command is a position a few mm from the origin of the board's frame. The robot has stopped
@@ -111,11 +113,11 @@ def deltas_are_understood(turning: Drift, base_radius_m: float) -> bool:
 
 
 def frame_is_right(before: Drift, after: Drift, turned_rad: float) -> bool:
-    """Return whether the frame of the odometry deltas is set correctly, "earth" or "body".
+    """Return whether the driver's frame of the odometry deltas, "earth" or "body", is right.
 
     ``before``, ``after``: motion by the same command, before and after a turn by ``turned_rad``.
 
-    Raises ToolError if neither frame fits.
+    Raises ToolError if the motions fit neither frame.
     """
     change_rad = abs(math.remainder(after.direction_rad - before.direction_rad, math.tau))
     if change_rad < ALIKE * abs(turned_rad):

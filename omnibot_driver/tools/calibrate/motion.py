@@ -19,17 +19,18 @@ Topic = Literal["cmd_vel", "wheel_cmd"]
 HALT: Final[Vector3] = (0.0, 0.0, 0.0)
 
 Law = Callable[[float, Pose], Vector3 | None]
-"""A control law: the command by the time in s and the unwrapped pose, since the start.
+"""A control law: a function of the time in s and the unwrapped pose, both since the start.
 
-None ends the motion. Units: m/s, m/s, rad/s for ``cmd_vel``, rad/s for ``wheel_cmd``.
+It returns the command, or None to end the motion. A ``cmd_vel`` is in m/s, m/s and rad/s, a
+``wheel_cmd`` in rad/s.
 """
 
 LOOK_S: Final = 1.0
 """Time, in s, over which the tool compares the commanded with the measured motion."""
 SLOW_LOOK_S: Final = 3.0
-"""``LOOK_S`` for a board that measures its motion only rarely, in s.
+"""Time, in s, over which the tool compares the motions if the board rarely measures its motion.
 
-Between measurements, the odometry is only predicted.
+Between two measurements, the odometry is only predicted.
 """
 OBEYED_PART: Final = 0.2
 """Ratio of measured to commanded motion below which the robot is regarded as not moving."""
@@ -37,7 +38,7 @@ SCALES: Final = " the switch of the board, `linear_scale` and `angular_scale`,"
 PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 """Speeds below which the tool does not check that the robot moves, because of friction.
 
-(Linear, turning): m/s and rad/s, or rad/s of a wheel.
+For ``cmd_vel``: a linear speed in m/s and a yaw rate in rad/s. For ``wheel_cmd``: rad/s.
 """
 
 
@@ -45,13 +46,13 @@ PLAIN: Final = {"cmd_vel": (0.03, 0.15), "wheel_cmd": (1.0, 1.0)}
 class Bounds:
     """Limits of one motion. For ``wheel_cmd``, rad/s of a wheel replaces m/s.
 
-    ``speed``, ``turning``: in m/s and rad/s.
+    ``speed``, ``turning``: largest commands, in m/s and rad/s.
 
-    ``way``, ``turn``: from the start by the odometry, in m and rad.
+    ``way``, ``turn``: largest distance and turn from the start, by the odometry, in m and rad.
 
-    ``seconds``: longest duration.
+    ``seconds``: longest duration of the motion.
 
-    ``acceleration``, ``angular_acceleration``: in m/s² and rad/s². Infinite: no ramp.
+    ``acceleration``, ``angular_acceleration``: limits in m/s² and rad/s². Infinite: no ramp.
     """
 
     speed: float
@@ -123,9 +124,9 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Raise ToolError if the robot was commanded to move for some time, but has not moved.
+        """Note the motion; raise ToolError if commands lasted for some time without motion.
 
-        ``seconds``: since the last call. ``measured``: in the units of ``command``.
+        ``seconds``: time since the last call. ``measured``: in the units of ``command``.
         """
         if math.isnan(self._began_s):
             self._began_s = now_s

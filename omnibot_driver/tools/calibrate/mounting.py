@@ -45,7 +45,9 @@ class Mounting:
 
     ``rotation``: converts from the sensor's axes to the body's axes.
 
-    ``yaw_sigma_rad``: the yaw depends on how exactly the user tilts the robot.
+    ``yaw_sigma_rad``: standard deviation of the yaw, which comes from the user's inexact tilts.
+
+    ``tilts_rad``: angles of the tilts with the front raised and with the left side raised.
     """
 
     rotation: Array
@@ -58,7 +60,7 @@ class Mounting:
         return rpy(self.rotation)
 
     def snapped(self) -> "Mounting | None":
-        """Return the nearest right-angled mounting, or None if none is within ``SNAP_RAD``."""
+        """Return the nearest right-angled mounting, or None if it differs by more than 15°."""
         nearest = max(_right_angles(), key=lambda one: float(np.trace(one.T @ self.rotation)))
         cosine = (float(np.trace(nearest.T @ self.rotation)) - 1.0) / 2.0
         if math.acos(max(-1.0, min(1.0, cosine))) > SNAP_RAD:
@@ -94,9 +96,12 @@ def bias(imu: Imu) -> Array:
 
 
 def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
-    """Return the mounting from "up" in three postures, as unit vectors in the sensor's axes.
+    """Return the mounting from the upward direction in three postures.
 
-    Raises Contradiction if a tilt is too small or too large, or if the tilts are not square.
+    The arguments are unit vectors in the sensor's axes: robot level, front raised, left side
+    raised.
+
+    Raises Contradiction if a tilt is too small or too large, or if the tilts are not at 90°.
     """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)
@@ -125,7 +130,7 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
 def require_left_turn(imu: Imu, bias_radps: Array, level: Array) -> float:
     """Return the angle, in rad, by which the user has turned the robot to the left.
 
-    ``level``: "up" in the sensor's axes.
+    ``bias_radps``: the gyro's bias. ``level``: the upward direction in the sensor's axes.
 
     Raises Contradiction if the turn is too small, or to the right.
     """

@@ -34,9 +34,9 @@ UNLIKE: Final = 4.0
 """Number of standard deviations by which two ratios must differ before the tool reports it."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
-"""``COUNT``: m per encoder count. ``UNITS``: number of motor units per m/s.
+"""Names of two parameters: m per encoder count, and number of motor units per m/s.
 
-A larger distance per count reduces the units in proportion.
+If the first one grows, the second one must be reduced in proportion.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.
@@ -65,9 +65,11 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The motion in one drive: by the tape and by the odometry, in m or rad.
+    """The motion in one drive, in m or rad, as measured by the tape and by the odometry.
 
-    ``told``: by the odometry. ``true``, ``sigma``: by the tape.
+    ``told``: motion by the odometry.
+
+    ``true``, ``sigma``: motion by the tape, and its standard deviation.
     """
 
     drive: Drive

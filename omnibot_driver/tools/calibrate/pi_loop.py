@@ -31,7 +31,10 @@ PHASE_POINTS: Final = 600
 
 @dataclass(frozen=True, slots=True)
 class PiGains:
-    """The gains that are written to the board: numbers, or arrays of the same shape."""
+    """The gains Kp, Tn and Td that are written to the board.
+
+    They are numbers, or arrays of the same shape with many candidates. Tn and Td are in s.
+    """
 
     kp: Array | float
     tn_s: Array | float
@@ -48,9 +51,9 @@ class Loop:
 
     ``feed_forward``: duty in percent for each RPM of the set-point.
 
-    ``low_pass``: coefficient of the set-point's filter. 1: no filter.
+    ``low_pass``: coefficient of the low-pass filter of the set-point. 1: no filter.
 
-    ``sends_each_s``: period of the board's messages with ticks.
+    ``sends_each_s``: period with which the board sends ticks.
     """
 
     period_s: float
@@ -64,7 +67,7 @@ class Loop:
 
     @property
     def stretch(self) -> float:
-        """Factor from a wanted time constant to the number to write to the board.
+        """Factor by which a time constant is multiplied before it is written to the board.
 
         The board computes its coefficients for ``nominal_s``, but applies them every ``period_s``.
         """
@@ -82,13 +85,16 @@ def answer(
     begun: Array | float = 0.0,
     sent_s: Array | None = None,
 ) -> Array:
-    """Return the speed in RPM after a step of the set-point from standstill, by ``STEP_S``.
+    """Return the speed of a wheel, in RPM, after a step of the set-point from standstill.
 
-    Further dimensions: the common shape of the gains and the last three arguments.
+    The first dimension is time, in steps of 1 ms. The further dimensions are the common shape of
+    the gains and the last three arguments.
 
-    ``dead_s``: replaces the loop's. ``begun``: wheel position between two marks, 0 to 1.
+    ``dead_s``: dead times that replace the dead time of ``loop``.
 
-    ``sent_s``: when the board first sends ticks, or None.
+    ``begun``: initial position of the wheel between two marks, 0 to 1.
+
+    ``sent_s``: time at which the board first sends ticks. None: it sends none.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(
@@ -152,11 +158,11 @@ def answer(
 class Traits:
     """Characteristics of a step response, as numbers or arrays.
 
-    ``overshoot``: fraction of the final speed or of the target, whichever is higher.
+    ``overshoot``: as a fraction of the final speed or of the target, whichever is higher.
 
-    ``settled_s``: infinite if the speed does not stay at the target.
+    ``settled_s``: settling time, in s. Infinite if the speed does not stay at the target.
 
-    ``error_s``: integral of the absolute error divided by the target.
+    ``error_s``: integral of the absolute error divided by the target, in s.
     """
 
     overshoot: Array
@@ -165,7 +171,9 @@ class Traits:
 
 
 def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
-    """Return the characteristics of a response.
+    """Return the characteristics of a step response to the set-point ``target_rpm``.
+
+    ``rpm``: the speed every 1 ms.
 
     ``band``: allowed deviation, as a fraction of the final speed (mean of the last quarter).
     """

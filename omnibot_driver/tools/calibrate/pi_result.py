@@ -25,7 +25,7 @@ WORSE: Final = 1.1
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Recorded steps of a set-point with the same gains."""
+    """Several recorded steps of the set-point of one wheel, all with the same gains."""
 
     steps: list[Response]
 
@@ -47,9 +47,9 @@ class Measured:
 
     @property
     def error_s(self) -> float:
-        """Integral of the absolute error divided by the final speed, in s; the mean of all steps.
+        """Integral of the absolute error of a step, divided by the final speed, in s.
 
-        The integral begins at the first tick.
+        The integral begins at the first tick. The value is the mean of all steps.
         """
         errors = []
         for one in self.steps:
@@ -60,7 +60,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True)
 class WheelTuned:
-    """The result for one wheel.
+    """The result of the tuning of one wheel.
 
     ``fit``: the plant as fitted to the starts at full duty.
 

@@ -39,7 +39,7 @@ ROUNDS: Final = 3
 WRITTEN_WITHIN_S: Final = 4.0
 """Longest time until settings have reached the board, in s.
 
-The board does not acknowledge settings, so the driver sends each of them several times.
+The board does not acknowledge settings. The driver therefore sends each setting several times.
 """
 
 QUIET_S: Final = 0.5
@@ -102,7 +102,7 @@ class _Bench:
         self.robot.rest(WRITTEN_WITHIN_S)
 
     def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
-        """Record ``count`` starts, each from standstill; return the times between ticks."""
+        """Record ``count`` starts from standstill; return the times between ticks, in s."""
         found: Records = {side: [] for side in SIDES}
         for _ in range(count):
             for side, column in read(self.robot.record("record_rpm", topic, command)).items():
@@ -112,7 +112,10 @@ class _Bench:
         return found
 
     def steps(self, rpm: Sequence[float]) -> Records:
-        """Record steps of the set-point from rest to the wheel speeds ``rpm``."""
+        """Record several steps of the set-point from rest to the wheel speeds ``rpm``.
+
+        Return the times between ticks, in s.
+        """
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)
 
@@ -169,9 +172,9 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Make the two levels of each encoder equally long on average, by corrections.
+    """Measure and set the corrections that make both levels of each encoder equally long.
 
-    All corrections must be 1 meanwhile, because the board records corrected times.
+    During the measurement all corrections are 1, because the board records corrected times.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})
@@ -182,9 +185,9 @@ def _encoders(bench: _Bench) -> dict[str, Levels]:
 
 
 def _plant(found: PlantFit, free: Levels) -> Plant:
-    """Return the plant of a wheel: gain and dead zone come from the speeds at two duties.
+    """Return the plant of a wheel. Its gain and dead zone come from the speeds at two duties.
 
-    ``found``: at full duty. ``free``: at half duty.
+    ``found``: the fit at full duty. ``free``: the measurement at half duty.
     """
     slope = (found.final_rpm - free.rpm) / (FULL_PERCENT - FREE_PERCENT)
     if slope <= 0.0:

@@ -33,15 +33,18 @@ FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
 """Starting positions of a simulated wheel between two marks, as fractions of their distance.
 
-The position decides in which control period a tick comes.
+The starting position decides in which control period a tick arrives.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
 """Times at which the board first sends ticks, as fractions of its sending period.
 
-The time decides which ticks the board notices late.
+While the board sends, it notices ticks late.
 """
 DISTURBED: Final = 0.02
-"""Overshoot that is allowed beyond the goal if the board sends ticks during a step."""
+"""Additional overshoot that is allowed if the board sends ticks during a step.
+
+It is a fraction of the speed, which is added to the user's limit.
+"""
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
 TDS: Final = (0.25, 0.5, 1.0)
@@ -53,15 +56,15 @@ With Td = 0, an oscillation from one control period to the next does not decay.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Goals:
-    """The goals of a tuning, on a step of the set-point.
+    """The goals of a tuning, for the response to a step of the set-point.
 
     ``overshoot``, ``band``: largest overshoot and final deviation, as fractions of the speed.
 
     ``destination``: set-point, as a fraction of the speed at full duty.
 
-    ``settled_s``: a longer settling time causes a warning.
+    ``settled_s``: settling time above which the tool warns, in s.
 
-    ``phase_margin_deg``: None: Td is 0, and the overshoot limits the gain.
+    ``phase_margin_deg``: smallest phase margin. If None, Td is 0 and the overshoot limits the gain.
     """
 
     overshoot: float = 0.05
@@ -140,9 +143,9 @@ def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
 
 
 def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
-    """Return the predicted traits of a step, over all starting positions in ``BEGUN``.
+    """Return the predicted traits of a step, for several starting positions of the wheel.
 
-    The traits are the largest overshoot, the longest settling time and the mean error.
+    The result has the largest overshoot, the longest settling time and the mean error.
     """
     target = target_of(plant, goals)
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=BEGUN)
@@ -167,16 +170,16 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 
 
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
-    """Return the dead time, in s, with which the model explains all wheels' steps best.
+    """Return the dead time, in s, with which the model explains the steps of all wheels best.
 
-    At least ``LEAST_DEAD_S``: too short a value makes the speed overshoot.
+    The result is at least 0.02 s. Gains that are tuned for too short a dead time overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
 
 
 def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
-    """Return, for each candidate in ``DEAD_S``, how badly the model fits the recorded steps."""
+    """Return the misfit of the model to the recorded steps, for each dead time in ``DEAD_S``."""
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]
@@ -192,7 +195,7 @@ def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
 def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
     """Return the response that a board would record from these positions of a wheel.
 
-    ``ticks``: positions in ticks, one for each ``STEP_S``.
+    ``ticks``: positions in ticks, one for each ms.
     """
     marks = np.arange(1.0, ticks[-1])
     at_s = np.interp(marks, ticks, STEP_S * np.arange(1, len(ticks) + 1))
@@ -200,7 +203,7 @@ def _recorded(ticks: Column, ticks_per_revolution: int) -> Response:
 
 
 def _unlike(shown: Response, model: Response) -> float:
-    """Return the mean square of the relative difference of two responses, up to time ``OVER_S``."""
+    """Return the mean square of the relative difference of two responses in their first 1.5 s."""
     times_s = shown.times_s[shown.times_s < OVER_S]
     told_rpm = np.interp(times_s, model.times_s, model.rpm)
     return float(np.mean((shown.rpm[: len(times_s)] / told_rpm - 1.0) ** 2))

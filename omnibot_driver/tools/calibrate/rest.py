@@ -28,13 +28,13 @@ LOST_PART: Final = 0.02
 
 @dataclass(frozen=True, slots=True)
 class Rest:
-    """The evaluation of an IMU at rest. Arrays have the values of the sensor's axes x, y and z.
+    """The evaluation of an IMU at rest. Arrays have one value for each of the sensor's axes.
 
-    ``bias_sigma``: includes the bias's random walk until the end of the measurement.
+    ``bias_sigma``: standard deviation of the gyro's bias at the end of the measurement.
 
     ``rate_noise``, ``force_noise``: standard deviation of a single reading.
 
-    ``curves``, ``noises``: the gyro's Allan deviation and its fitted noise.
+    ``curves``, ``noises``: the gyro's Allan deviations and fitted noise terms, for each axis.
     """
 
     bias_radps: Column
@@ -116,7 +116,7 @@ def rest(imu: Imu) -> Rest:
 def still(bias_radps: Column) -> Callable[[Log], None]:
     """Return a function that checks a growing log, and raises ToolError if the robot moves.
 
-    ``bias_radps``: what the driver has subtracted from the gyro's readings.
+    ``bias_radps``: the bias that the driver has subtracted from the gyro's readings.
     """
     seen = [0, 0]
     look = Look()
@@ -148,9 +148,9 @@ def _within(readings: Column, size: int) -> Column:
 
 
 def _of_mean(readings: Column, noise: Column, size: int) -> Column:
-    """Return the standard deviation of the mean of ``readings``.
+    """Return the standard deviation of the mean of ``readings``, for each axis.
 
-    The larger of two estimates: by single readings, and by the means of blocks.
+    It is the larger of two estimates: from single readings, and from the means of blocks.
     """
     means = _blocks(readings, size).mean(axis=1)
     white = noise / np.sqrt(len(readings))

@@ -34,7 +34,7 @@ PERIOD_S: Final = 0.02
 """Period, in s, with which the tool sends commands."""
 STANDS_WITHIN_S: Final = 3.0
 ASKED_WITHIN_S: Final = 0.6
-"""Time, in s, from the request for a record to the start of the motion.
+"""Time, in s, that the tool waits from the request for a record to the start of the motion.
 
 In this time the driver can repeat a lost request.
 """
@@ -58,7 +58,7 @@ class Robot(Listener):
         self._unanswered: Counter[tuple[Topic, tuple[float, ...]]] = Counter()
         """Number of commands that this node published but has not yet received back.
 
-        Key: topic and values. A negative number shows a command of another node.
+        The key is topic and values. A negative number shows a command of another node.
         """
         self._foreign: Topic | None = None
         kinds: dict[Topic, Any] = {
@@ -104,9 +104,10 @@ class Robot(Listener):
     ) -> Log:
         """Move the robot by the law, within the bounds, then stop it; return the log.
 
-        ``obeys``: whether it is a fault if the robot does not move.
+        ``obeys``: whether a robot that does not move is an error.
 
-        ``monitored``: must be false before speed and direction are calibrated.
+        ``monitored``: whether the driver's motion monitor stays on. It must be off before speed
+        and direction are calibrated.
 
         ``show``: called with the seconds since the start.
 

@@ -56,7 +56,7 @@ def wanted(axis: int) -> Pattern:
 def wheel_sign(wheel: int, seen: Pattern) -> int:
     """Return 1 if the wheel turned in the manual's direction, -1 if in reverse.
 
-    Raises Contradiction if it did not turn, or if another wheel turned.
+    Raises Contradiction if the wheel did not turn, or if another wheel turned.
     """
     name = WHEELS[wheel]
     turned = [n for n in range(3) if seen[n]]
@@ -81,9 +81,9 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
 
 
 def axis_sign(axis: int, seen: Pattern) -> int:
-    """Return 1 if the wheels show a motion along +axis, -1 along -axis.
+    """Return 1 if the wheels show a motion along +axis, -1 if along -axis.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction otherwise.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. Raises Contradiction if the wheels show neither.
     """
     expected = wanted(axis)
     if seen == expected:
@@ -99,7 +99,8 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    If only another side is regarded as the robot's front, sign(x) sign(y) = sign(yaw).
+    They do unless sign(x) sign(y) = sign(yaw). Signs that are not mirrored can come from another
+    choice of the robot's front.
     """
     x, y, yaw = signs
     return x * y != yaw

@@ -19,7 +19,7 @@ from omnibot_driver.tools.needs import ToolError
 SETTLE_S: Final = 1.2
 """Time from a command to a steady speed, in s.
 
-After 1 s, the board's integrator still leaves an error of 0.1 %.
+After 1 s, the speed still differs by 0.1 %, because the board's integrator has not settled.
 """
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
@@ -42,7 +42,8 @@ class Speed:
 
     ``measured``, ``sigma``: speed by the odometry, and its standard deviation.
 
-    ``gyro``, ``gyro_sigma``: the same by the gyro. ``gyro`` is NaN for x and y.
+    ``gyro``, ``gyro_sigma``: rate by the gyro, and its standard deviation. ``gyro`` is NaN for x
+    and y.
     """
 
     axis: int
@@ -87,9 +88,11 @@ def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tup
 def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
     """Return a speed for every command in the log that was sent for long enough.
 
-    ``scales``: counts per m/s or rad/s. ``up``: in the sensor's axes.
+    ``scales``: counts per m/s or rad/s, for x, y and yaw.
 
-    Raises ToolError without such a command.
+    ``up``, ``bias``: the upward direction and the gyro's bias (rad/s), in the sensor's axes.
+
+    Raises ToolError if the log has no steady speed.
     """
     odometry, imu = log.odometry, log.imu
     found = []
@@ -119,7 +122,7 @@ def speeds(log: Log, scales: Vector3, up: Column, bias: Column) -> list[Speed]:
 
 
 def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") -> Scale:
-    """Return the scale that fits the speeds best, weighted by their uncertainties.
+    """Return the scale that fits the speeds best. Their uncertainties determine their weights.
 
     Raises ToolError if the robot moved in the opposite direction to its commands.
     """
@@ -141,9 +144,10 @@ def scale(found: Sequence[Speed], by: Literal["odometry", "gyro"] = "odometry") 
 
 
 def _held(log: Log) -> list[tuple[float, float, Column]]:
-    """Return the time spans of steady speed as (begin, end, command), without zero commands.
+    """Return the time spans of steady speed as (begin in s, end in s, command).
 
-    A pause begins a new span: the driver may have dropped the command.
+    Spans of zero commands are omitted. A pause of the commands begins a new span, because the
+    driver may have stopped the robot.
     """
     commands = log.commands
     if not len(commands.stamp_s):
@@ -164,9 +168,9 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the coordinate of each pose along one of the robot's axes, at the mean heading.
+    """Return the coordinate of each pose along one of the robot's axes.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw.
+    The axes are those at the mean heading. ``axis``: 0 for x, 1 for y, 2 for yaw.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -81,7 +81,8 @@ def _to_and_fro(
 ) -> tuple[Law, float]:
     """Return a law that alternates between the slow and the fast speed, and its duration in s.
 
-    Steps begin at different times within an odometry delta, to show the whole response.
+    The steps begin at different times within the period of the odometry deltas. Together, the
+    deltas then show the whole response.
     """
     plan: list[tuple[float, Vector3]] = []
     for number in range(arguments.steps + 1):

@@ -27,7 +27,7 @@ from omnibot_driver.tools.needs import ToolError
 ON_THE_WAY_S: Final = 0.0015
 """Time, in s, from the publication of a command to its last bit on the line.
 
-DDS, plus 9 bytes at 115200 baud.
+It is the time of DDS, plus the time of 9 bytes at 115200 baud.
 """
 BEFORE: Final = 3
 """Number of odometry deltas before the onset that belong to the record of a step."""
@@ -36,7 +36,7 @@ ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
 """Tested shifts of an onset, in ticks. A positive shift moves the onset to an earlier time."""
 UNLIKE: Final = 3.0
-"""A step is rejected if its misfit is larger than the median misfit, multiplied by this number."""
+"""A step is rejected if its misfit exceeds the median misfit of all steps by this factor."""
 
 
 LOOK_S: Final = np.arange(0.0, 2.0, 1e-3)
@@ -48,13 +48,15 @@ DRAWS: Final = 100
 class Step:
     """One step from one commanded rate to another. Ticks are control ticks.
 
-    ``end_ticks``: end of each odometry delta, from the onset.
+    ``before_radps``, ``after_radps``: commanded rates before and after the step.
 
-    ``rate_radps``: mean rate in each delta, over its four ticks.
+    ``end_ticks``: end of each odometry delta, in ticks after the onset of the step.
 
-    ``last_radps``: commanded before ``before_radps``. Its effect may still continue.
+    ``rate_radps``: mean rate in each odometry delta, which lasts four ticks.
 
-    ``last_ticks``: from the change between these two rates to the onset.
+    ``last_radps``: commanded rate before ``before_radps``. Its effect may still continue.
+
+    ``last_ticks``: time from the onset of the previous step to this onset.
     """
 
     before_radps: float
@@ -65,7 +67,7 @@ class Step:
     last_ticks: int
 
     def sooner(self, ticks: int) -> "Step":
-        """Return this step with its onset moved to an earlier time, by ``ticks`` control ticks."""
+        """Return this step with its onset moved ``ticks`` control ticks earlier."""
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
@@ -86,9 +88,9 @@ class Step:
 class Fit:
     """A model with the parameter values that explain the steps best.
 
-    ``covariance``: of ``values``, scaled by the residuals.
+    ``covariance``: covariance of ``values``, scaled by the residuals.
 
-    ``rms_radps``: of the residuals.
+    ``rms_radps``: root mean square of the residuals.
 
     ``samples``: number of odometry deltas used.
     """
@@ -137,7 +139,7 @@ class Fit:
 
 
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
-    """Return the steps of one wheel in which the command changed between two rates of ``levels``.
+    """Return the steps of one wheel between two of the commanded rates in ``levels``, in rad/s.
 
     Raises ToolError if gaps in the odometry leave no complete step.
     """
@@ -201,7 +203,9 @@ class WheelFound:
 
     ``steps``: the steps that were used. ``left_out``: number of rejected steps.
 
-    ``first``, ``second``: models by order. ``motor_fit``: a motor in the manual's control loop.
+    ``first``, ``second``: fits of models of first and second order.
+
+    ``motor_fit``: fit of a motor in the manual's control loop.
     """
 
     name: str
@@ -229,7 +233,7 @@ class WheelFound:
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
     """Fit three models to a wheel's steps: first order, second order, and a motor.
 
-    ``now``: the gains in the firmware, in the motor's control loop.
+    ``now``: the firmware's gains, which the motor's control loop has.
     """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (
@@ -241,7 +245,7 @@ def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
 def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps with their onsets moved to the ticks that fit the model best.
 
-    A command may take effect late, e.g. on a busy computer.
+    The onset is late if a busy computer delayed the command.
     """
     shifts = [0] * len(steps)
     for _ in range(ROUNDS):
@@ -262,7 +266,7 @@ def aligned(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
 def alike(steps: Sequence[Step], model: Model = SECOND_ORDER) -> list[Step]:
     """Return the steps that fit a common model well.
 
-    Their misfit is at most ``UNLIKE`` times the median misfit.
+    Their misfit is at most three times the median misfit.
     """
     guess = fit(model, steps)
     misfits = [_misfit(guess, step) for step in steps]

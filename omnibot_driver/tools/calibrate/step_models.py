@@ -22,9 +22,9 @@ Source: manual, "25Hz Encoder data"; docs/internals/omnibot_protocol.md.
 """
 
 Turned = Callable[[Array, Array], Array]
-"""The angle turned in rad, after a unit step of the rate (1 rad/s).
+"""A function that returns the angle turned, in rad, after a step of the rate to 1 rad/s.
 
-Arguments: the model's parameters without the gain, and times in s.
+Arguments: the model's parameters without the gain, and times after the step in s.
 """
 
 
@@ -32,11 +32,11 @@ Arguments: the model's parameters without the gain, and times in s.
 class Model:
     """A model of a step response.
 
-    ``names``, ``units``: of the parameters. The first parameter is the gain.
+    ``names``, ``units``: names and units of the parameters. The first parameter is the gain.
 
-    ``start``, ``low``, ``high``: starting values and bounds.
+    ``start``, ``low``, ``high``: starting values and bounds of the parameters.
 
-    ``turned``: gives the angle after a unit step.
+    ``turned``: returns the angle turned after a step of the rate to 1 rad/s.
     """
 
     title: str
@@ -57,16 +57,20 @@ class Model:
 
 
 def first_order(parameters: Array, time_s: Array) -> Array:
-    """Return the angle turned by the model exp(-L s) / (1 + T s) after a unit step."""
+    """Return the angle turned after a unit step, by the transfer function exp(-L s) / (1 + T s).
+
+    ``parameters``: T and L, in s.
+    """
     time_constant_s, delay_s = parameters
     after_s = np.maximum(0.0, time_s - delay_s)
     return np.asarray(after_s + time_constant_s * np.expm1(-after_s / time_constant_s))
 
 
 def second_order(parameters: Array, time_s: Array) -> Array:
-    """Return the angle turned after a unit step: (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²).
+    """Return the angle turned after a unit step, by a transfer function of second order.
 
-    The zero Z comes from the PI loop with feed-forward.
+    It is (1 + Z s) exp(-L s) / (1 + 2 ζ s/ω + s²/ω²). The zero Z comes from the PI loop with
+    feed-forward. ``parameters``: ω in rad/s, ζ, Z and L in s.
     """
     omega, damping, zero_s, delay_s = parameters
     root = np.sqrt(complex(damping * damping - 1.0))
@@ -81,9 +85,9 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 
 
 def motor_in_loop(gains: Gains) -> Turned:
-    """Return the model of a motor in the manual's control loop with these gains.
+    """Return the step response of a motor in the manual's control loop with these gains.
 
-    The parameters of the model are PWM per count, time constant and delay.
+    Its parameters are PWM steps per (count per tick), time constant in s, and delay in s.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

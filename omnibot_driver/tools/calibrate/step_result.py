@@ -13,9 +13,9 @@ from omnibot_driver.tools.calibrate.wheel_loop import Gains
 UNLIKE_ONE: Final = 0.02
 """Difference of a wheel's gain from 1 above which the tool recommends ``calibrate scale``."""
 QUANTUM_RADPS: Final = 0.05
-"""Standard deviation of an odometry delta's rate by quantisation, in rad/s.
+"""Standard deviation, in rad/s, that quantisation causes in the rate of an odometry delta.
 
-Two causes: the encoder, and the protocol's unit of 0.1 mm.
+The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 """
 MANY: Final = 1.5
 """Multiple of ``QUANTUM_RADPS`` above which the tool warns about the residuals.

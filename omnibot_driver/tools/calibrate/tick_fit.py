@@ -27,7 +27,9 @@ FEWEST_TICKS: Final = 30
 class Plant:
     """A wheel, as a plant from duty in percent to speed in RPM.
 
-    ``slow_s``, ``fast_s``: time constants. ``fast_s`` is 0 for first order.
+    ``rpm_per_percent``: the gain.
+
+    ``slow_s``, ``fast_s``: time constants. ``fast_s`` is 0 for a plant of first order.
 
     ``dead_zone_percent``: duty up to which the wheel does not turn.
 
@@ -48,11 +50,11 @@ class Plant:
 class PlantFit:
     """The fit of a plant to records of starts.
 
-    ``sigmas``: of ``final_rpm``, ``slow_s`` and ``fast_s``, scaled by the residuals.
+    ``sigmas``: standard deviations of ``final_rpm``, ``slow_s`` and ``fast_s``.
 
-    ``rms``: of the relative residuals.
+    ``rms``: root mean square of the relative residuals.
 
-    ``samples``: number of residuals. ``order``: of the plant.
+    ``samples``: number of residuals. ``order``: order of the plant, 1 or 2.
     """
 
     final_rpm: float
@@ -85,7 +87,7 @@ def speed(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     """Fit a plant to records of starts from standstill, all at the same duty.
 
-    ``records``: times between ticks in s. The first one is not used.
+    ``records``: times between ticks in s. The first time of each record is not used.
 
     Raises ToolError if a record is too short.
     """

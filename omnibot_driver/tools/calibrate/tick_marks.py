@@ -22,11 +22,12 @@ LARGEST: Final = 0.5
 A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""Largest relative error of a time that is used, in standard deviations of all errors."""
+"""Largest relative error with which a time is used, in standard deviations of all errors."""
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
-Evenly spaced marks explain less than 0.2, by three records of two turns.
+If the marks are evenly spaced, fitted marks explain less than 0.2. This was found with three
+records of two turns each.
 """
 
 
@@ -64,9 +65,9 @@ class Marks:
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
     """Return the marks that explain the records' errors, or None if no pattern repeats.
 
-    ``rows``: relative errors by record, NaN if unknown.
+    ``rows``: for each record, the relative errors of its times between ticks, NaN if unknown.
 
-    ``marks``: number of marks on the disc.
+    ``marks``: number of marks on the encoder's disc.
     """
     spread = 1.4826 * float(np.nanmedian(np.abs(np.concatenate(list(rows)))))
     limit = min(LARGEST, OUTLIER * spread)
@@ -88,9 +89,11 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the index in ``steps`` from which on ``row`` and ``steps`` agree best.
+    """Return the index in ``steps`` at which a record begins, by the best agreement.
 
-    ``row``: relative errors of one record.
+    ``row``: relative errors of the record's times between ticks.
+
+    ``steps``: relative errors of the distances between the encoder's marks.
     """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
@@ -101,7 +104,9 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return the median error of each distance between marks, shifted to a mean of zero.
 
-    ``rows``: relative errors, by record. ``firsts``: each row's first distance.
+    ``rows``: for each record, the relative errors of its times between ticks.
+
+    ``firsts``: for each record, the index of the distance at which it begins.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

@@ -20,19 +20,21 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest accepted fraction of missing times in a record."""
 UNLIKE: Final = 1.5
-"""Largest accepted ratio between a time and the median time, up or down.
+"""Largest accepted ratio of a time between ticks to the median time, or of the median to the time.
 
-Beyond it, the board missed an edge or noticed it late.
+A larger ratio shows that the board missed an edge or noticed it late.
 """
 SMOOTHED: Final = 4
 """Number of successive times between ticks from which one speed is computed.
 
-A displaced mark changes their sum by no more than one time.
+A displaced mark changes the sum of these times only if it is the first or the last one.
 """
 
 
 def read(path: Path) -> dict[str, Column]:
-    """Return the times between ticks in s, by side. A missing time is NaN.
+    """Return the times between ticks in s, for the left and the right wheel.
+
+    A missing time is NaN.
 
     Raises ToolError if the file cannot be read, or lacks too many times.
     """
@@ -61,7 +63,7 @@ class Levels:
 
     ``short``, ``long``: factors that give both levels the same duration.
 
-    ``sigma``: of the factors. ``rpm``: speed in the measurement.
+    ``sigma``: standard deviation of the factors. ``rpm``: speed during the measurement.
     """
 
     short: float
@@ -73,8 +75,10 @@ class Levels:
 def levels(ticks_s: Column, ticks_per_revolution: int) -> Levels:
     """Return the corrections of the two levels of an encoder's signal, which differ in duration.
 
-    ``ticks_s``: times between the ticks of a wheel at constant duty. They must be uncorrected: the
-    board's parameters for both corrections were 1. Raises ToolError for irregular ticks.
+    ``ticks_s``: times between the ticks of a wheel at constant duty. The board must have recorded
+    them with both corrections set to 1.
+
+    Raises ToolError for irregular ticks.
     """
     usual = float(np.nanmedian(ticks_s))
     good = np.isfinite(ticks_s) & (ticks_s < UNLIKE * usual) & (ticks_s > usual / UNLIKE)

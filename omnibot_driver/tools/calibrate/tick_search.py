@@ -45,10 +45,10 @@ LAGS: Final = 60
 Even such distant residuals are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
-"""Sum of two successive relative errors above which the board has missed a mark.
+"""Least sum of the relative errors of two successive times that shows a missed mark.
 
-The sum is near 0 for a late mark. For a missed mark it is less than 1, because the board's clock
-loses up to 6 ms.
+For a mark that was only noticed late, the sum is near 0. For a missed mark it is below 1, because
+the board's clock loses up to 6 ms.
 """
 SURE_TICKS: Final = 4
 """Number of ticks at the start of a record among which the board cannot miss a mark.
@@ -62,7 +62,10 @@ FEWEST_RECORDS: Final = 6
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the distance turned since a step at time 0, divided by the final speed, in s."""
+    """Return the distance turned since a step of the duty at time 0.
+
+    It is divided by the final speed, and therefore in s.
+    """
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
         return np.asarray(times_s - slow_s * (1 - slow))
@@ -76,7 +79,8 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    ``values`` has their sum and ratio. With these, the search has only one optimum.
+    ``values`` contains the sum and the ratio of the time constants instead. With these, the search
+    has only one optimum.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -140,7 +144,7 @@ class Search:
     def off(self, values: Column) -> list[Column]:
         """Return, by record, the relative errors of the times between evenly spaced marks.
 
-        NaN around a mark that the board missed.
+        The errors before and after a missed mark are NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -153,7 +157,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        From then on, the time around a missed mark is used for two distances between marks.
+        From then on, the search regards a time with a missed mark as that of two distances.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -180,9 +184,9 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Measure the residuals' correlation at these values, and remove it from now on.
+        """Measure the correlation of the residuals at these values, and remove it from now on.
 
-        Its cause: the marks, until they are fitted; then the changing load.
+        Misplaced marks cause the correlation until they are fitted. Then the changing load does.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)
@@ -201,8 +205,8 @@ class Search:
     def covariance(self, values: Column) -> Column:
         """Return the covariance of the values that all records share.
 
-        A slowly changing load affects whole records. So if the records scatter more than the
-        residuals show, the covariance is increased to this scatter.
+        A slowly changing load affects whole records. If the scatter between records is larger than
+        the residuals predict, the covariance is increased to this scatter.
         """
         own = 1 + self.order
         found = self._search(values)

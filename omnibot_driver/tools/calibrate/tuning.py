@@ -27,7 +27,7 @@ LARGEST_MS: Final = 1.6
 LARGEST_OVERSHOOT: Final = 0.05
 HORIZON_TICKS: Final = 400
 SETTLED: Final = 1e-3
-"""Relative error after ``HORIZON_TICKS`` below which a loop is regarded as stable."""
+"""Relative error at the end of the simulation below which a loop is regarded as stable."""
 CANDIDATES: Final = 24
 """Number of values of each gain in one round of the search."""
 ROUNDS: Final = 3
@@ -37,13 +37,17 @@ ROUNDS: Final = 3
 class Behaviour:
     """The behaviour of a motor with some gains, as numbers or arrays.
 
-    ``rise_s``: from 10 % to 90 % of a step.
+    ``rise_s``: rise time, from 10 % to 90 % of a step of the command.
 
-    ``command_error_s``: integral of the absolute error after a step of 1.
+    ``overshoot``: as a fraction of the step.
 
-    ``load_error_s``: the same, after a load of the effort for one count per tick.
+    ``command_error_s``: integral of the absolute error after a step of the command by 1.
+
+    ``load_error_s``: this integral after a step of the load by the effort for one count per tick.
 
     ``ms``: peak of the sensitivity; 1 is best.
+
+    ``stable``: whether the errors have decayed at the end of the simulation.
     """
 
     rise_s: Array
@@ -75,7 +79,7 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the gains within the limits that are best for all these motors together.
 
-    ``now``: the present gains. Errors are compared with those of ``now``.
+    ``now``: the present gains. A motor's errors are divided by its errors with these gains.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)

@@ -18,7 +18,7 @@ NEAR_RAD: Final = 0.01
 BRAKING: Final = 0.15
 """Deceleration before a waypoint, in m/s².
 
-It is half of the rate at which a command may change.
+It is half of the largest acceleration that the tool commands.
 """
 ANGULAR_BRAKING: Final = 0.4
 
@@ -26,9 +26,9 @@ ANGULAR_BRAKING: Final = 0.4
 def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
     """Return a law that drives the robot through these poses, and stops it at each pose.
 
-    ``places``: relative to the start, with unwrapped yaw.
+    ``places``: the poses relative to the start, with unwrapped yaw.
 
-    ``speed``, ``turning``: largest, in m/s and rad/s.
+    ``speed``, ``turning``: largest speed and yaw rate, in m/s and rad/s.
     """
     number = 0
 
@@ -70,9 +70,9 @@ def turn(angle_rad: float, turning: float) -> Law:
 
 
 def square(side_m: float, sign: int) -> list[Pose]:
-    """Return the poses of a square: four times forward, each followed by a quarter turn.
+    """Return the eight poses at the ends of a square's four sides and four quarter turns.
 
-    ``sign``: 1 to the left, -1 to the right.
+    ``sign``: 1 for turns to the left, -1 for turns to the right.
     """
     places = []
     place = Pose()

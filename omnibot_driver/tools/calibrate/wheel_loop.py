@@ -2,9 +2,9 @@
 
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-Units: counts per tick of 10 ms, PWM steps, ticks. The direction must not change: the dry friction
-is constant. This module knows the motor and the control law; it does not know measurements or
-radians.
+Units: counts per tick of 10 ms, PWM steps, ticks. The wheel must not change its direction, because
+the dry friction is assumed to be constant. This module knows the motor and the control law; it
+does not know measurements or radians.
 """
 
 from dataclasses import dataclass
@@ -48,9 +48,9 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The response of a wheel by tick, from the first tick with the new command.
+    """The response of a wheel, with one value for each tick since the new command.
 
-    ``speed``: during the tick. ``effort``: computed in the tick.
+    ``speed``: speed during the tick. ``effort``: effort that was computed in the tick.
     """
 
     speed: Array
@@ -113,7 +113,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     def way(share: float) -> float:
         """Return how many counts the wheel turns from rest in ``share`` ticks.
 
-        The effort is that of a final speed of one count per tick.
+        The effort is the one that leads to a final speed of one count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 

@@ -17,7 +17,8 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
-    One lag: -0.5 shows displaced marks, 0 shows independent errors. More lags are tapered.
+    With a single lag, a value of -0.5 shows displaced marks, and 0 shows independent errors. With
+    more lags, the values are tapered.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))
@@ -37,9 +38,10 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
 
 def whitener(of_lags: Column, length: int) -> Column:
-    """Return the matrix that removes this autocorrelation from a row of residuals.
+    """Return the matrix that removes an autocorrelation from a row of ``length`` residuals.
 
-    Its upper left part is the matrix for a shorter row.
+    ``of_lags``: the autocorrelation for lags from 0 on. The upper left part of the matrix is the
+    matrix for a shorter row.
     """
     column = np.zeros(length)
     column[: len(of_lags)] = of_lags[:length]

@@ -6,7 +6,7 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are those of ``judge_step.py``. There are three kinds of noise:
+The robots are random, as those of ``judge_step.py``. There are three kinds of noise:
 
 - "each time": every time has an independent error of 10 %.
 - "other marks": the marks have other places in each turn, 10 % off.
@@ -69,7 +69,7 @@ def _slope(values: Column, place: int | slice) -> Column:
 
 
 def _covariance(kind: str, ways_s: Column) -> Column:
-    """Return the covariance of the relative errors of the times ``ways_s`` between marks."""
+    """Return the covariance of the relative errors of the times between marks."""
     count = len(ways_s)
     if kind == "each time":
         return NOISE**2 * np.eye(count)

@@ -6,7 +6,8 @@ Run this by hand, with the number of robots and optionally the first seed (2 min
 
     PYTHONPATH=.:test:test/core:test/tools/lois_ecu python test/tools/lois_ecu/judge_step.py 20
 
-It prints the overshoot of the true wheel speeds with the found gains and even marks.
+The program prints the overshoot of the true wheel speeds in a step with the gains found. In this
+step, the marks of the encoders are evenly spaced.
 """
 
 import contextlib
@@ -49,7 +50,7 @@ def calibrated(motors: Motors, folder: Path, seed: int) -> list[WheelTuned]:
 def true_overshoots(motors: Motors, wheels: Sequence[WheelTuned], folder: Path) -> list[float]:
     """Return the overshoot of each wheel's true speed in a step with the found gains.
 
-    It is relative to the final speed or the target, whichever is higher.
+    The overshoot is relative to the final speed or the target, whichever is higher.
     """
     robot = SimulatedRobot(folder, motors, mark_noise=0.0)
     found = pi_step._gains({wheel.name: wheel.tuned for wheel in wheels})

@@ -66,7 +66,7 @@ def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Co
 def test_a_plants_speed_is_the_change_of_its_way(fast_s: float) -> None:
     """The function ``speed`` is the time derivative of the function ``turned``.
 
-    This includes a plant of first order (``fast_s`` of 0) and two equal time constants.
+    This also holds for a plant of first order (``fast_s`` is 0) and for two equal time constants.
     """
     times_s = np.linspace(0.0, 3.0, 3001)
     slope = np.gradient(turned(times_s, 0.3, fast_s), times_s)
@@ -102,9 +102,9 @@ def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant(
 
 
 def test_noise_that_does_not_come_again_is_not_taken_for_marks() -> None:
-    """The times have only random noise.
+    """The times between ticks have only random noise, and the marks are evenly spaced.
 
-    The tool does not mistake a chance pattern for misplaced marks.
+    The tool finds no misplaced marks.
     """
     random = np.random.default_rng(4)
     assert marks_in([0.1 * random.standard_normal(120) for _ in range(24)], TICKS) is None
@@ -174,7 +174,7 @@ def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> No
 def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plant: Plant) -> None:
     """The board sends data during a step, which delays its controller.
 
-    The gains are for an overshoot of 5 %. 95 % of the overshoots are below 8 %.
+    The gains are tuned for an overshoot of at most 5 %. 95 % of the overshoots are below 8 %.
     """
     loop = replace(LOOP, dead_s=0.02)
     found = tune(plant, loop, Goals(phase_margin_deg=60.0))
@@ -206,9 +206,9 @@ def test_goals_that_nothing_meets_are_told() -> None:
 
 
 def test_a_phase_margin_is_that_of_the_open_loop() -> None:
-    """The phase margin is compared with that of a simple open loop, calculated by hand.
+    """The phase margin agrees with that of a simple open loop, calculated by hand.
 
-    With small lags: Kp K / (s Tn), with gain 1 at Kp K / Tn.
+    Without lags, the open loop is Kp K / (s Tn). Its gain is 1 at the frequency Kp K / Tn.
     """
     loop = Loop(1e-6, 10**9, nominal_s=1e-6)
     plant = Plant(1.0, 0.5, 0.0)
@@ -307,7 +307,8 @@ def test_a_robot_is_calibrated_from_its_records(
 ) -> None:
     """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
 
-    ``calibrate step`` sets corrections, plants and gains. All are allowed in the calibration file.
+    ``calibrate step`` finds the plants, and sets corrections and gains in the driver. The
+    calibration file may contain all of these values.
     """
     monkeypatch.setattr(pi_step, "ROUNDS", 1)
     motors = random_motors(5)
