@@ -23,7 +23,7 @@ WINDOW_S: Final = 30.0
 SETTLE_S: Final = 10.0
 """Time in s to wait for the drivers' start, and for the end of the observer's traffic.
 
-No event reports the last packet.
+No event reports the last packet, so the time is fixed.
 """
 TICK_S: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 FIND: Final = """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make bench``: how long a front angle takes to reach the drive Teensy.
+"""The Fejemis's part of ``make bench``: the delay of the front angle to the drive Teensy.
 
 The two simulated Teensys have their own process. Other processes keep the computer busy.
 """
@@ -132,7 +132,7 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return an empty list of figures, because there is no floor, and the rows of a table."""
+    """Return an empty list, because nothing is compared with a floor, and the rows of a table."""
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

@@ -16,14 +16,14 @@ from publishers import connected
 PERIOD_S = 0.0247
 """Period of the commands in s.
 
-It is not a multiple of the board's tick, so that all phases occur.
+It is not a multiple of the board's tick, so the commands are sent at all times within a tick.
 """
 FASTEST = 30
 LSB_PER_MPS = 70.0
 
 
 def main() -> None:
-    """Command the robots in turn, with the same wait before each command."""
+    """Command the robots in turn, with the same pause before each command."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, int]]] = [[] for _ in namespaces]

@@ -87,7 +87,10 @@ class Stage:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return the figures that have a floor, and an empty list of further report sections."""
+    """Return the comparisons of the driver with the floor, and an empty list.
+
+    The list is for further sections of the report.
+    """
     windows = 2 if quick else 12
     with Stage(2) as stage, ExitStack() as stack:
         parameters = {"board": "lois_ecu", "port": stage.paths[0], "motion_monitor": "false"}

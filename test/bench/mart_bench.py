@@ -3,8 +3,8 @@
 """The MART's part of ``make bench``: the latency of commands, and the cost of the queries.
 
 The driver and the floor (the smallest program with the same output, without any checks) have a
-simulated controller each, on UDP. The driver sends a speed after the current reply, but a stop at
-once.
+simulated controller each, on UDP. The driver sends a speed only after the reply to its current
+query, but a stop at once.
 """
 
 import time
@@ -52,7 +52,10 @@ class Heard(SimulatedMart):
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return the figures that have a floor, and an empty list of further report sections."""
+    """Return the comparisons of the driver with the floor, and an empty list.
+
+    The list is for further sections of the report.
+    """
     windows = 2 if quick else 12
     with ExitStack() as stack:
         boards: list[Any] = [Heard(), Heard()]
@@ -104,9 +107,9 @@ def _medians(late: list[list[float]], windows: int) -> list[list[float]]:
 def _latencies(
     sent: list[tuple[float, float]], heard: list[tuple[float, bytes]], *, stops: bool
 ) -> list[float]:
-    """Return how long each command to a moving robot took to reach the controller, in µs.
+    """Return the latencies of commands to a moving robot, from publication to controller, in µs.
 
-    ``stops``: measure stops, instead of changes of speed.
+    ``stops``: whether stops are measured, instead of changes of speed.
     """
     found = []
     for (_, before), (at, speed) in pairwise(sent):

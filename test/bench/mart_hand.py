@@ -20,7 +20,7 @@ AHEAD_S = 3.0
 
 
 def main() -> None:
-    """Command each speed to the robots in turn, and record when it was first published."""
+    """Command the speeds to the robots in turn, and record the first publication of each speed."""
     seconds, namespaces = float(sys.argv[1]), sys.argv[2:]
     publishers = connected(namespaces)
     sent: list[list[tuple[float, float]]] = [[] for _ in namespaces]

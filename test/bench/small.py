@@ -2,8 +2,9 @@
 
 """Driver and floor on a small computer: each gets a share of one core, by Linux's cgroups.
 
-The quota's period is the shortest that the kernel permits, so the processes run evenly. This needs
-root. The floor is the smallest program with the same output as the driver, without any checks.
+The period of the cgroup is the shortest that the kernel permits, so the processes run evenly. Only
+root can run this program. The floor is the smallest program with the same output as the driver,
+without any checks.
 """
 
 import math
@@ -20,7 +21,7 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core to measure. Driver and floor each get a share of this size."""
+"""Shares of one core that are measured. The driver gets this share, and so does the floor."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays of growing size between the floor and a correct relay. Each step adds one task.
+"""Relays between the floor and the driver, in steps: each step adds one task of the driver.
 
 The floor is the smallest program with the same output as the driver, without any checks.
 

@@ -172,7 +172,7 @@ def commands(adapter: str, windows: int) -> Figure:
 
 
 def imports(times: int) -> Figure:
-    """Measure the time to import the driver, and the time to import what any similar node needs."""
+    """Measure the time to import the driver, and the time to import what any ROS node needs."""
     floor_names = "rclpy, geometry_msgs.msg, nav_msgs.msg, sensor_msgs.msg, std_srvs.srv"
 
     def seconds(names: str) -> float:
@@ -258,7 +258,7 @@ def split(seconds: float) -> list[str]:
 def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return for each message when its frame was delivered, in s, and the latency, in µs."""
+    """Return for each message the time of its frame's delivery, in s, and its latency, in µs."""
     found = []
     for at, value in heard:
         number = round(value / unit)
@@ -273,7 +273,7 @@ def latencies(
 def command_latencies(
     sent: Sequence[tuple[float, int]], heard: Sequence[tuple[float, bytes]]
 ) -> list[float]:
-    """Return how long each command took until the board's first read with its frame, in µs."""
+    """Return the time from each command to the board's first read with its frame, in µs."""
     found = []
     frames = [
         (at, struct.unpack_from(">h", data, begin + 3)[0])

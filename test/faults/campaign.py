@@ -2,7 +2,8 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-With ``--minutes`` it is only a long random walk. The exit code is 1 when anything was wrong.
+With ``--minutes`` the campaign is only a long walk through random faults. The exit code is 1 when
+anything was wrong.
 """
 
 import argparse
@@ -109,7 +110,7 @@ class Campaign(Outcome):
 
     @property
     def outcome(self) -> Outcome:
-        """The result without the rest of this object, so that it can be sent to another process."""
+        """The result as an ``Outcome``, which can be sent to another process."""
         return Outcome(self.rows, self.complaints, self.published, self.wrong)
 
     def rig(self, kind: type[Rig] = Rig, before: str = "") -> Rig:
@@ -243,7 +244,7 @@ class Campaign(Outcome):
             self.judge(rig)
 
     def soak(self, minutes: float) -> None:
-        """Run random walks with one driver for ``minutes``."""
+        """Run sequences of random faults with one driver for ``minutes``."""
         row = self.row(f"soak: random walks of {SOAK_STEPS} faults")
         end, seed = time.monotonic() + 60 * minutes, 0
         with self.rig() as rig:
@@ -301,7 +302,7 @@ def pieces() -> list[Piece]:
 
 
 def play(board: str, numbered: tuple[int, Piece]) -> Outcome:
-    """Run one piece in its own process and ROS domain."""
+    """Run one piece of the campaign in its own process and ROS domain; return the result."""
     number, (method, arguments) = numbered
     os.environ["ROS_DOMAIN_ID"] = str(1 + (os.getppid() + number) % 101)
     rclpy.init()

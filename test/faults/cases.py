@@ -234,7 +234,7 @@ def estop_by_topic(rig: Rig) -> None:
 def service_discards_the_command(service: str, rig: Rig) -> None:
     """Call pause and resume, or another service, while the robot drives.
 
-    The robot must then rest until a fresh command.
+    The robot must stop, and stay at rest until a fresh command.
     """
     rig.drive()
     rig.hand.leave()

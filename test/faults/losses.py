@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes to the board, until the stop is judged.
+"""Stops on a line that loses bytes to the board until the robot must be at rest.
 
-Each stop takes real time. test/integrity/outbound.py measures the rate of failures in simulated
+The stops run in real time. test/integrity/outbound.py measures the rate of failures in simulated
 time.
 """
 

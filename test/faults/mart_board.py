@@ -32,7 +32,7 @@ LOST_STOP_S: Final = 1.2
 BLIND_S: Final = 2.0
 """Longest time in s until a robot must stop if its driver gets no replies.
 
-The time of slow exchanges is included.
+It includes the time that a slow reply may take.
 """
 NETWORK_S: Final = 90.0
 """Longest time in s until a robot on a bad network begins to drive.

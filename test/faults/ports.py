@@ -56,7 +56,7 @@ class Terminal(PtyBoard):
     def full(self, old: bytes) -> Iterator[None]:
         """Fill the kernel's buffer with ``old`` commands (20 kB), which the board does not read.
 
-        At the end, wait until the board has received them.
+        At the end of the ``with`` block, wait until the board has received these commands.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
@@ -71,9 +71,9 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def kept_full(self, old: bytes) -> Iterator[None]:
-        """Keep the kernel's buffer full, even when the driver discards its content.
+        """Keep the kernel's buffer full, even when the driver discards the content of the buffer.
 
-        In the context, the terminal's output is suspended.
+        The terminal's output is suspended until the end of the ``with`` block.
         """
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
@@ -90,9 +90,11 @@ class Terminal(PtyBoard):
 class Server(RunningBoard):
     """A board behind a serial-port server on the network.
 
-    ``deaf``, ``mute``: whether the server keeps back data to the board, or from it.
+    ``deaf``: whether the server holds back data to the board.
 
-    ``accepted_at``: the board's tick at each connection.
+    ``mute``: whether the server holds back data from the board.
+
+    ``accepted_at``: for each connection, the board's tick at which it was accepted.
     """
 
     deaf = mute = False
@@ -125,7 +127,7 @@ class Server(RunningBoard):
     def vanish(self) -> None:
         """Cut the network.
 
-        All packets are dropped, and neither side sees that the connection closes.
+        All packets are dropped, and neither side receives a message that the connection closes.
         """
         program = ctypes.create_string_buffer(DROP_ALL)
         rule = struct.pack("HP", 1, ctypes.addressof(program))
@@ -135,7 +137,7 @@ class Server(RunningBoard):
                 each.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, rule)
 
     def come_back(self) -> None:
-        """Restore the network, with a server that has forgotten its clients."""
+        """Restore the network, with a server that has no connections."""
         self._listener.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
         self.deaf = self.mute = False
 

@@ -50,7 +50,7 @@ def sent_odom_key(frame: bytes) -> Key | None:
 
 
 def not_sent(published: Iterable[Key | None], sent: Iterable[Key | None]) -> int:
-    """Return how many published keys the board has not sent, or has sent in another order."""
+    """Return the number of published keys that the board did not send, or sent in another order."""
     truth = [key for key in sent if key is not None]
     at = missing = 0
     for key in published:

@@ -181,7 +181,10 @@ class Rig:
             self.line.board.reboot()
 
     def wait_for_board(self, predicate: Any, patience_s: float = PATIENCE_S) -> bool:
-        """Wait for a condition, which is checked after each of the board's ticks."""
+        """Wait until ``predicate`` is true; return False on timeout.
+
+        The condition is checked after each tick of the board.
+        """
         assert self._terminal is not None
         return self._terminal.wait_for(predicate, patience_s)
 

@@ -13,7 +13,7 @@ from omnibot_board import BOARD
 def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
     number: int, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The line loses bytes to the board. The loss lasts until the stop is judged.
+    """The line loses bytes to the board, even while the robot must stop.
 
     Each kind of stop still works.
     """

@@ -25,7 +25,7 @@ the motion.
 
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
-    """Cause this number of random faults, and return their names in order."""
+    """Cause ``steps`` random faults, and return the names of the faults in order."""
     names = []
     for step in range(1, steps + 1):
         if random.random() < 0.8:

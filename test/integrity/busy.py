@@ -132,7 +132,7 @@ def each_by_itself(received: Received, random: Random) -> Chunks:
 
 
 def mixed(received: Received, random: Random) -> Chunks:
-    """Deliver pieces of changing kinds.
+    """Deliver pieces whose kind changes at random: single bytes, a few bytes, bursts or packets.
 
     A late reader reads all bytes that have arrived, or some of them.
     """

@@ -86,7 +86,7 @@ class Received:
 
 
 def receive(truth: Truth, fault: Fault, random: Random) -> Received:
-    """Send the true stream through a faulty line, and return it as the host receives it."""
+    """Send the true stream through a faulty line; return the stream that the host receives."""
     origins = fault(len(truth.data), random)
     data = bytes(truth.data[at] if at >= 0 else random.randrange(256) for at in origins)
     times, last = [], 0.0

@@ -47,9 +47,9 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""A pose is wrong if its squared error, normalized by its covariance, is larger than this.
+"""Largest normalised squared error (NEES) of a right pose.
 
-With right covariances, 1 pose in 270,000 exceeds this.
+If the covariances are right, 1 right pose in 270,000 has a larger error.
 """
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
@@ -136,7 +136,9 @@ def _watch(bench: MartBench, score: Score) -> None:
 
 
 def _is_true(sonar: SonarReading, x_m: float, yaw_rad: float) -> bool:
-    """Return whether a sonar's range agrees with the true distance to the wall before the start.
+    """Return whether a sonar's range agrees with the true distance to the wall.
+
+    The wall is in front of the robot's start.
 
     From 254 inches on, the sonar reports -1.
     """

@@ -3,7 +3,7 @@
 """What the driver writes in a scene.
 
 The writes depend only on the states that the board shows. A ``Course`` has the writes for one
-sequence of states. All trials share it.
+sequence of states. All trials of a scene share its courses.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ class Understood:
 
     ``held``: the bytes that the receiver holds after each write.
 
-    ``alike_until``: for each write, the index of the next write of another kind. The two kinds are
-    motions and other writes. A write that the receiver misunderstands also ends a series.
+    ``alike_until``: for each write, the index of the next write that differs. A write differs if it
+    begins or ends a motion, or if the receiver misunderstands it.
     """
 
     held: list[bytes]
@@ -55,7 +55,7 @@ class Course:
         return other
 
     def understood(self, kind: ReceiverKind) -> Understood:
-        """Return what an awake receiver of this kind understands of the course."""
+        """Return what a receiver of this kind, on a running board, understands of the writes."""
         if kind not in self._understood:
             self._understood[kind] = self._understand(kind)
         return self._understood[kind]

@@ -49,7 +49,10 @@ class Write:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A call of the session at a time in s. The session may refuse it."""
+    """A command or a request to the driver's session, at a time in s.
+
+    The session may refuse it.
+    """
 
     at_s: float
     do: Callable[[Session, float], object]
@@ -59,9 +62,9 @@ class Command:
 class Scene:
     """One script of what the driver does. All times are in s.
 
-    ``kind``: such as "timeout".
+    ``kind``: name of the kind of scene, such as "timeout".
 
-    ``wishes``: the calls of the session.
+    ``wishes``: the commands and requests to the driver's session.
 
     ``faults_from_s``: the line has faults from this time on.
 
@@ -73,7 +76,7 @@ class Scene:
 
     ``linear_scale``: LSB per m/s.
 
-    ``exits_s``, ``killed_s``: the time of the driver's end.
+    ``exits_s``, ``killed_s``: the time of the driver's end, on request or by force.
 
     ``guard_after_s``: delay from the driver's end to the guard's action.
     """
@@ -96,15 +99,15 @@ class Scene:
 
 
 def rehearse(scene: Scene, history: History) -> list[Write]:
-    """Run the session through a scene.
+    """Run the driver's session through a scene, while the board shows the states in ``history``.
 
-    Return everything that is written after the port was opened.
+    Return all writes after the opening of the port.
     """
     return [write for write in _Rehearsal(scene).run(dict(history)) if write.at_s < scene.ends_s]
 
 
 class _Rehearsal:
-    """One session on a board that follows commands."""
+    """One run of the driver's session, on a simulated board that follows commands."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -162,9 +165,9 @@ class _Rehearsal:
         self._session.take_events()
 
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
-        """Act as the link does at the driver's end: send Stop until the robot rests, then watch it.
+        """Act as the link does at the driver's end: send Stop until the robot is at rest.
 
-        If the robot keeps moving, the guard writes.
+        If the robot moves again or does not stop, the guard writes its last words.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)

@@ -145,7 +145,7 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Record a letter on which the board acts. Return the name of its error, or "".
+        """Record a letter on which the board acts. Return "false letter" if it was not sent, or "".
 
         ``at``: position of the letter in the write. It is negative if the line added or changed it.
         """
@@ -157,7 +157,7 @@ class Judge:
         return ""
 
     def no_setpoint(self, at_s: float) -> None:
-        """End the active set-point. Count how long it was stray or uncommanded."""
+        """End the active set-point, and count the time for which it was stray or uncommanded."""
         score = self.score
         if self._uncommanded_from_s is not None:
             lasted_s = at_s - self._uncommanded_from_s

@@ -14,9 +14,10 @@ ADDED: Final = -1
 CHANGED: Final = -2
 
 Arrival = tuple[int, float, int]
-"""A byte that arrives: its value, its position in its write, and its origin.
+"""A byte that arrives: its value, its position in the write, and its origin.
 
-Origin: the position, ADDED or CHANGED. Added bytes have fractions as positions.
+The origin of a byte that the driver wrote is its position. Otherwise, the origin is ``ADDED`` or
+``CHANGED``. The position of an added byte is between those of two bytes of the write.
 """
 Change = Callable[[bytes, int, Random], list[Arrival]]
 

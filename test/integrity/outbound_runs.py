@@ -98,7 +98,7 @@ def one(
 
 
 def add(total: Scores, more: Scores) -> None:
-    """Add the scores ``more`` to ``total``, name by name."""
+    """Add each score in ``more`` to the score with the same key in ``total``."""
     for key, score in more.items():
         total.setdefault(key, Score()).__iadd__(score)
 

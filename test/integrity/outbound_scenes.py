@@ -2,7 +2,7 @@
 
 """Scripts of the outbound trials: drives, and every way in which a drive ends.
 
-A scene is made from a seed. Many speeds contain a letter or a header byte.
+A scene is made from a seed. Many commands contain bytes that equal a letter or a header.
 """
 
 import math
@@ -49,7 +49,10 @@ def _rates(random: Random) -> tuple[float, float, float]:
 def driving(
     random: Random, begin_s: float, end_s: float, *, by_wheels: bool = False, rate_hz: float = 0.0
 ) -> list[Command]:
-    """Return commands at a random rate. The commands change at random times."""
+    """Return commands from ``begin_s`` to ``end_s``, which change at random times.
+
+    ``rate_hz``: rate of the commands. 0: a random rate.
+    """
     rate_hz, changes = rate_hz or random.choice(RATES_HZ), random.choice((0.0, 0.1, 0.1, 1.0))
     wishes = []
     now = begin_s
@@ -114,7 +117,7 @@ def _wheels(random: Random) -> bool:
 
 
 def drive(rate_hz: float, random: Random) -> Scene:
-    """Make a scene that only drives, with commands at this rate. Its end is not judged."""
+    """Make a scene that only drives, with commands at this rate, and does not stop the robot."""
     wishes = driving(random, FROM_S, FROM_S + DRIVE_S, rate_hz=rate_hz)
     return Scene(
         kind=f"drive {rate_hz:g}",
@@ -276,7 +279,7 @@ def leave(random: Random) -> Scene:
 
 
 def kill(random: Random) -> Scene:
-    """Make a scene in which the driver is killed, perhaps during a write. Then its guard writes."""
+    """Make a scene in which the driver is killed, perhaps during a write. Its guard sends Stop."""
     wishes, last_s = _leg(random)
     killed_s = last_s + random.choice((0.0002, 0.0007, 0.0012, 0.002, 0.02))
     if random.random() < 0.2:

@@ -28,7 +28,7 @@ ACCEL_Z = -16384
 
 
 class Shown(NamedTuple):
-    """The part of the board's state that the driver can see in what the board sends."""
+    """The part of the board's state that the driver can detect in the board's frames and texts."""
 
     mode: str
     """The mode: booting, paused or running."""
@@ -40,7 +40,7 @@ class Teller:
 
     ``linear_scale``: LSB per m/s.
 
-    ``goals``: whether a frame is a goal to which the board drives.
+    ``goals``: whether the board drives to goals, as under position control.
     """
 
     def __init__(self, linear_scale: float, *, goals: bool = False) -> None:

@@ -75,8 +75,9 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    Each ``run`` begins at the scene's ``faults_from_s``. Trials with the same kind of receiver may
-    share a ``memo``.
+    Each call of ``run`` begins at the time from which the line has faults.
+
+    ``memo``: cached results, which trials with the same kind of receiver may share.
     """
 
     def __init__(self, course: Course, board: BoardKind, memo: Memo) -> None:

@@ -15,7 +15,9 @@ class Items:
 
     ``letters``: the offset and the byte of each letter.
 
-    ``stops``: whether there are frames, all without motion.
+    ``moves``: whether the write contains a motion frame.
+
+    ``stops``: whether the write contains control frames, but no motion.
     """
 
     frames: tuple[tuple[int, int, Words], ...] = ()

@@ -36,7 +36,7 @@ def driver() -> tuple[Feed, Feed]:
 def plain() -> tuple[Feed, Feed]:
     """Make a parser that checks nothing. Return the functions that feed and flush it.
 
-    A header fixes the number of bytes to take.
+    A header alone determines the kind and the length of a frame.
     """
     held = bytearray()
 

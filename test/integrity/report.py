@@ -26,13 +26,13 @@ BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_report", "mart": "mart_report", "fejemis": "fejemis_report"}
 """For each other board, the module that measures its codec."""
 SEEDS_OF_THE_PLAIN_PARSER = 4
-"""Number of streams for the plain parser. Its errors are frequent, so a few streams show them."""
+"""Number of streams for the plain parser. Its errors are frequent, so a few streams suffice."""
 
 Job = tuple[str, int, str]
 
 
 def one(seconds: float, job: Job) -> tuple[str, Scores]:
-    """Return a parser's name and its scores for one stream. This runs in a process of the pool."""
+    """Return a parser's name and its scores for one stream. The call runs in another process."""
     scenario, seed, parser = job
     return parser, run(scenario, seed, seconds, parser)
 

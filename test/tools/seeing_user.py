@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A simulated user who sees the robot's wheels turn, and who holds the robot as the tool asks."""
+"""A simulated user who watches the robot's wheels, and who tilts the robot as the tool requests."""
 
 from omnibot_driver.simulator.omnibot import PtyBoard
 

@@ -51,7 +51,7 @@ def test_a_driver_of_another_version_is_told(
 ) -> None:
     """The driver lacks one of the tool's parameters.
 
-    The message says that the driver and the tool have different versions.
+    The message reports that the driver and the tool have different versions.
     """
     newer = Parameter("of_tomorrow", 1, "", "")
     table = replace(PARAMETERS, sections={**PARAMETERS.sections, "New": (newer,)})

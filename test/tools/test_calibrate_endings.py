@@ -74,7 +74,7 @@ def test_all_is_well(ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixtu
 def test_a_picture_that_cannot_be_drawn_costs_the_picture_alone(
     draw: Callable[[Any], None], ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The picture cannot be drawn. The result is still saved, and the error says so."""
+    """The picture cannot be drawn. The result is still saved, and the error message states this."""
     assert ending(draw=draw) == 1
     assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
     said = capsys.readouterr()

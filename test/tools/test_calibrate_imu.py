@@ -114,9 +114,9 @@ def test_a_bias_that_walks_is_known_less_well() -> None:
 
 
 def test_a_long_rest_makes_a_moderate_picture(tmp_path: Path) -> None:
-    """A picture of noise does not compress well. So the picture of a long rest omits many points.
+    """A picture of noise does not compress well. The picture of a long rest omits many points.
 
-    The file is smaller than 170 kB.
+    The file is therefore smaller than 170 kB.
     """
     imu = sensor(120.0)
     picture = tmp_path / "imu.png"
@@ -147,7 +147,7 @@ def test_readings_that_say_nothing_are_turned_away() -> None:
 def test_a_robot_that_moves_is_not_at_rest() -> None:
     """The robot should rest, but its wheels turn, or its gyro shows too high a rate for a bias.
 
-    The tool rejects such a rest.
+    The tool reports that the robot moves.
     """
     still(np.zeros(3))(log_of(sensor(3.0)))
     with pytest.raises(ToolError, match="its wheels turn"):

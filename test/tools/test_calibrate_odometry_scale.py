@@ -151,7 +151,7 @@ def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
 def test_a_line_that_was_misread_is_told() -> None:
     """The user measures two lines of equal length, and misreads the tape on one of them.
 
-    A note says by how much the two results differ.
+    A note gives the difference of the two results.
     """
     robot = TwoWheels()
     found = geometry.run(robot, answers(robot, misread_mm=100.0), arguments("geometry"))

@@ -42,7 +42,7 @@ def watch(topic: Topic, command: Vector3, measured: Vector3) -> None:
 def test_a_robot_with_slow_odometry_is_watched_for_longer() -> None:
     """The robot has slow odometry and does not move. The tool reports this only after 3 s.
 
-    This robot lacks scales, so the error does not mention them.
+    The driver has no scale parameters, so the error does not mention scales.
     """
     obedience = Obedience("cmd_vel", {"odom_rate": 20.0})
     still, ahead = (0.0, 0.0, 0.0), (0.2, 0.0, 0.0)
@@ -91,7 +91,9 @@ def test_a_command_beyond_the_bounds_is_refused(command: tuple[float, float, flo
 
 
 def test_a_robot_out_of_bounds_is_told_by_how_much() -> None:
-    """A robot drives too far, turns too much or takes too long. The error says by how much.
+    """A robot drives too far, turns too much or takes too long.
+
+    The error gives the distance, the angle or the time.
 
     A pose that is not finite is an error, too.
     """

@@ -23,7 +23,7 @@ ASSUMED = (70.0, 70.0, 500.0)
 
 
 def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) -> Log:
-    """Return the log of a drive in which the commands are planned with the scales ``ASSUMED``.
+    """Return the log of a drive whose commands are planned with assumed scales.
 
     ``true``: the board's scales. ``gyro``: a factor on the measured rate.
     """
@@ -56,7 +56,10 @@ def drive(true: tuple[float, float, float], seed: int = 0, gyro: float = 1.0) ->
 def test_any_scale_is_found_within_what_is_claimed(
     linear: float, angular: float, seed: int
 ) -> None:
-    """Whatever the scale, odometry and gyro each give it within five claimed sigmas."""
+    """Whatever the scales of the board, the tool finds them within five claimed sigmas.
+
+    It finds the scale of turns by the odometry and also by the gyro.
+    """
     found = speeds(drive((linear, linear, angular), seed), ASSUMED, UP, NO_BIAS)
     by = scale([one for one in found if one.axis < 2])
     assert abs(by.value - linear) < max(5 * by.sigma, 1e-4 * linear)
@@ -106,7 +109,10 @@ def test_a_gyro_that_contradicts_the_odometry_is_told() -> None:
 
 
 def test_axes_that_disagree_are_told() -> None:
-    """The scales of x and y differ, but both axes share one parameter. A note says so."""
+    """The scales of x and y differ, but both axes share one parameter.
+
+    A note gives the difference.
+    """
     found = speeds(drive((70.0, 72.0, 500.0)), ASSUMED, UP, NO_BIAS)
     assert "x and y differ by 2.8%" in result(found, NOW).notes[0]
 

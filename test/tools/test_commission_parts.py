@@ -88,9 +88,9 @@ def test_what_is_not_three_signs_is_not_understood(answer: str) -> None:
 def test_a_wheel_is_itself_or_it_is_a_contradiction(
     wheel: int, pattern: tuple[int, int, int]
 ) -> None:
-    """One wheel is commanded. A pattern is valid if only this wheel turns, forward or backward.
+    """One wheel is commanded, and the user answers with one of the 27 patterns of wheel directions.
 
-    All other patterns of the 27 are contradictions.
+    A pattern in which only this wheel turns is valid. All others are contradictions.
     """
     alone = tuple(int(n == wheel) for n in range(3))
     if pattern in (alone, tuple(-n for n in alone)):
@@ -105,10 +105,9 @@ def test_a_wheel_is_itself_or_it_is_a_contradiction(
 def test_an_axis_is_right_or_reversed_or_it_is_a_contradiction(
     axis: int, pattern: tuple[int, int, int]
 ) -> None:
-    """One axis is commanded.
+    """One axis is commanded, and the user answers with one of the 27 patterns of wheel directions.
 
-    A pattern of the wheels is valid if it is the expected one or its reverse. All other patterns of
-    the 27 are contradictions.
+    The expected pattern and its reverse are valid. All others are contradictions.
     """
     expected = wanted(axis)
     if pattern == expected:
@@ -297,9 +296,9 @@ def test_a_pose_is_driven_to_and_no_further(slow: Drift, fast: Drift) -> None:
     ],
 )
 def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
-    """The motion fits neither control method, so the tool finds none.
+    """The motion fits neither velocity nor positional control, so the tool finds no control method.
 
-    For example, a command came late, so the robot becomes faster during the measurement.
+    For example, a command came late, and the robot becomes faster during the measurement.
     """
     assert control_method(slow, fast, 0.06) is None
 
@@ -308,9 +307,10 @@ def test_a_disturbed_motion_shows_nothing(slow: Drift, fast: Drift) -> None:
 def test_the_wrong_frame_turns_with_the_robot(
     direction_rad: float, turned_rad: float, side: int
 ) -> None:
-    """The robot drives in one direction of the room before and after a turn.
+    """The robot gets the same command before and after a turn.
 
-    In the wrong frame, the direction turns with the robot. Any other change is an error.
+    In the right frame, the direction in the body's axes is the same. In the wrong frame, it changes
+    by the angle of the turn. Any other change is an error.
     """
 
     def heading(rad: float) -> Drift:

@@ -106,7 +106,7 @@ def test_a_key_asks_for_what_the_last_line_says(key: str, asked: str) -> None:
 
 
 def test_the_estop_is_released_by_two_keys() -> None:
-    """The key R asks whether to release the e-stop.
+    """After the key R, the monitor asks whether to release the e-stop.
 
     The key y confirms, and any other key cancels.
     """
@@ -116,9 +116,9 @@ def test_the_estop_is_released_by_two_keys() -> None:
 
 
 def test_space_stops_even_while_a_question_stands() -> None:
-    """The monitor asks whether to release the e-stop.
+    """The monitor asks whether to release the e-stop, and the user presses the space bar.
 
-    The space bar means no, and requests the e-stop.
+    The monitor takes this as no, and requests the e-stop again.
     """
     assert press("R", "space", "y").asked == ["estop"]
 

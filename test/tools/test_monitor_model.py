@@ -79,7 +79,7 @@ def test_the_way_is_kept_in_steps() -> None:
 
 
 def test_the_way_is_bounded() -> None:
-    """The path never has more than ``LONGEST_PATH`` points, even after hours of driving."""
+    """The robot drives for hours. The number of points in its path stays limited."""
     model = Model("/omnibot_driver", 0.0)
     for tick in range(2 * LONGEST_PATH):
         model.odom(Pose(0.03 * tick, 0.0), HALT, 0.04 * tick)

@@ -100,7 +100,7 @@ def test_a_message_cannot_move_the_cursor() -> None:
 
 
 def test_a_silent_driver_is_said_to_be_silent() -> None:
-    """The driver is silent. The title says for how long, and omits the outdated link."""
+    """The driver is silent. The title shows for how long, and omits the old state of the link."""
     assert text.title(view(silent_s=7.2)).endswith("silent for 7 s (last state: nominal)")
     assert text.title(view()) == "/robot1/omnibot_driver  nominal  connected, /dev/omnibot"
 

@@ -21,7 +21,7 @@ def test_a_library_that_is_there_is_imported() -> None:
 
 
 def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
-    """The message names the missing library, without its submodule, and says how to install it."""
+    """A library is missing. The message names it, without its submodule, and how to install it."""
     with pytest.raises(ToolError) as refusal:
         need("no_such_library.part")
     assert str(refusal.value) == (

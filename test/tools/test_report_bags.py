@@ -137,7 +137,7 @@ def test_what_is_not_a_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_an_empty_bag_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A bag has a topic, but no messages. The report says that the bag is empty."""
+    """A bag has a topic, but no messages. The error message states that the bag is empty."""
     with Writer(tmp_path / "bag", version=9) as writer:
         writer.add_connection("/imu/data_raw", "sensor_msgs/msg/Imu", typestore=TYPES)
     assert "is empty" in refused(tmp_path / "bag", capsys)
@@ -182,7 +182,7 @@ def test_a_place_that_cannot_be_written_is_told(
 ) -> None:
     """A file has the name of the output folder, so the folder cannot be made.
 
-    The report says so.
+    The report ends with an error message.
     """
     (tmp_path / "out").write_text("taken")
     assert "cannot be written" in refused(write(tmp_path / "bag", [drive]), capsys)

@@ -56,7 +56,7 @@ def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None
 def test_a_long_gap_is_worse(drive: Drive) -> None:
     """The odometry has a gap of 1 s.
 
-    Because it is longer than 0.5 s, its level is BAD, not WARN.
+    A gap of more than 0.5 s has the level BAD, not WARN.
     """
     drive.odom.drop(8.0, 9.0)
     assert said(drive, "Gaps", "odom", "1 gap").level is Level.BAD
@@ -72,9 +72,9 @@ def test_a_pause_is_not_a_gap(drive: Drive) -> None:
 
 
 def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) -> None:
-    """The board is lost for a while. The report names the loss once, by the driver's state.
+    """The board is lost for a while. The report mentions the loss once, from the driver's state.
 
-    The gaps in its data are not reported too.
+    The gaps in the board's data are not reported in addition.
     """
     drive.states += [(17.0, "connecting"), (18.0, "nominal")]
     drive.imu.drop(16.9, 18.0)
@@ -85,7 +85,7 @@ def test_a_lost_board_is_reported_and_is_not_counted_as_a_gap_too(drive: Drive) 
 def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
     """The last state is ``disconnected``.
 
-    The report says that the driver ended, not that it lost the board.
+    The report mentions the end of the driver, and no loss of the board.
     """
     drive.states.append((19.5, "disconnected"))
     assert not troubles(drive)
@@ -95,7 +95,7 @@ def test_the_end_of_the_driver_is_not_a_lost_board(drive: Drive) -> None:
 def test_stamps_that_leap_and_come_back_are_no_gap(drive: Drive) -> None:
     """Timestamps jump ahead by 20 ms and slowly return. The report calls this a jump, not a gap.
 
-    Cause: a driver that could not read for some time.
+    The cause is a driver that could not read for some time.
     """
     drive.imu.stamp_s[800:850] += np.linspace(0.020, 0.0, 50)
     drive.imu.late_s = drive.imu.late_s + 0.05
@@ -113,9 +113,9 @@ def test_uneven_stamps_are_noticed(drive: Drive) -> None:
 
 
 def test_a_board_that_was_lost_and_sought_was_out_of_reach_once(drive: Drive) -> None:
-    """The states ``disconnected`` and ``connecting`` follow each other.
+    """The driver's states ``disconnected`` and ``connecting`` follow each other.
 
-    This is one loss of the board.
+    The report counts one loss of the board.
     """
     drive.states += [(8.0, "disconnected"), (8.5, "connecting"), (9.0, "nominal")]
     for topic in (drive.imu, drive.odom, drive.joints):
@@ -139,7 +139,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """Every other reading of a log is missing. The report says that the rate is wrong.
+    """Every second reading of a log is missing. The report calls the rate wrong.
 
     It does not report gaps.
     """
@@ -187,7 +187,7 @@ def test_messages_that_wait_are_told_with_the_cure(drive: Drive) -> None:
 
 
 def test_a_recorder_with_another_clock_is_told_once(drive: Drive) -> None:
-    """All IMU messages arrive 30 s after their timestamps. A single finding says so."""
+    """All IMU messages arrive 30 s after their timestamps. A single finding reports this delay."""
     drive.imu.late_s = drive.imu.late_s + 30.0
     (clock,) = troubles(drive)
     assert "30 s after its stamp" in clock.text
@@ -228,7 +228,7 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
     """For each status of the diagnostics, the report gives the worst level and the message.
 
-    It also says how often the driver reported this level.
+    It also gives the number of times that the driver reported this level.
     """
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))
@@ -268,7 +268,7 @@ def test_topics_that_are_missing_are_named(drive: Drive) -> None:
 def test_stamps_of_zero_are_told(drive: Drive) -> None:
     """Some messages have no timestamp.
 
-    The report says so, because the driver stamps all its messages.
+    The report mentions them, because the driver stamps all its messages.
     """
     log = drive.log()
     log.imu.stamp_s[:3] = np.nan

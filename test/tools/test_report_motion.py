@@ -38,7 +38,7 @@ def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
 
 
 def test_a_tilt_at_rest_is_told(drive: Drive) -> None:
-    """At rest, the sensor is tilted by 10° about y. The report says so."""
+    """At rest, the sensor is tilted by 10° about y. The report gives this tilt."""
     tilt = np.radians(10.0)
     force = drive.imu.values[:, 3:].copy()
     drive.imu.values[:, 3] = force[:, 0] * np.cos(tilt) + force[:, 2] * np.sin(tilt)
@@ -56,9 +56,9 @@ def test_a_biased_gyro_is_told_with_the_service_that_mends_it(drive: Drive) -> N
 
 
 def test_a_stuck_gyro_is_wrong(drive: Drive) -> None:
-    """200 gyro readings are identical, and the level is BAD.
+    """200 successive gyro readings are identical, but those of the accelerometer vary.
 
-    The accelerometer varies and is not named.
+    The report calls the gyro stuck, with the level BAD, and does not mention the accelerometer.
     """
     drive.imu.values[500:700, :3] = drive.imu.values[500, :3]
     stuck = said(drive, "IMU", "identical readings")
@@ -77,9 +77,9 @@ def test_a_gyro_that_contradicts_the_wheels_is_told(drive: Drive) -> None:
 def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
     drive: Drive, lost: tuple[str, ...]
 ) -> None:
-    """IMU or odometry messages are lost during a turn of 2 s. Gyro and wheels are not compared.
+    """IMU or odometry messages are lost for 2 s during a turn.
 
-    The next pose contains the whole turn in one step.
+    The report does not compare gyro and wheels in this gap. They agree in the rest of the drive.
     """
     for name in lost:
         getattr(drive, name).drop(8.0, 10.0)
@@ -87,9 +87,9 @@ def test_turns_that_were_not_heard_do_not_contradict_the_wheels(
 
 
 def test_a_gap_in_the_odometry_is_not_rest(drive: Drive) -> None:
-    """The odometry has a gap. The robot may turn during the gap.
+    """The odometry has a gap, in which the robot may turn.
 
-    So the report does not regard the gap as rest.
+    The report does not regard the gap as rest.
     """
     drive.odom.drop(8.0, 10.0)
     assert said(drive, "IMU", "At rest the gyro").level is Level.GOOD
@@ -166,7 +166,7 @@ def test_commands_that_ceased_are_noted(drive: Drive) -> None:
 
 
 def test_a_robot_that_moves_by_itself_is_told(drive: Drive) -> None:
-    """The robot moves for four seconds without commands. The report says so."""
+    """The robot moves for four seconds without commands. The report mentions this motion."""
     drive.cmd_vel.drop(10.0, 14.0)
     assert said(drive, "Commands", "without a command").level is Level.WARN
 

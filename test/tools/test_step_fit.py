@@ -105,7 +105,7 @@ def test_late_commands_are_put_right_and_a_stall_is_left_out() -> None:
 
 
 def test_a_wheel_that_answers_differently_each_time_is_said() -> None:
-    """A wheel responds differently from step to step. A note says so."""
+    """A wheel responds differently from step to step. A note warns of this."""
     random = np.random.default_rng(5)
     steps = made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 1) + made_up(FIRST_ORDER, (1.0, 0.06, 0.0), 2)
     for step in steps:

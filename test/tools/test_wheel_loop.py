@@ -140,7 +140,10 @@ def test_two_equal_poles_are_no_exception() -> None:
 
 
 def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
-    """The angle at the end of a tick is the sum of all speeds so far, times the tick period."""
+    """A motor runs in the manual's control loop.
+
+    The angle at the end of a tick is the sum of all speeds so far, times the tick period.
+    """
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
     speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5).speed

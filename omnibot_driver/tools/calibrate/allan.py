@@ -59,7 +59,10 @@ class Noise:
     walk: float
 
     def deviation(self, tau_s: Column) -> Column:
-        """Return the Allan deviation that this noise has at the averaging times ``tau_s``, in U."""
+        """Return the Allan deviation of this noise at the averaging times ``tau_s``, in s.
+
+        The result has the unit of the readings.
+        """
         variance = self.density**2 / tau_s + FLICKER * self.instability**2
         return np.asarray(np.sqrt(variance + self.walk**2 * tau_s / 3))
 

@@ -2,8 +2,8 @@
 
 """``calibrate commission``: guide the user to find how motors and IMU are oriented.
 
-The user moves the robot and answers questions where the board's data do not suffice. A
-contradiction is explained, and the question is repeated.
+The user moves the robot, and answers the questions that the board's data cannot answer. If an
+answer is contradictory, the tool explains the contradiction and repeats the question.
 """
 
 import argparse
@@ -219,9 +219,9 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Run a motion that the user watches; return how the wheels turned, as the user saw it.
+        """Run a motion that the user watches; return the wheels' directions in the user's answer.
 
-        The user may ask to see the motion again.
+        The user may request the motion again.
         """
         while True:
             self._console.say(f"\n{what}:")
@@ -272,8 +272,8 @@ class Walk:
     def _until_possible(self, find: Callable[[], T]) -> T:
         """Call ``find`` until it succeeds; return its result.
 
-        ``find`` raises Contradiction for an impossible answer or measurement. Raises ToolError
-        after ``TRIES`` failures.
+        ``find`` raises Contradiction for an impossible answer or measurement. After several such
+        failures, this method raises ToolError.
         """
         for _ in range(TRIES):
             try:

@@ -71,7 +71,10 @@ def save(result: Result, output: Path, table: Table) -> None:
 
 
 def draw(result: Result, output: Path, picture: Path) -> None:
-    """Draw the picture. On failure, a ToolError says whether at least the result is saved."""
+    """Draw the picture of a result. Raises ToolError on failure.
+
+    The message of the error also states whether the result is saved.
+    """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure

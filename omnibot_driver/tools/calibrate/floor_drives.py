@@ -105,9 +105,9 @@ def driven(
 
 
 def turned_past_mark(console: Console) -> float:
-    """Ask how far the robot's front has turned past the mark on the floor; return it in rad.
+    """Ask for the angle from the mark on the floor to the robot's front; return this angle in rad.
 
-    Positive to the left.
+    It is positive if the front points left of the mark.
     """
     return math.radians(
         console.number(

@@ -34,7 +34,9 @@ class Reading:
 
     ``path``: odometry poses, (n, 3), until the robot is at rest.
 
-    ``end``, ``sigma``: the true end relative to the start, (3,). NaN if not measured.
+    ``end``: the measured end relative to the start, (3,). A value that was not measured is NaN.
+
+    ``sigma``: standard deviations of the values in ``end``, (3,).
     """
 
     name: str
@@ -69,13 +71,13 @@ class Geometry:
 
     @property
     def turn_sigma(self) -> float:
-        """Standard deviation of ``turn``."""
+        """Standard deviation of the ratio of the true angle of a turn to the computed angle."""
         slope = np.array([1 / self.base, -self.wheels / self.base**2, 0.0, 0.0])
         return _sigma(slope, self.covariance)
 
     @property
     def unlike_sigma(self) -> Column:
-        """Standard deviation of each value in ``unlike``, (3,)."""
+        """Standard deviation of each wheel's relative deviation from the mean radius, (3,)."""
         slopes = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, 0, -1, -1]], dtype=float)
         return np.array([_sigma(slope, self.covariance) for slope in slopes])
 

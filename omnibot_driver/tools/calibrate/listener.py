@@ -118,7 +118,7 @@ class Listener(Client):
     def _begin(self, states: Sequence[str]) -> None:
         """Wait for fresh data, then begin a new log.
 
-        The tool receives nothing while it waits for the user's answer, so its last data may be old.
+        The last data may be old, because the tool receives nothing while it waits for the user.
         """
         self._require_alone()
         self._heard_s = dict.fromkeys(self._topics, -math.inf)
@@ -145,7 +145,7 @@ class Listener(Client):
     def _lost(self) -> list[str]:
         """Return the required topics without recent data.
 
-        Pending messages are read first: perhaps this program was only too slow to read them.
+        Pending messages are read first, because this program may have been too slow to read them.
         """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):

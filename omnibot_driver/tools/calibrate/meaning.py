@@ -18,7 +18,7 @@ from omnibot_driver.tools.needs import ToolError
 ControlMethod = Literal["velocity", "position"]
 
 STANDS_PART: Final = 0.1
-"""Up to this fraction of the commanded speed, the robot is regarded as standing still."""
+"""Largest fraction of the commanded speed at which the robot is regarded as standing still."""
 STEADY_PART: Final = 0.25
 STOPS_PART: Final = 0.5
 """Largest ratio of late to early speed at which the robot is regarded as stopping.

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Find how the IMU is mounted, from gravity: level, front raised, left side raised.
+"""Find the mounting of the IMU from gravity in three postures of the robot.
 
-A turn to the left shows whether gyro and gravity agree. This module knows IMU readings; it does not
-know who holds the robot.
+The postures are level, front raised, and left side raised. A turn to the left shows whether gyro
+and gravity agree. This module knows IMU readings; it does not know who holds the robot.
 """
 
 import math
@@ -21,22 +21,25 @@ from omnibot_driver.tools.calibrate.seen import Contradiction
 Array = NDArray[np.float64]
 
 STILL_RADPS: Final = 0.1
-"""Standard deviation of the rotation rate, in rad/s, up to which the robot is held still enough."""
+"""Largest standard deviation of the gyro's rates, in rad/s, while the robot is held still."""
 GRAVITY_PART: Final = 0.15
 LEAST_TILT_RAD: Final = math.radians(10)
 MOST_TILT_RAD: Final = math.radians(75)
 SQUARE_RAD: Final = math.radians(35)
-"""Largest accepted deviation from a right angle of the angle between the two tilts, in rad."""
+"""Largest accepted deviation of the angle between the two tilts from 90°, in rad."""
 LEAST_TURN_RAD: Final = math.radians(30)
 SNAP_RAD: Final = math.radians(15)
-"""Largest rotation, in rad, that makes a mounting right-angled.
+"""Largest rotation, in rad, by which the tool corrects a mounting to a right-angled one.
 
-Right-angled: each axis of the IMU is parallel to an axis of the body.
+In a right-angled mounting, each axis of the IMU is parallel to an axis of the body.
 """
 HAND_RAD: Final = math.radians(2)
 """Least assumed standard deviation, in rad, of the direction of a tilt made by hand."""
 LEVEL_WEIGHT: Final = 20.0
-"""Weight of the level posture relative to a tilted one, because tilts by hand are less exact."""
+"""Weight of the level posture in the fit.
+
+A posture that is tilted by hand is less exact, and has the weight 1.
+"""
 
 
 @dataclass(frozen=True, slots=True)

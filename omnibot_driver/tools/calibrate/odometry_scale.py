@@ -41,7 +41,7 @@ If the first one grows, the second one must be reduced in proportion.
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.
 
-Names: the parameter, the value in /diagnostics, the value's standard deviation.
+The three values are the parameter's name, the name in /diagnostics, and the standard deviation.
 """
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark where"
@@ -79,12 +79,12 @@ class Ratio:
 
     @property
     def value(self) -> float:
-        """The ratio of ``true`` to ``told``."""
+        """Ratio of the motion by the tape to the motion by the odometry."""
         return self.true / self.told
 
     @property
     def value_sigma(self) -> float:
-        """The standard deviation of ``value``."""
+        """Standard deviation of the ratio of the motion by the tape to that by the odometry."""
         return self.sigma / abs(self.told)
 
 

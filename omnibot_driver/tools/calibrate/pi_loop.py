@@ -45,7 +45,9 @@ class PiGains:
 class Loop:
     """The control loop of a wheel. Times are in s.
 
-    ``whole_rpm``: the controller rounds the measured speed down.
+    ``dead_s``: dead time of the plant.
+
+    ``whole_rpm``: whether the controller rounds the measured speed down to whole RPM.
 
     ``nominal_s``: the control period that the board assumes.
 

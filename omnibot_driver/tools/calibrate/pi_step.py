@@ -5,7 +5,7 @@
 1. Record steps with the present gains.
 2. Find the encoders' corrections at a constant duty.
 3. Fit each plant to starts at full duty.
-4. ``ROUNDS`` times: compute gains, record steps, fit the dead time for the next round.
+4. In several rounds, compute gains, record steps, and fit the dead time for the next round.
 """
 
 import argparse
@@ -45,7 +45,7 @@ The board does not acknowledge settings. The driver therefore sends each setting
 QUIET_S: Final = 0.5
 """Period, in s, with which the board sends ticks during a record.
 
-The period is long, because the board does not measure ticks while it sends.
+The period is long, because the board misses ticks of the wheel while it sends.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""

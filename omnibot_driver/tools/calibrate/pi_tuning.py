@@ -2,7 +2,7 @@
 
 """Find gains of a band-limited PI controller that suit a plant.
 
-Afterwards the plant's dead time is fitted to recorded steps with these gains.
+This module also fits the plant's dead time to recorded steps with such gains.
 """
 
 from collections.abc import Sequence

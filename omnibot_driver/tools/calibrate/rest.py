@@ -2,8 +2,8 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-Tilt, slope and sideways bias look equal, so only the bias along gravity is found. This module knows
-readings; it does not know how they are recorded.
+A tilt, a slope and a sideways bias have the same effect on the readings. Therefore only the bias
+along gravity is found. This module knows readings; it does not know how they are recorded.
 """
 
 from collections.abc import Callable

@@ -35,13 +35,13 @@ class Finding:
 class Result:
     """The result of a calibration.
 
-    ``parameters``: for the driver to load, by name.
+    ``parameters``: values that the driver loads, by name.
 
-    ``record``: further content of the file. The driver ignores it.
+    ``record``: further content of the calibration file, which the driver ignores.
 
     ``notes``: sentences for the user.
 
-    ``draw``: draws into a figure of 9 by 6 inches.
+    ``draw``: function that draws the result into a figure of 9 by 6 inches.
     """
 
     findings: list[Finding]

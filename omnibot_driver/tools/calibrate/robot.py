@@ -267,10 +267,9 @@ class Robot(Listener):
             )
 
     def _require_unforgotten(self, silence_s: float) -> None:
-        """Raise ToolError if this program has sent no command for too long.
+        """Raise ToolError if this program has sent no command for longer than the driver's timeout.
 
-        ``silence_s``: time since the last command. After ``cmd_vel_timeout`` the driver stops the
-        robot.
+        The driver has then stopped the robot. ``silence_s``: time since the last command.
         """
         if silence_s > self.parameters["cmd_vel_timeout"]:
             raise ToolError(

@@ -21,11 +21,11 @@ STILL: Final[Pattern] = (0, 0, 0)
 
 
 class Contradiction(Exception):
-    """An answer or a measurement cannot be right. The message says why."""
+    """An answer or a measurement cannot be right. The message gives the reason."""
 
 
 def understand(answer: str) -> Pattern | None:
-    """Return the pattern of an answer such as ``+0-``, or None if the answer is not a pattern.
+    """Return the three directions in an answer such as ``+0-``, or None if it is not valid.
 
     Spaces and commas are ignored.
     """
@@ -38,12 +38,14 @@ def understand(answer: str) -> Pattern | None:
 
 
 def in_words(pattern: Sequence[int]) -> str:
-    """Return a text for the user that describes the pattern."""
+    """Return a text for the user that describes the directions of wheels A, B and C."""
     return ", ".join(f"{wheel} {WORDS[sign]}" for wheel, sign in zip(WHEELS, pattern, strict=True))
 
 
 def wanted(axis: int) -> Pattern:
-    """Return the pattern of a motion along +x, +y or +yaw by the manual's equations.
+    """Return the directions of wheels A, B and C in a motion along +x, +y or +yaw.
+
+    The directions follow from the manual's equations.
 
     ``axis``: 0 for x, 1 for y, 2 for yaw.
     """

@@ -69,7 +69,7 @@ class Scale:
 
 
 def plan(top: Vector3, scales: Vector3, levels: int, seconds: float) -> list[tuple[float, Vector3]]:
-    """Return commands in both directions along each axis, each with its duration in s.
+    """Return pairs of a duration in s and a command, in both directions along each axis.
 
     ``top``: largest speeds. ``scales``: counts per m/s or rad/s. ``levels``: number of speeds for
     each axis.

@@ -101,9 +101,9 @@ def _wheels(names: str) -> str:
 
 
 def _levels(parameters: dict[str, Any], arguments: argparse.Namespace) -> tuple[float, float]:
-    """Return the slow and the fast speed in rad/s, as whole units of the board's command.
+    """Return the slow and the fast speed in rad/s, rounded to whole units of the board's command.
 
-    Raises ToolError if they are not allowed, or are equal.
+    Raises ToolError if a speed is not allowed, or if the two speeds are equal.
     """
     slow, fast = arguments.speeds
     if not 0.0 < slow < fast <= parameters["max_wheel_speed"]:

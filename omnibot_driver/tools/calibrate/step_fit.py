@@ -73,7 +73,8 @@ class Step:
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
         """Return the predicted rates of this step's odometry deltas, in rad/s.
 
-        ``mean``: mean response to a unit step in deltas that end at the given ticks.
+        ``mean``: function that returns the mean response to a unit step in each odometry delta, for
+        the ticks at which the deltas end.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps
@@ -122,7 +123,7 @@ class Fit:
     def traits(self) -> dict[str, tuple[float, float]]:
         """Return "rise time" in s and "overshoot", each with its standard deviation.
 
-        Rise: from 10 % to 90 % of the step. Overshoot: fraction of the step.
+        The rise is from 10 % to 90 % of the step. The overshoot is a fraction of the step.
         """
         random = np.random.default_rng(0)
         draws = random.multivariate_normal(self.values, self.covariance, DRAWS)

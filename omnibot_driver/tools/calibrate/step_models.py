@@ -2,8 +2,8 @@
 
 """Models of a wheel's step response, as the odometry measures it.
 
-A model gives the angle turned since a unit step. The odometry gives its mean rate in deltas of 40
-ms. This module knows models and times; it does not know measured data.
+A model gives the angle that the wheel has turned since a step. The odometry gives the mean rate in
+deltas of 40 ms. This module knows models and times; it does not know measured data.
 """
 
 from collections.abc import Callable

@@ -18,10 +18,10 @@ QUANTUM_RADPS: Final = 0.05
 The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 """
 MANY: Final = 1.5
-"""Multiple of ``QUANTUM_RADPS`` above which the tool warns about the residuals.
+"""The tool warns if the residuals exceed the quantisation error by more than this factor.
 
-Example: with delayed commands, the residuals are twice ``QUANTUM_RADPS``, and the delay that the
-tool finds is 4 ms too long.
+For example, delayed commands cause residuals of twice the quantisation error. The delay that the
+tool finds is then 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.

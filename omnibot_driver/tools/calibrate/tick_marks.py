@@ -2,8 +2,9 @@
 
 """Find the positions of an encoder's marks from several records of a wheel.
 
-Uneven marks cause errors of the times between ticks, in each turn the same. Records begin at
-unknown marks. This module knows these errors; it does not know how the wheel moved.
+Uneven marks cause errors of the times between ticks. These errors repeat in each turn of the wheel.
+Records begin at unknown marks. This module knows these errors; it does not know how the wheel
+moved.
 """
 
 from collections.abc import Sequence
@@ -35,8 +36,7 @@ records of two turns each.
 class Marks:
     """The marks of an encoder.
 
-    ``steps``: for each distance between successive marks, its relative difference from the mean
-    distance.
+    ``steps``: relative difference of each distance between successive marks from the mean distance.
     """
 
     steps: Column

@@ -29,7 +29,7 @@ LONGEST_S: Final = 5.0
 """Longest allowed sum of both time constants, in s."""
 GRID: Final = 1500
 STARTS_S: Final = (0.1, 0.5)
-"""Starting values for the sum of both time constants, in s. A search begins at each of them."""
+"""Starting values for the sum of both time constants, in s. There is one search for each value."""
 RATIOS: Final = (0.15, 0.4, 0.8)
 """Starting values for the ratio of the fast to the slow time constant.
 
@@ -136,7 +136,7 @@ class Search:
     def first_order(self, values: Column) -> Column:
         """Search again for a plant of first order, starting from the values of second order.
 
-        This call sets ``order`` to 1.
+        The attribute ``order`` is then 1.
         """
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
@@ -186,7 +186,8 @@ class Search:
     def correlate(self, values: Column) -> None:
         """Measure the correlation of the residuals at these values, and remove it from now on.
 
-        Misplaced marks cause the correlation until they are fitted. Then the changing load does.
+        Misplaced marks cause the correlation until they are fitted. After their fit, only the
+        changing load causes correlation.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
         every = np.concatenate(rows)

@@ -90,9 +90,9 @@ def test_a_plant_is_found_in_how_ticks_follow_each_other(slow_s: float) -> None:
 
 
 def test_marks_that_come_again_in_each_turn_are_found_and_do_not_blur_the_plant() -> None:
-    """Misplaced marks change the times between ticks by 10 %. The fit finds their places.
+    """Misplaced marks change the times between ticks by 10 %. The fit finds the marks' places.
 
-    An error of less than 1 % remains, from the rounding of the clock.
+    The rounding of the board's clock leaves an error of less than 1 %.
     """
     found = fit(starts(PLANT, 8), TICKS)
     assert found.marks is not None
@@ -139,9 +139,9 @@ def test_records_that_are_too_short_are_refused() -> None:
 
 @pytest.mark.parametrize("begins", [0, 1])
 def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -> None:
-    """An encoder has short and long ticks in turn. The tool finds the correction of each.
+    """An encoder has short and long ticks in turn, and the board has missed some edges.
 
-    The first tick may be short or long. Some edges are missed.
+    The tool finds the corrections of both, whether the first tick is short or long.
     """
     random = np.random.default_rng(2)
     ticks_s = 0.03 * np.tile([0.93, 1.07], 150)[begins:] * random.normal(1.0, 0.05, 300 - begins)
@@ -199,7 +199,10 @@ def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
 
 
 def test_goals_that_nothing_meets_are_told() -> None:
-    """The plant is faster than its controller, so no gains meet the goals. An error says so."""
+    """The plant is faster than its controller, so no gains meet the goals.
+
+    The tool reports an error.
+    """
     slow = Loop(1.0, TICKS, 0.5)
     with pytest.raises(ToolError, match="allow more"):
         tune(Plant(0.66, 0.02, 0.0), slow, Goals(overshoot=0.0, band=0.001, phase_margin_deg=89.9))
