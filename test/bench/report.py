@@ -39,8 +39,7 @@ def say(what: str) -> None:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return the comparisons of the driver with the floor, and the further sections of the report.
-    """
+    """Return the comparisons of the driver with the floor, and further sections of the report."""
     windows = 2 if quick else 6
     figures: list[Figure] = []
     for adapter in ADAPTERS:

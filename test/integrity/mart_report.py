@@ -2,8 +2,8 @@
 
 """Integrity of the values published for a MART controller on a bad network (``make integrity``).
 
-The simulated controller shares no code with the driver. A pose is wrong if its error exceeds
-``WRONG_NEES``.
+The simulated controller shares no code with the driver. A pose is wrong if its normalised squared
+error (NEES) is larger than 28.
 """
 
 import math

@@ -167,7 +167,7 @@ class _Rehearsal:
     def _leave(self, changes: dict[int, Shown], shown: Shown, tick: int) -> None:
         """Act as the link does at the driver's end: send Stop until the robot is at rest.
 
-        If the robot moves again or does not stop, the guard writes its last words.
+        If the robot is not at rest in time, the guard writes its last words.
         """
         session, now = self._session, self._scene.exits_s
         session.shutdown.begin(now)

@@ -31,7 +31,7 @@ LINES: Final = 2
 With two drives the tool notices a single wrong reading, because the results of the drives differ.
 """
 UNLIKE: Final = 4.0
-"""Number of standard deviations by which two ratios must differ before the tool reports it."""
+"""The tool reports a difference of two ratios of more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s.
