@@ -2,8 +2,9 @@
 
 """Timers that measure the processor time of each stage of the driver's reader.
 
-The driver's process imports this module first. When the process ends, it writes a JSON object to
-the file in the variable SPLIT: seconds by stage, and the reader's whole time as ``passed``.
+The driver's process imports this module first. When the process ends, the module writes a JSON
+object to the file in the environment variable SPLIT. The object contains the seconds of each stage,
+and the reader's whole time as ``passed``.
 """
 
 import atexit

@@ -99,9 +99,9 @@ def judge(received: Received, chunks: Chunks, feed: Feed, flush: Feed) -> Score:
 
 
 def _place(received: Received, key: Key, at: int, horizon: int) -> int:
-    """Return the index of the next frame with this content, up to ``horizon``.
+    """Return the index of the next true frame with this content, up to the byte ``horizon``.
 
-    If it is not found, return the number of frames.
+    If no such frame is found, return the number of frames.
     """
     frames = received.truth.frames
     while at < len(frames) and frames[at][1] <= horizon and frames[at][0] != key:

@@ -24,7 +24,7 @@ DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "integrity.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 
 OTHERS = {"lois_ecu": "lois_ecu_report", "mart": "mart_report", "fejemis": "fejemis_report"}
-"""For each other board, the module that measures its codec."""
+"""For each board other than the OmniBot, the module that measures the board's codec."""
 SEEDS_OF_THE_PLAIN_PARSER = 4
 """Number of streams for the plain parser. Its errors are frequent, so a few streams suffice."""
 

@@ -89,7 +89,7 @@ def test_any_geometry_is_found_within_what_is_claimed(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """The sizes of 60 robots with slip are fitted. The claimed uncertainties are true.
+    """The sizes of 60 robots with slip are fitted. The claimed uncertainties agree with the errors.
 
     An error divided by its claimed uncertainty has a standard deviation near 1.
     """

@@ -21,7 +21,10 @@ def test_a_library_that_is_there_is_imported() -> None:
 
 
 def test_a_library_that_is_missing_is_named_with_what_installs_it() -> None:
-    """A library is missing. The message names it, without its submodule, and how to install it."""
+    """A submodule of a missing library is imported.
+
+    The message names the library, and explains how to install it.
+    """
     with pytest.raises(ToolError) as refusal:
         need("no_such_library.part")
     assert str(refusal.value) == (

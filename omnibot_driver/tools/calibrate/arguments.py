@@ -121,7 +121,7 @@ def _imu(parser: argparse.ArgumentParser) -> None:
         type=_positive,
         default=STANDARD_GRAVITY,
         metavar="M/S²",
-        help="gravity at your place (default %(default)s)",
+        help="gravity at your place, in m/s² (default %(default)s)",
     )
 
 

@@ -218,9 +218,9 @@ class WheelFound:
 
     @property
     def answer(self) -> Fit:
-        """The better of ``first`` and ``second``, by AIC.
+        """The better of the fits of first and second order, by Akaike's information criterion.
 
-        These two fits assume nothing about the control loop.
+        These two models assume nothing about the control loop.
         """
         return min(self.first, self.second, key=lambda fit: fit.aic)
 
