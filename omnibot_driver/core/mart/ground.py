@@ -51,6 +51,11 @@ The silence is ABSENT_S (s), plus the duration of ABSENT_TRIPS exchanges.
 """
 MOST_GREETINGS: Final = 10
 """Largest number of HELLOs whose answers the driver expects. Older HELLOs are regarded as lost."""
+HEADING_S, HEADING_TRIPS = 1.0, 5
+NO_HEADING: Final = (
+    "the server does not report the relative heading (RMRA) of the robot at rest, so the heading of"
+    " the odometry is uncertain: check the network and the server"
+)
 PRESENT_S: Final = 0.35
 """Silence in s up to which a server has certainly not been restarted."""
 ABSENT_BUSY_S: Final = 2.5
@@ -252,11 +257,18 @@ class Ground:
     def _heading_first(self) -> bool:
         """Whether the heading must be read before the encoder.
 
-        RM's last heading must precede the count that ends the motion.
+        RM's last heading must precede the count that ends the motion. The driver waits for it for
+        HEADING_S plus the duration of HEADING_TRIPS exchanges.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE
-        return by_reference and odometry.heading.from_s < self._rested_s
+        if not by_reference or odometry.heading.from_s >= self._rested_s:
+            return False
+        longest_s = HEADING_S + HEADING_TRIPS * self.conversation.trip_s
+        if self.now_s < self._rested_s + longest_s:
+            return True
+        self._once(NO_HEADING)
+        return False
 
     def _require(self, word: Word) -> None:
         """Raise AssertionError if the command is not allowed in the present state."""

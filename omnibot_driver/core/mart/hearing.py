@@ -140,6 +140,7 @@ class Hearing(Measuring):
         if self.state is State.ASKING:
             self._asked(answer, now)
         elif word.kind is Kind.QUERY:
+            self._polls.answered(word)
             self._measured(answer, now)
         elif word.kind is Kind.CHECK:
             self._checked(answer, now)
@@ -181,4 +182,4 @@ class Hearing(Measuring):
             if self.odometry.left_over_right is not None and self.loop.part > BLIND_PART:
                 self._halt(now)  # the turn would be unknown; the motion is started again
         else:
-            self._polls.press(word)
+            self._polls.missed(word)

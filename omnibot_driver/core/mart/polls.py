@@ -48,10 +48,12 @@ class Polls:
 
     def __init__(self) -> None:
         self._asked_s: dict[Word, float] = {}
+        self._repeated: set[Word] = set()
 
     def connect(self) -> None:
         """Make all queries due."""
         self._asked_s.clear()
+        self._repeated.clear()
 
     def due(self, state: State, now: float) -> list[Word]:
         """Return the queries that are due, the most urgent one first.
@@ -74,6 +76,21 @@ class Polls:
     def asked_s(self, word: Word) -> float:
         """Return when the query was last sent; minus infinity if never."""
         return self._asked_s.get(word, -math.inf)
+
+    def answered(self, word: Word) -> None:
+        """Record that the query was answered."""
+        self._repeated.discard(word)
+
+    def missed(self, word: Word) -> None:
+        """Make a query without an answer due at once.
+
+        If its repetition has no answer either, it waits for its turn, so that the others are sent.
+        """
+        if word not in self._repeated:
+            self._repeated.add(word)
+            self.press(word)
+        else:
+            self._repeated.remove(word)
 
     def press(self, word: Word) -> None:
         """Make the query due at once."""

@@ -19,7 +19,7 @@ _FORMS: Final = (
     (Form.DECIMAL, re.compile(r"[-+]?(\d{1,25}\.\d{1,6}|nan|inf)")),
     (Form.TRUTH, re.compile(r"true|false")),
     (Form.FILE, re.compile(r"(\S.*) (\d{1,9})")),
-    (Form.NAME, re.compile(r"\S+")),
+    (Form.NAME, re.compile(r"[A-Za-z]\S*")),
 )
 
 
