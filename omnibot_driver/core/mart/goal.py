@@ -48,26 +48,33 @@ MOST_MOVES: Final = 9
 """Largest number of moves to one goal. After them, the driver gives the goal up."""
 
 
-LEAST_LIKE: Final = 0.35
-"""Largest relative difference between a measured move and its request.
-
-If the difference is larger, the server may have run the move twice.
-"""
+LEAST_LIKE: Final = 0.65
+"""Smallest measured fraction of a requested distance or turn that can be a complete move."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
 SLOW doubles the times per degree and inch.
 """
-LONGER: Final = 1.4
+FULL, TWO = 0.6, 1.4
+"""Shortest durations of one and of two complete runs of a move, as fractions of the usual one."""
+LEAST_CUT_M, LEAST_CUT_RAD = 0.1, math.radians(15.0)
+"""Smallest request for which the encoder count shows whether the run was complete."""
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder.
+    ``way_m``, ``turned_rad``: distance and turn by the encoder. If a duplicate of the request has
+    started the move again, they cover the second run only.
 
-    ``quiet_s``: longest time in s for which a duplicate of the move may have run after the move.
+    ``lasted_s``: time in s from the request to the reply.
+
+    ``quiet_s``: longest time in s for which the second run may have lasted.
+
+    ``completed``: whether the server has reported the end of the move, not of a stop.
+
+    ``stopped_again``: whether the driver has then stopped a possible second run.
     """
 
     request: Request
@@ -75,6 +82,8 @@ class Done:
     turned_rad: float
     lasted_s: float
     quiet_s: float
+    completed: bool
+    stopped_again: bool
 
     @property
     def is_straight(self) -> bool:
@@ -88,21 +97,57 @@ class Done:
         return number * INCH_M if self.is_straight else math.radians(number)
 
     @property
+    def _least(self) -> float:
+        return LEAST_CUT_M if self.is_straight else LEAST_CUT_RAD
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the encoder count can show that a run was not complete."""
+        return self.asked >= self._least
+
+    @property
+    def longest(self) -> float:
+        """Longest distance in m, or turn in rad, of one complete run."""
+        return 2 * self.asked + self._least
+
+    @property
     def usual_s(self) -> float:
         """The usual duration of the move, in s."""
         number = float(self.request.data.split()[-1])
         slow = 2 if b"SLOW" in self.request.data.split() else 1
         return SETTLES_S + slow * number * (S_PER_IN if self.is_straight else S_PER_DEG)
 
-    def may_have_run_twice(self, delay_s: float) -> bool:
-        """Return whether the server may have run the move twice, from a duplicated datagram.
-
-        After two runs, the encoder count covers only the second run.
-        """
+    @property
+    def _is_short(self) -> bool:
+        """Whether the count is too small for a complete move."""
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
-        like = abs(seen - self.asked) <= LEAST_LIKE * self.asked
-        short = self.lasted_s <= LONGER * self.usual_s + 2 * delay_s
-        return not (like and short and self.quiet_s < self.usual_s / 2)
+        return seen < LEAST_LIKE * self.asked
+
+    @property
+    def may_have_run_twice(self) -> bool:
+        """Whether the server may have run the move twice, from a duplicated datagram."""
+        no_time = self.quiet_s < FULL * self.usual_s and not self.ended_late
+        not_cut = not self._is_short or (self.completed and not self.stopped_again)
+        return not (no_time and not_cut)
+
+    @property
+    def has_run_twice(self) -> bool:
+        """Whether a complete run came before a second one, which the driver has stopped."""
+        whole = self.completed and not self.ended_early
+        return whole and self.stopped_again and self._is_short and self.is_large
+
+    @property
+    def ended_late(self) -> bool:
+        """Whether the reply may be the one to a second run, and the one to the first was lost."""
+        return self.lasted_s >= TWO * self.usual_s
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether the reply came before the end of a complete run, so it answers another request.
+
+        If the driver has then stopped a possible second run, it has cut the first one short.
+        """
+        return self.lasted_s < FULL * self.usual_s
 
 
 class Surplus:
@@ -135,6 +180,15 @@ class Surplus:
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
+
+    def expected(self, request: Request) -> float:
+        """Return the distance in m, or the turn in rad to the left, of a complete move."""
+        parts = request.data.split()
+        slow, asked = b"SLOW" in parts, float(parts[-1])
+        sign = -1.0 if request.word in (TB, MCR) else 1.0
+        if request.word in (TF, TB):
+            return sign * asked * INCH_M * self._stretch[slow]
+        return sign * math.radians(asked + self._degrees[slow])
 
     def inches(self, way_m: float, *, slow: bool) -> int:
         """Return the number of inches to request, so that the robot drives ``way_m``."""

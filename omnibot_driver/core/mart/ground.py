@@ -173,9 +173,10 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """The start time of the present controlled move, or None."""
+        """The start time of a controlled move that is in progress or may run again, or None."""
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
-        return self._started_s if moves and self.state is not State.LOST else None
+        again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
+        return self._started_s if (moves or again) and self.state is not State.LOST else None
 
     @property
     def refusal(self) -> str:

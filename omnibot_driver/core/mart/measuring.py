@@ -96,32 +96,14 @@ class Measuring(Starts):
         if self.state is State.STILL:
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
             if rested and self.odometry.motion is not Motion.NONE:
-                move, self._moved_by = self._moved_by, None
-                stopped = move is not None and self._stopped_a_copy(move, now)
-                twice = self._doubt_a_copy(now, suspected=stopped)
-                self.odometry.rest()
-                if stopped and twice:
-                    self._discard_goal()
-                elif move is not None:
-                    self._learn_from(move, now)
+                self._end_move(now)
+                before = None  # it belongs to the motion
             self._watch_stray(before, count, now)
         elif self.state is State.TURNING:
             self._turns.seen_radps = rate
         else:
             self._fresh = True
             self._learn(reading, now)
-
-    def _discard_goal(self) -> None:
-        """Discard the goal, because the network may have duplicated the last move to it."""
-        if self._move is None or self._move.given_up:
-            return
-        self._move.fail()
-        self._notice(
-            "the server did not answer in time after a controlled move, so the driver has stopped a"
-            " possible copy of it; the driven distance is unknown, so the goal of cmd_pose is"
-            " discarded: check the network, then send the goal again",
-            halt=True,
-        )
 
     def _watch_stray(self, before: int | None, count: int, now: float) -> None:
         """Stop a robot whose encoder counts change although it should be at rest.
@@ -130,7 +112,8 @@ class Measuring(Starts):
         """
         self._counted_at_rest += 1
         rolls_s = ROLLS_AFTER_MOVE_S if self._moved_last else ROLLS_S
-        if self._counted_at_rest < 2 or now - self._rested_s < rolls_s or before is None:
+        ended_s = max(self._rested_s, self._copies_stopped_s)
+        if self._counted_at_rest < 2 or now - ended_s < rolls_s or before is None:
             return
         if abs(count - before) <= STRAY_COUNTS:
             self._stood_s = now

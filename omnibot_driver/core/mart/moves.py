@@ -13,13 +13,22 @@ from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.asking import Asking
-from omnibot_driver.core.mart.goal import INCH_M, Done, Move, next_move
+from omnibot_driver.core.mart.goal import FULL, INCH_M, Done, Move, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion
 from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
+UNLIKELY: Final = 1 / 3
+"""Assumed error of the odometry if a second run of a move is possible but unlikely.
+
+It is a fraction of the move, as a standard deviation: the error would then be 3 of them.
+"""
+RAN_TWICE: Final = (
+    "the network has delivered a controlled move twice; the driver has stopped the second run, and"
+    " continues with an estimate of the first one: check the network"
+)
 LEAST_STOP_S: Final = 0.3
 """Shortest time in s from SL or SS until the server answers again, if a move was stopped."""
 
@@ -119,46 +128,60 @@ class Moves(Asking):
                 self._records.used(odometry.turn.spun_rad, wheel_rad)
         self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
 
-    def _done(self, move: Request, free_s: float) -> Done:
-        """Return the last move with its measurements.
+    def _end_move(self, now: float) -> None:
+        """Evaluate the count after a controlled move: odometry, goal, and lessons from the move."""
+        move, self._last_move = self._last_move, None
+        completed, self._moved_by = self._moved_by is not None, None
+        if move is None:
+            self.odometry.rest()
+            return
+        done = self._done(move, now, completed=completed)
+        stopped = self._may_have_stopped_a_copy(done, now)
+        twice = stopped and done.has_run_twice
+        doubtful = (stopped or self.conversation.disturbed(now)) and done.may_have_run_twice
+        likely = stopped and not (completed and done.ended_early)
+        if doubtful and not twice:
+            error = done.asked * (1.0 if likely or done.ended_late else UNLIKELY)
+            self.odometry.doubt.add(*((error**2, 0.0) if done.is_straight else (0.0, error**2)))
+        self.odometry.rest(done.longest)
+        if twice:
+            self.odometry.run_before(done.is_straight, self._surplus.expected(move))
+            self._notice(RAN_TWICE, halt=False)
+        elif completed and likely and doubtful and done.is_large:
+            self._discard_goal()
+        elif completed and not (stopped and doubtful):
+            self._learn_from(move, now)
 
-        ``free_s``: time of the first reply after the move.
-        """
+    def _done(self, move: Request, now: float, *, completed: bool) -> Done:
+        free_s = min(now, self._port_free_s)
         return Done(
             move,
             self.odometry.moved_m,
             self.odometry.turn.spun_rad,
             lasted_s=self._rested_s - self._started_s,
             quiet_s=free_s - self._rested_s + self._delay_s,
+            completed=completed,
+            stopped_again=self._copies_stopped_s >= self._rested_s,
         )
 
-    def _stopped_a_copy(self, move: Request, now: float) -> bool:
-        """Return whether SL and SS may have stopped a copy of ``move``.
+    def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
+        """Return whether SL and SS may have stopped a second run of the move.
 
-        The result is False in one case: the server has answered sooner than it can end a motion,
-        and the time was too short for a copy to end by itself.
+        The result is False in one case: after a complete move, the server has answered sooner than
+        it can end a motion, and the time was too short for a copy to end by itself.
         """
-        if self._copies_stopped_s < self._rested_s:
-            return False
-        free_s = min(now, self._port_free_s)
-        quick = free_s < self._first_copy_stop_s + LEAST_STOP_S
-        done = self._done(move, free_s)
-        return not (quick and done.quiet_s < done.usual_s / 2)
+        quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
+        no_time = quick and done.quiet_s < FULL * done.usual_s
+        return done.stopped_again and not (done.completed and no_time)
 
-    def _doubt_a_copy(self, now: float, *, suspected: bool) -> bool:
-        """Return whether the server may have run the last controlled move twice.
-
-        After two runs, the encoder count covers only the second one, so the uncertainty grows.
-
-        ``suspected``: whether SL and SS may have stopped the second run.
-        """
-        move, self._last_move = self._last_move, None
-        if move is None or not (suspected or self.conversation.disturbed(now)):
-            return False
-        done = self._done(move, now)
-        twice = done.may_have_run_twice(self._delay_s)
-        if twice:
-            self.odometry.doubt.add(
-                *((done.asked**2, 0.0) if done.is_straight else (0.0, done.asked**2))
-            )
-        return twice
+    def _discard_goal(self) -> None:
+        """Discard the goal, because the network may have duplicated the last move to it."""
+        if self._move is None or self._move.given_up:
+            return
+        self._move.fail()
+        self._notice(
+            "the server did not answer in time after a controlled move, so the driver has stopped a"
+            " possible copy of it; the driven distance is unknown, so the goal of cmd_pose is"
+            " discarded: check the network, then send the goal again",
+            halt=True,
+        )

@@ -181,6 +181,8 @@ class Pilot(Hearing):
             if self._copies_stopped_s < self._rested_s:
                 self._first_copy_stop_s = now
             self._copies_stopped_s = now
+            for form in self._last_move.word.forms if self._last_move is not None else ():
+                self.conversation.owes(form, now + STOPS_S)  # the reply to the copy
             return self._send((words.SL, words.SS), now)
         if self.state is State.MOVING and now >= self._free_s:
             self._named_in_a_move(now)

@@ -37,6 +37,11 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 lost."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
+RUN, END_RUN_RAD = 0.1, math.radians(3.0)
+"""Errors of a controlled move that was not counted, as standard deviations.
+
+``RUN``: relative error of its distance or turn. ``END_RUN_RAD``: additional error of a turn in rad.
+"""
 
 
 class Reckoning:
@@ -132,8 +137,11 @@ class Reckoning:
         """Record that the robot was stopped; it may still coast."""
         self.stands, self._stood_s = True, now
 
-    def rest(self) -> None:
-        """End the motion, after the distance that the robot coasted was measured too."""
+    def rest(self, longest: float = math.inf) -> None:
+        """End the motion, after the distance that the robot coasted was measured too.
+
+        ``longest``: longest possible distance of a straight move in m, or turn in rad.
+        """
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
@@ -142,7 +150,8 @@ class Reckoning:
             self.doubt.end_turn(self.turn.spun_rad, self.turn.told_rad)
         self.doubt.end()
         way_m, turn_rad = self.maybe
-        self.doubt.add(way_m**2, turn_rad**2)
+        if abs(turn_rad if self.on_the_spot else way_m) <= longest:  # else the start was lost
+            self.doubt.add(way_m**2, turn_rad**2)
         if self._begins_in_move:  # the part of the move before the reset is not known
             self.doubt.add(self.moved_m**2, self.turn.spun_rad**2)
         self._begins_in_move = False
@@ -150,6 +159,20 @@ class Reckoning:
         self.wheel.rest()
         self.slowing_since_s = None
         self.speeds.forget()
+
+    def run_before(self, is_straight: bool, amount: float) -> None:
+        """Add a complete run of the last move, before the run that was counted.
+
+        ``amount``: its expected distance in m, or its turn in rad.
+        """
+        if is_straight:
+            self.pose = self.pose.moved(Pose(amount, 0.0, 0.0))
+            self.rolled += Pose(amount, 0.0, 0.0)
+            self.doubt.add((RUN * amount) ** 2, 0.0)
+            self.doubt.end_straight()
+        else:
+            self._correct_yaw(amount)
+            self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def turned(self, degrees: float, when: Moment) -> bool:
         """Process a reported heading in degrees; return whether it is plausible and has changed."""

@@ -55,6 +55,25 @@ def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
     assert discarded <= 6
 
 
+def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
+    """Each tenth datagram arrives twice, so the server runs some moves twice.
+
+    The driver stops the second run and estimates the first one. It discards few goals. Where the
+    odometry is wrong, its covariance says so.
+    """
+    said = ""
+    for seed in range(12):
+        network = NetworkFaults(duplicate=0.1, delay_s=0.05)
+        bench, random = on(network, EVERY_FIRMWARE[seed % 3], seed), Random(seed)
+        for _ in range(3):
+            said += reach(bench, random_goal(random))
+            covariance = bench.odometry[-1].covariance
+            assert bench.error.way_m < 0.1 + 2 * (covariance.xx + covariance.yy) ** 0.5
+            assert yaw_error(bench) < 0.2 + 2 * covariance.yaw_yaw**0.5
+    assert said.count("delivered a controlled move twice") >= 4
+    assert said.count("discarded") <= 4
+
+
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
     """The reply to each turn is lost. The driver sends a stop, and the server answers "no motion".
