@@ -32,6 +32,8 @@ LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
 """Groups that arrive within this time in s were probably read together after a pause. Only the
 last, with the smallest delay, is stored."""
+DISAGREES_S: Final = 0.03
+"""A deviation from the last groups is certain from this time in s on, beyond their own spread."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
@@ -74,6 +76,29 @@ class BoardTime:
         self._taken_s = now - late_s
         return late_s
 
+    def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
+        """Return how much later than the last groups a group arrives by its clock, in s.
+
+        It is negative if the group is early. Also return whether this is too much for a read: a
+        read is never early, and at most as late as the last ones. 0 and False while too few groups
+        are known. Nothing is stored.
+        """
+        if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
+            return 0.0, False
+        before, at_s = self._before
+        elapsed = round((now - at_s) / UNIT_S[unit])
+        # A clock in ns wraps every 4.3 s, so only the difference of times is unwrapped.
+        changed_s = -wrapped(counts - before - elapsed) * UNIT_S[unit]
+        found = []
+        for index, sending_s in enumerate((0.0, self._lines * LINE_S)):
+            points = self._kept[index]
+            slope, least = _line_below(points)
+            usual_s = max(behind_s - slope * at for at, behind_s in points) - least
+            behind_s = self._behind_s[index] + changed_s - sending_s
+            found.append((usual_s, behind_s - slope * now - least))
+        usual_s, late_s = min(found)
+        return late_s, max(-late_s, late_s - usual_s) > DISAGREES_S
+
     def _above_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
         if unit is None:
             return 0.0
@@ -103,6 +128,12 @@ class BoardTime:
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
     """Return the height of each point above a straight line that touches the points from below."""
+    slope, least = _line_below(kept)
+    return [behind_s - slope * at_s - least for at_s, behind_s in kept]
+
+
+def _line_below(kept: Sequence[Point]) -> Point:
+    """Return slope and height of a straight line that touches the points from below."""
     half = len(kept) // 2
     points = list(kept)
     # A read may be late but never early, so the line lies below all arrivals. Its slope is that
@@ -110,6 +141,4 @@ def _above_line(kept: Sequence[Point]) -> list[float]:
     first_s, first = min(points[:half], key=itemgetter(1))
     second_s, second = min(points[half:], key=itemgetter(1))
     slope = (second - first) / (second_s - first_s)
-    heights = [behind_s - slope * at_s for at_s, behind_s in points]
-    least = min(heights)
-    return [height - least for height in heights]
+    return slope, min(behind_s - slope * at_s for at_s, behind_s in points)

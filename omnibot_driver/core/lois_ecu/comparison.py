@@ -43,6 +43,8 @@ COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
 """Residual of a count, in ticks, above which the wheel's speed has changed without a new
 set-point."""
+UNFORESEEN: Final = 5.0
+"""Residual of a count, in standard deviations, above which no motion of the wheel explains it."""
 SAME_TICKS: Final = 0.6
 """Smallest residual, in ticks, at which an unchanged count is used. At a smaller residual, the next
 tick may not be due yet."""
@@ -88,6 +90,26 @@ class Comparison:
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
+
+    def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
+        """Return by how many ticks a wheel's ``ticks`` new ticks differ from the expectation.
+
+        Also return whether this is more than the filter's own error can explain. The difference is
+        0 while the board does not count. Nothing is corrected.
+
+        ``late_s``: how much later than usual the ticks arrived.
+        """
+        motion = self._motion
+        wheel, speed = motion.wheels[index], motion.speed_mps(index)
+        counts = wheel.counts(speed, signed=motion.signed)
+        if not counts:
+            return 0.0, False
+        counted_m = self._counted_m[index] + ticks * motion.tick_m
+        residual = counted_m - motion.filter.mean[wheel.base + COUNT]
+        residual += (TICKS_AGE_S + late_s) * speed * counts
+        variance = motion.filter.variance_of([(wheel.base + COUNT, 1.0)])
+        unsure = variance + TICK_VARIANCE * motion.tick_m**2
+        return residual / motion.tick_m, residual**2 > UNFORESEEN**2 * unsure
 
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
         """Correct the filter by ``ticks`` new ticks of a wheel.

@@ -183,6 +183,11 @@ class MotionFilter:
             terms = [*self._way_terms(index), (wheel.base + COUNT, 1.0)]
         self.filter.disturb(terms, stddev_m**2)
 
+    def doubt_way(self, index: int, stddev_m: float) -> None:
+        """Add an error to a wheel's distance that its count does not show."""
+        terms = [term for term in self._way_terms(index) if term[0] != PER_WHEEL * index + COUNT]
+        self.filter.disturb(terms, stddev_m**2)
+
     def _doubted(self, index: int) -> Terms:
         """Return which states are wrong, and by how much, if a wheel's distance is wrong by 1 m."""
         wheel, base = self.wheels[index], PER_WHEEL * index

@@ -38,6 +38,8 @@ UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
 """The pose is predicted for this number of tick periods after the last report, and for at least
 ``UNHEARD_S`` s."""
+FEWEST_UNFORESEEN: Final = 2.0
+"""Fewest ticks by which a count must differ from the expectation to show a restart."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
@@ -139,6 +141,34 @@ class LoisOdometry:
         self._lost_s = self._advanced_s = -math.inf
         self._ticks = Ticks(0, 0, 0)
         self._comparison.begin_counts()
+
+    def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
+        """Return whether counts near zero differ from all that the wheels can have done.
+
+        A robot at rest may be pushed, and then its wheels differ from the expectation too. But at
+        rest, counts that have begun at zero are still zero.
+
+        ``late_s``: how much later than usual the ticks arrived.
+        """
+        found = self._unforeseen(ticks, now, late_s)
+        if self._motion.resting and max(abs(ticks.left), abs(ticks.right)) > 1:
+            return False
+        return any(sure and abs(count) >= FEWEST_UNFORESEEN for count, sure in found)
+
+    def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
+        """Add an error to each wheel's distance, because its count may have begun at zero."""
+        for index, (count, _) in enumerate(self._unforeseen(ticks, now, late_s)):
+            self._motion.doubt_way(index, count * self._settings.tick_m)
+
+    def _unforeseen(self, ticks: Ticks, now: float, late_s: float) -> list[tuple[float, bool]]:
+        before = self._ticks
+        if before is None:
+            return []
+        self._advance(min(now, self._heard_at_s + self._unheard_s))
+        counts = wrapped(ticks.left - before.left), wrapped(ticks.right - before.right)
+        return [
+            self._comparison.unforeseen(index, count, late_s) for index, count in enumerate(counts)
+        ]
 
     # Outbound
 

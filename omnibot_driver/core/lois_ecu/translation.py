@@ -46,6 +46,10 @@ ROLLED_OUT_TICKS: Final = 10
 STARTING_TICKS_PER_S: Final = 20.0
 """``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count after a restart, while a
 wheel rolls out and starts again."""
+SILENT_S: Final = 1.0
+"""Pause in s after which counts near zero need not be unforeseen to show a restart."""
+NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
+"""Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
 """Wheels that roll back are assumed to do it for at most this time in s, if the clock's unit is
 unknown again. The clock then cannot confirm how long ago the last ticks were sent."""
@@ -163,21 +167,51 @@ class Translation:
         self._unit = clock_unit or self._unit
         contradicted = self._unit_known and clock_unit is None
         self._unit_known = clock_unit is not None
+        age_s = self._age_s(ticks, duration_s)
         late = self._unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
         if contradicted:
             duration_s = min(duration_s, CONTRADICTED_S)
         rolled = RESTARTED_TICKS_PER_S * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
-        began = contradicted and left + right > 0 and _began_within(duration_s, ticks)
+        began = left + right > 0 and _began_within(duration_s, ticks)
+        if began and not contradicted and self._unit == "ns":
+            began = self._restart_is_shown(ticks, duration_s, now)
+        else:
+            began = began and contradicted
         if late or began or fewer > RESTARTED_TICKS:
             self.restarts += 1
-            age_s = ticks.time_counts * UNIT_S["ms"] if self._unit == "ms" else None
-            self.odometry.restarted(now, age_s)  # a clock in ns wraps every 4.3 s
+            self.odometry.restarted(now, age_s)
             self._time.begin()
             self.headings.forget()
             return [DisplacementReading(0.0, 0.0, 0.0, "body", None, 0, restarted=True)]
         return []
+
+    def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
+        """Return how long ago the board's clock began, in s, if that was since the last ticks.
+
+        A clock in ms may have begun earlier. None if unknown.
+        """
+        if self._unit is None:
+            return None
+        age_s = ticks.time_counts * UNIT_S[self._unit]
+        # A clock in ns wraps every 4.3 s. So after a longer pause, the age is unknown.
+        wrapped_too = self._unit == "ns" and not age_s <= duration_s < NS_WRAPS_S
+        return None if wrapped_too else age_s
+
+    def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
+        """Return whether ``ticks`` that may have begun at zero show a restart.
+
+        The clock has wrapped shortly before, so it fits the last ticks within ``LATEST_S``. If it
+        fits even better, odometry gets an error instead.
+        """
+        odometry, silent = self.odometry, duration_s > SILENT_S
+        deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)
+        late_s = max(deviation_s, 0.0)
+        if certain and (silent or odometry.only_a_restart_explains(ticks, now, late_s)):
+            return True
+        odometry.may_have_restarted(ticks, now, late_s)
+        return False
 
     @property
     def needs_date(self) -> bool:

@@ -102,3 +102,53 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
         assert now - late_s >= taken_s
         assert board.stddev_s < 10.0
         taken_s = now - late_s
+
+
+@pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
+def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
+    """The clock in ns leaps by less than a late read may explain. It has also wrapped.
+
+    The next group deviates from the line through the last ones. A group without a leap does not.
+    """
+    board, now = settled_on_time(), 0.2 * 60
+    usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
+    assert usual_s == pytest.approx(0.0, abs=0.001)
+    assert not certain
+    deviation_s, certain = board.deviation_s(nanoseconds(now + leap_s), "ns", now)
+    assert deviation_s == pytest.approx(-leap_s, abs=0.001)
+    assert certain
+
+
+def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
+    """Reads are up to 0.1 s late at random. Then a read that is 0.1 s late shows nothing.
+
+    A read is never early.
+    """
+    board, random = BoardTime(), Random(2)
+    for step in range(60):
+        now = 0.2 * step
+        board.late_s(nanoseconds(now), "ns", now + random.uniform(0.0, 0.1))
+    now = 0.2 * 60
+    assert not board.deviation_s(nanoseconds(now), "ns", now + 0.1)[1]
+    assert board.deviation_s(nanoseconds(now + 0.06), "ns", now)[1]
+
+
+def test_nothing_deviates_before_enough_groups_are_known() -> None:
+    """The first groups of a connection have nothing to deviate from."""
+    board = BoardTime()
+    assert board.deviation_s(0, "ns", 5.0) == (0.0, False)
+    board.late_s(0, "ns", 0.0)
+    assert board.deviation_s(nanoseconds(1.0), "ns", 0.2) == (0.0, False)
+    assert settled_on_time().deviation_s(0, None, 12.0) == (0.0, False)
+
+
+def nanoseconds(board_s: float) -> int:
+    return round(board_s * 1e9) % 2**32
+
+
+def settled_on_time() -> BoardTime:
+    """Return the estimator after 60 groups with a clock in ns that were read in time."""
+    board = BoardTime()
+    for step in range(60):
+        board.late_s(nanoseconds(0.2 * step), "ns", 0.2 * step)
+    return board
