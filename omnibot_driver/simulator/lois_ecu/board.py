@@ -72,7 +72,9 @@ class SimulatedLois:
             over_north=quirks.headings_average_over_north,
             random=self._random,
         )
-        self._sayings = Sayings(settings, self._vehicle, self.wheels, self.odometry, self._compass)
+        self._sayings = Sayings(
+            settings, self._vehicle, self.wheels, self.odometry, self._compass, self.now_s
+        )
         self._applied_duty = (0, 0)
         self._boots_until_s = self.now_s + (BOOT_S if quirks.slow_boot else 0.0)
         self._reader = wire.LineReader(lenient=quirks.lenient_hex)

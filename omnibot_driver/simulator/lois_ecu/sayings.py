@@ -14,7 +14,10 @@ from omnibot_driver.simulator.lois_ecu.vehicle import Vehicle
 
 
 class Sayings:
-    """Encoder of the periodic messages of one board. A boot makes a new one."""
+    """Encoder of the periodic messages of one board. A boot makes a new one.
+
+    began_s: time of the boot, at which the board's clock in ns starts from zero.
+    """
 
     def __init__(
         self,
@@ -23,9 +26,11 @@ class Sayings:
         wheels: tuple[WheelChannel, ...],
         odometry: DocumentedOdometry,
         compass: Compass,
+        began_s: float,
     ) -> None:
         self._settings, self._vehicle, self._wheels = settings, vehicle, wheels
         self._odometry, self._compass = odometry, compass
+        self._began_s = began_s
 
     def group(self, code: int, clock_ms: int, now_s: float) -> bytes:
         """Return the lines of the message with the command number ``code``."""
@@ -43,7 +48,7 @@ class Sayings:
         numbers = [wire.bits_of(n) for n in (*odometry.pose, *odometry.velocity)]
         if code == 0x20:
             return wire.sequence(code, numbers)
-        clock = clock_ms if quirks.clock_in_ms else round(now_s * 1e9)
+        clock = clock_ms if quirks.clock_in_ms else round((now_s - self._began_s) * 1e9)
         ticks = [channel.ticks & 0xFFFFFFFF for channel in self._wheels]
         group = wire.sequence(code, [clock & 0xFFFFFFFF, *ticks])
         return group + wire.sequence(code, numbers) if quirks.appends_odometry else group

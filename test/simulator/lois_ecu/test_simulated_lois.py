@@ -242,6 +242,23 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
     assert rig.board.standing
 
 
+@pytest.mark.parametrize(("quirks", "unit_s"), [(DOCUMENTED, 1e-9), (FIRMWARE, 1e-3)])
+def test_a_reboot_restarts_the_clock(quirks: Quirks, unit_s: float) -> None:
+    """The board reboots after 3 s. The time in its ticks is then the time since the reboot.
+
+    The GPS receiver's time goes on.
+    """
+    rig = Rig(quirks, running=True)
+    rig.run(3.0)
+    rig.board.reboot()
+    began_s = rig.now
+    rig.run(3.0)
+    at_s, ticks = [(at, one) for at, one in rig.heard if isinstance(one, Ticks)][-1]
+    assert ticks.time_counts * unit_s == pytest.approx(at_s - began_s, abs=0.3)
+    times = [one for _, one in rig.heard if isinstance(one, GpsTime)]
+    assert times == sorted(times, key=lambda time: (time.hours, time.minutes, time.seconds))
+
+
 def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
     """The board gives a ball and reboots. The LED is off, and another ball drops at once.
 
