@@ -8,7 +8,7 @@ The module knows when lines came; it does not know what they contain.
 import math
 from typing import Final
 
-from omnibot_driver.core.fejemis.front_wheel import FrontWheel
+from omnibot_driver.core.fejemis.front_wheel import OLDEST_S, FrontWheel
 from omnibot_driver.core.fejemis.half import NEEDED, SILENT_S
 from omnibot_driver.core.fejemis.ports import PARAMETERS, Ports
 from omnibot_driver.core.fejemis.told import Told
@@ -20,6 +20,13 @@ NO_ANGLE_S: Final = 0.25
 FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
 """Silence in s after which the user is notified that the board at an opened port is missing."""
+UNREAD_S: Final = 0.03
+"""Time in s without a line of either board above which no single board is to blame. Each board
+sends every 15 ms or more often, so the driver reads late, or both boards are cut off."""
+UNREAD: Final = (
+    "the driver has read nothing from either board for a moment; reduce the load of the computer,"
+    " or check the USB hub"
+)
 SLACK_S: Final = 1e-6
 
 
@@ -40,6 +47,7 @@ class Watch:
         self.blind = self.unposed = self._sick = self._stalled = False
         self._begun_at = math.inf
         self._patient_until = -math.inf
+        self._looked_at = self._heard_at = self._unread_until = -math.inf
 
     def stalled(self) -> None:
         """Record a stall of the driver, so that it is not regarded as silence of the boards."""
@@ -54,6 +62,7 @@ class Watch:
 
         Return whether a board no longer sends the data stream that driving requires.
         """
+        self._look_at_reads(now)
         if self._stalled:
             self._stalled, self._patient_until = False, now + SILENT_S
         lost = [self._look_at(channel, now) for channel in (0, 1)]
@@ -108,6 +117,16 @@ class Watch:
             return True
         return False
 
+    def _look_at_reads(self, now: float) -> None:
+        """Notice that no line of either board was read for ``UNREAD_S``.
+
+        After that, the front board has ``OLDEST_S`` to show that its angles only waited.
+        """
+        if now - self._heard_at > UNREAD_S:
+            self._unread_until = now + OLDEST_S
+        self._looked_at = now
+        self._heard_at = max(half.heard_at for half in self._ports.halves)
+
     def _look_at_age(self, now: float, *, driving: bool) -> None:
         drive = self._ports.half("drive")
         was_blind, was_unposed, was_sick = self.blind, self.unposed, self._sick
@@ -131,6 +150,8 @@ class Watch:
         """The reason why the robot must not be driven; empty if driving is allowed."""
         if trouble := self._ports.trouble or self._front.trouble:
             return trouble
+        if (self.blind or self.unposed) and self._looked_at < self._unread_until:
+            return UNREAD
         if self.blind:
             return "no angle of the front wheel for 60 ms; check the front board"
         if self.unposed:

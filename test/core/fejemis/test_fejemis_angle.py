@@ -3,7 +3,7 @@
 """Tests of the angle of the front wheel: its relay, its age and a broken sensor."""
 
 import pytest
-from fejemis_bench import DRIVE, FRONT, drive_until_refused, nominal
+from fejemis_bench import DRIVE, FRONT, Bench, drive_until_refused, nominal
 
 from omnibot_driver.core.errors import CommandRefused
 
@@ -38,6 +38,87 @@ def test_an_angle_older_than_60_ms_stops_the_robot() -> None:
     ]
     assert stops[0] - mark <= 0.064
     assert any("60 ms" in text for text in bench.notices)
+
+
+def refusal(bench: Bench) -> str:
+    """Return the text with which a motion command is refused now."""
+    with pytest.raises(CommandRefused) as refused:
+        bench.drive()
+    return str(refused.value)
+
+
+def test_without_angles_a_command_is_refused_because_of_the_front_board() -> None:
+    """The front board sends no more angles. The drive board sends as before."""
+    bench = nominal()
+    bench.carry = lambda channel, data: b"" if channel == FRONT else data
+    bench.run(0.08)
+    assert "check the front board" in refusal(bench)
+
+
+def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
+    """The driver reads nothing for 0.1 s, because the computer is busy. Its timers are in time.
+
+    The refusal names the computer, and not the front board.
+    """
+    bench = nominal()
+    bench.run(0.1)
+    bench.read_s = 0.1
+    bench.run(0.08)
+    text = refusal(bench)
+    assert "front board" not in text
+    assert "computer" in text
+    bench.read_s = 0.0
+    bench.run(0.05)
+    bench.drive()
+
+
+@pytest.mark.parametrize("first", [DRIVE, FRONT])
+def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
+    """The driver does nothing for 80 ms, and then reads one port before the other.
+
+    Until it has read both, the refusal names the computer.
+    """
+    bench = nominal()
+    waiting = {DRIVE: b"", FRONT: b""}
+    for _ in range(round(0.08 / bench.robot.tick_s)):
+        bench.now += bench.robot.tick_s
+        for channel, data in bench.robot.advance():
+            waiting[channel] += data
+    bench.session.inbound.receive(waiting[first], bench.now, first)
+    bench.settle()
+    if first == DRIVE:
+        assert "computer" in refusal(bench)
+    other = DRIVE + FRONT - first
+    bench.session.inbound.receive(waiting[other], bench.now + 0.001, other)
+    bench.settle()
+    bench.drive()
+
+
+def test_a_late_read_does_not_hide_a_silent_front_board() -> None:
+    """The driver reads late, and the front board is silent from then on.
+
+    60 ms later the refusal names the front board.
+    """
+    bench = nominal()
+    bench.run(0.1)
+    bench.carry = lambda channel, data: b"" if channel == FRONT else data
+    bench.read_s = 0.1
+    bench.run(0.08)
+    assert "computer" in refusal(bench)
+    bench.read_s = 0.0
+    bench.run(0.1)
+    assert "check the front board" in refusal(bench)
+
+
+def test_a_late_read_is_not_blamed_on_the_drive_board() -> None:
+    """The driver reads nothing for 0.3 s. The refusal names neither board."""
+    bench = nominal()
+    bench.run(0.3)
+    bench.read_s = 0.4
+    bench.run(0.35)
+    text = refusal(bench)
+    assert "board and its cable" not in text
+    assert "computer" in text
 
 
 SENSOR = [
@@ -97,6 +178,6 @@ def test_a_robot_that_stands_is_not_set_in_motion_by_an_old_angle() -> None:
     bench.speaks = set()
     bench.run(0.1)
     mark = bench.now
-    with pytest.raises(CommandRefused, match="angle"):
+    with pytest.raises(CommandRefused, match="nothing from either board"):
         bench.drive()
     assert not [text for text in bench.lines(DRIVE, mark) if text.startswith("rc 2 .")]
