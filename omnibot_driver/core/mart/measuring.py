@@ -120,7 +120,7 @@ class Measuring(Starts):
             return
         if now - self._stray_s < STRAY_AGAIN_S:
             return
-        if not self.conversation.doubles(now):
+        if not self.conversation.disturbed(now):  # else it may be a copy, or a start unanswered
             self.health.strays(now)
         # the robot has not been at rest since the last start, or since a restart of the server
         unknown = self._stood_s < max(self.appeared_s, self._started_s)

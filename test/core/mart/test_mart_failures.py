@@ -256,6 +256,30 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
     assert not bench.robot.stands
 
 
+def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
+    """The server rejects an RM. The network loses replies, and then delivers a late copy of an RM.
+
+    The driver stops the robot, but does not refuse motion for good.
+    """
+    bench = MartBench("source").ready()
+    usual = bench.server.motions[Kind.REFERENCE].samples
+    bench.server.motions[Kind.REFERENCE].samples = 58
+    bench.command(0.3, 0.0, 0.3)
+    bench.server.motions[Kind.REFERENCE].samples = usual
+    assert any("RM failed" in notice for notice in bench.notices)
+    bench.command(0.0, 0.0, 0.6)
+    bench.server.receive(b"RM 30", 0, None, bench.robot.board.now_s)
+    bench.speaks = False
+    bench.command(0.0, 0.0, 0.2)
+    bench.speaks = True
+    bench.run(6.0)
+    assert any("moves without a command" in notice for notice in bench.notices)
+    assert bench.robot.stands
+    assert bench.try_command(0.3, 0.0) == ""
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
     """Another program stops the robot, so the server knows of no motion and rejects RMCS.
 
