@@ -75,8 +75,8 @@ bench: $(VENV)/.test  ## measure BOARD against a floor (15 minutes), into docs/i
 faults: $(VENV)/.test  ## break everything around BOARD, with the real node (15 minutes), into docs/internals/faults.md
 	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --board $(BOARD)
 
-soak: $(VENV)/.test  ## random faults for MINUTES (10)
-	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --minutes $(or $(MINUTES),10)
+soak: $(VENV)/.test  ## random faults around BOARD for MINUTES (10)
+	PYTHONPATH=test:test/system $(PY) test/faults/campaign.py --board $(BOARD) --minutes $(or $(MINUTES),10)
 
 lint: $(VENV)/.test  ## check formatting, style and types
 	$(PY) -m ruff format --check || { echo "$(UNFORMATTED)" >&2; exit 1; }

@@ -10,6 +10,7 @@ import socket
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from random import Random
 from typing import Any, Final
 
 from breakable_line import TICK_S, Damage, cut, whole
@@ -251,6 +252,35 @@ def cases(_seed: int) -> dict[str, Case[Rig]]:
     }
 
 
+def _network_is(faults: NetworkFaults) -> Callable[[Rig, Random], None]:
+    return lambda rig, _random: line_of(rig).network(faults)
+
+
+def _replies_cease(rig: Rig, _random: Random) -> None:
+    rig.line.from_board = cut
+
+
+def _network_is_cut(rig: Rig, _random: Random) -> None:
+    rig.line.from_board = rig.line.to_board = cut
+
+
+def _heals(rig: Rig, _random: Random) -> None:
+    rig.heal()
+
+
+def _restarts(rig: Rig, _random: Random) -> None:
+    rig.reboot_board()
+
+
+STEPS: Final = {
+    **{name: _network_is(faults) for name, faults in ASSUMED.items()},
+    "no replies come": _replies_cease,
+    "a cut": _network_is_cut,
+    "a whole network": _heals,
+    "the server is restarted": _restarts,
+}
+
+
 def serve(line: Any, url: str) -> ServedBoard[Any]:
     """Return a server that offers the controller at the UDP port of this address."""
     return ServedBoard(line, udp_port=int(url.rpartition(":")[2]))
@@ -289,6 +319,8 @@ BOARD: Final = RigBoard(
     serve=serve,
     port=url,
     cases=cases,
+    steps=STEPS,
+    rests_later_s=BLIND_S,
     without=frozenset(
         {
             "faults_of_the_network",  # the faults of a server of serial lines

@@ -34,6 +34,8 @@ class RigBoard:
 
     ``ends_later_s``: additional time within which the driver must end.
 
+    ``rests_later_s``: additional time until the robot rests after several faults at the same time.
+
     ``deaf_s``: longest time for which the board may ignore its input.
 
     ``silent_s``: longest usual pause between two transmissions of the board.
@@ -49,6 +51,8 @@ class RigBoard:
     ``line``, ``serve``: make the board's line and its server. None: a serial line on a terminal.
 
     ``cases``: returns the faults of the n-th round. None: those of a serial line.
+
+    ``steps``: faults of a random walk. None: those of a serial line.
 
     ``without``: faults and parts of the campaign that do not apply.
     """
@@ -66,6 +70,7 @@ class RigBoard:
     off_within_s: float = 0.0
     old_bytes_s: float = 0.0
     ends_later_s: float = 0.0
+    rests_later_s: float = 0.0
     deaf_s: float = 0.0
     silent_s: float = 0.0
     imu: bool
@@ -79,6 +84,7 @@ class RigBoard:
     serve: Callable[[Any, str], Any] | None = None
     port: Callable[[Path], str] = lambda folder: str(folder / "omnibot")
     cases: Callable[[int], Mapping[str, Any]] | None = None
+    steps: Mapping[str, Any] | None = None
     without: frozenset[str] = frozenset()
 
 

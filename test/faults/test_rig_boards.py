@@ -1,12 +1,13 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test that the campaign's settings of each board name only faults that exist."""
+"""Tests that the campaign's settings of each board name only faults and services that exist."""
 
 import pytest
 from campaign import BOARDS, pieces
 from cases import survivable
 from endings import ENDINGS
 from rig_board import load
+from walk import CALLS, steps_of
 
 
 @pytest.mark.parametrize("board", BOARDS)
@@ -23,3 +24,12 @@ def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> N
         *(name for name, _ in pieces()),
         "busy_computer",
     }
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_a_random_walk_calls_only_services_that_the_board_has(board: str) -> None:
+    """A random walk has faults for every board. Of the services, it calls those of the board."""
+    kind = load(board)
+    steps = steps_of(kind)
+    assert {CALLS[name] for name in steps if name in CALLS} == kind.services & {*CALLS.values()}
+    assert steps.keys() - CALLS.keys()

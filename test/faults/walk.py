@@ -12,6 +12,7 @@ from typing import Final
 
 from breakable_line import Damage, cut, gaining, late, losing, losing_bursts, noise
 from rig import Rig
+from rig_board import RigBoard
 from std_srvs.srv import SetBool, Trigger
 
 STEPS_TO_A_REST: Final = 3
@@ -26,15 +27,16 @@ the motion.
 
 def walk(rig: Rig, random: Random, steps: int) -> list[str]:
     """Cause ``steps`` random faults, and return the names of the faults in order."""
+    possible = steps_of(rig.kind)
     names = []
     for step in range(1, steps + 1):
         if random.random() < 0.8:
             rig.hand.hold(*(random.uniform(-0.5, 0.5) for _ in range(3)))
         else:
             rig.hand.leave()
-        name = random.choice(list(STEPS))
+        name = random.choice(list(possible))
         names.append(name)
-        STEPS[name](rig, random)
+        possible[name](rig, random)
         rig.wait_ticks(random.randrange(150))
         if step % STEPS_TO_A_REST == 0 or step == steps:
             _rest(rig, f"step {step}, after {', '.join(names[-STEPS_TO_A_REST:])}")
@@ -47,16 +49,21 @@ def _rest(rig: Rig, what: str) -> None:
     if to_board is not cut:
         rig.line.to_board = to_board
     rig.hand.leave()
-    rig.expect_still(rig.line.tick, what, STANDS_AGAIN_S)
+    rig.expect_still(rig.line.tick, what, STANDS_AGAIN_S + rig.kind.rests_later_s)
     rig.heal()
     rig.probe.call(SetBool, "estop", data=False)
+    if "pause" in rig.kind.services:
+        _run_again(rig, what)
+    rig.expect_obeys_again()
+
+
+def _run_again(rig: Rig, what: str) -> None:
     for _ in range(TRIES):  # another request may be in progress
         answer = rig.probe.call(SetBool, "pause", data=False)
         if answer.success:
             break
         rig.wait_ticks(100)
     rig.findings.expect(answer.success, f"{what}: it does not run: {answer.message}")
-    rig.expect_obeys_again()
 
 
 def _damage(kind: Callable[[Random], Damage]) -> Callable[[Rig, Random], None]:
@@ -116,9 +123,17 @@ STEPS: Final[dict[str, Callable[[Rig, Random], None]]] = {
     "a whole line": _heal,
     "a reboot": _reboot,
     "a replug": _replug,
-    "start": _call("start"),
-    "pause": _call("pause"),
-    "reset": _call("reset"),
-    "e-stop": _call("estop"),
-    "reset_odometry": _call("reset_odometry"),
 }
+CALLS: Final = {
+    "start": "start",
+    "pause": "pause",
+    "reset": "reset",
+    "e-stop": "estop",
+    "reset_odometry": "reset_odometry",
+}
+
+
+def steps_of(kind: RigBoard) -> dict[str, Callable[[Rig, Random], None]]:
+    """Return the faults of this board's line, and the calls that it offers."""
+    calls = {name: _call(call) for name, call in CALLS.items() if call in kind.services}
+    return {**(STEPS if kind.steps is None else kind.steps), **calls}
