@@ -81,7 +81,8 @@ class ReadingClock(Protocol):
     def stamp(self, reading: ImuReading, now: float, edge: SampleBoundary | None) -> float | None:
         """Return the stamp of a reading that arrived alone. This is faster than ``stamps``.
 
-        If the stamp is uncertain, return None and change nothing: call ``stamps`` then.
+        If the stamp is uncertain, return None and change nothing. The caller must then use
+        ``stamps`` instead.
         """
 
 
@@ -159,9 +160,9 @@ class Board(Protocol):
         """Forget the mode, because the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """Record that this process stalled, so the guard may have sent ``last_words``.
+        """Record that this process stalled, so its watchdog may have sent ``last_words``.
 
-        The Stop in these packets can also have switched off other motors, e.g. a brush motor.
+        These packets stop the robot. They may also have switched off another motor, e.g. a brush.
         """
         return
 
@@ -185,7 +186,7 @@ class Board(Protocol):
         return []
 
     def leave(self) -> None:
-        """Prepare for the driver's exit: from now on, ``due`` returns only what a stop needs."""
+        """Prepare for the driver's exit: after this, ``due`` returns only what a stop needs."""
         return
 
     def reset_odometry(self) -> None:
@@ -222,7 +223,8 @@ class Board(Protocol):
     def pause(self) -> Packets:
         """Return the packets that pause a running board.
 
-        If the pause command toggles, raise RequestRefused unless the board is known to run.
+        On some boards, the pause command resumes a paused board. There, raise RequestRefused unless
+        the board is known to run.
         """
         return NO_PACKETS
 
@@ -246,7 +248,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two sets of packets; the guard sends one if this process hangs.
+        """Return two sets of packets; the watchdog process sends one if this process hangs.
 
         First: Stop. Second, for a latched e-stop: emergency stop, then Stop. Called after each
         input and before each output.

@@ -31,7 +31,11 @@ class Liveness:
         self._silent_since = None
 
     def stalled(self, now: float) -> None:
-        """Measure the silence from now on, because this process stalled and could not receive."""
+        """Count the board's silence from ``now`` on, because this process has stalled until now.
+
+        During the stall it could not receive, so the board may have sent data. A silence that was
+        reported before the stall is not reported again.
+        """
         if self._silent_since == self.heard_at:
             self._silent_since = now
         self.heard_at = now

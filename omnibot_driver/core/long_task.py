@@ -2,8 +2,8 @@
 
 """Long tasks of a board, such as a recording: one at a time.
 
-A task fails at its time limit, at a stop, and when the board is lost. This module knows times and
-sentences; it does not know what a task does.
+A task fails at its time limit, when the robot is stopped, and when the board is lost. This module
+knows time limits and the texts of answers; it does not know what a task does.
 """
 
 import math
@@ -59,7 +59,7 @@ class LongTask:
             self.end(self._token, False, f"the {self._name} failed: {reason}")
 
     def watch(self, *, driven: bool) -> None:
-        """Fail the task if the robot was driven at the last call, but is not driven now.
+        """Fail the task if the robot was driven at the last call, but has been stopped since.
 
         ``driven``: whether a command drives the robot now.
         """

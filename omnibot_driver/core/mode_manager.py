@@ -2,8 +2,9 @@
 
 """Requests for a mode of the board: start, pause and reset, repeated until data confirms them.
 
-The letters S, P and R may be lost, and P toggles between pause and run. So each request is an
-exchange with a deadline. This module does not know bytes, and reads no clock.
+The letters S (start), P (pause) and R (reset) may be lost on the line, and a P resumes a paused
+board. So each request is an exchange with a deadline. This module does not know bytes, and reads no
+clock.
 """
 
 import math
@@ -30,7 +31,8 @@ Of a longer interval, only this time is added. A running board sends every 10 ms
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command or a notice of a paused board takes to arrive.
 
-A notice proves nothing if it follows a command, or precedes data, within this time.
+A notice that comes within this time after a command may be older than the command, so it proves
+nothing. The same holds for a notice that data follows within this time.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -184,7 +186,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether this class can ignore further data from a running board."""
+        """Whether further data from a running board has no effect here: no request is open."""
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:

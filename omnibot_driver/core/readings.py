@@ -56,7 +56,8 @@ class PoseReading:
 
     * ``lost``: number of lost displacements whose motion this pose includes. The next displacement
       does not count them again.
-    * ``restarted``: whether the counter of poses starts again, after that of displacements did.
+    * ``restarted``: whether the counter of poses starts again. The counter of displacements has
+      started again before this pose.
     """
 
     x_m: float

@@ -3,7 +3,7 @@
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
 Each method returns the reason for a refusal, as a sentence with a remedy, or an empty string if
-there is no reason. This module knows modes and phases.
+there is no reason. This module knows the board's mode, and whether a request is in progress.
 """
 
 from omnibot_driver.core.board import Board, Mode
@@ -18,7 +18,7 @@ from omnibot_driver.core.requests import Request
 class Interlocks:
     """The conditions under which the driver refuses commands and requests.
 
-    * ``leaving``: whether the driver is shutting down. Everything is then refused.
+    * ``leaving``: whether the driver is shutting down. If so, everything is refused.
     * ``missing``: which lines are not open, as a sentence; empty if none.
     """
 
@@ -41,9 +41,10 @@ class Interlocks:
         return "the driver is shutting down" if self.leaving else self.missing
 
     def refused(self, now: float) -> None:
-        """Record that a motion command was refused, which shows that its sender is still active.
+        """Record that a motion command was refused, so that its sender is known to be active.
 
-        Call this for every refused command, also if another check has refused it.
+        The motion interlock may wait for a pause without commands. A refused command ends the pause
+        too. Call this for every refused command, also if another check has refused it.
         """
         self._interlock.be_active(now)
 

@@ -11,7 +11,8 @@ from enum import Enum
 from typing import Final
 
 AGAIN_S: Final = 60.0
-"""Time, in s, within which a second stop shows that the cause of the first stop remains."""
+"""Longest time, in s, between two stops by the motion monitor that probably have the same cause.
+After the second, the user must act before motion is accepted again."""
 
 
 class Until(Enum):
@@ -51,13 +52,18 @@ class MotionInterlock:
         self.until, self._tripped_at = Until.NOTHING, -math.inf
 
     def release(self) -> None:
-        """Record the release of the e-stop, which ends the refusal on a board without ~/start."""
+        """Record that the e-stop was released.
+
+        On a board without ~/start, this ends the refusal after a second stop within 60 s. A refusal
+        after a first stop stays, and so does one that only ~/start can end.
+        """
         if self.until is Until.ESTOP:
             self.start()
 
     def be_active(self, now: float) -> None:
-        """Record that a sender of commands is active. Only a pause without commands ends a refusal.
+        """Record that a sender of commands was active at ``now``.
 
+        A pause without commands ends the refusal after a first stop. This pause begins again here.
         Call this when a command is refused, and after a stall of this process.
         """
         self._commanded_at = now
@@ -67,7 +73,8 @@ class MotionInterlock:
 
         ``stands``: whether the command is to stand still, which is always allowed.
 
-        ``timeout_s``: time without commands that ends a refusal after a first stop.
+        ``timeout_s``: pause without commands, in s, that ends the refusal after a first stop. It
+        does not end the refusal after a second stop within 60 s.
         """
         silent = now - self._commanded_at >= timeout_s
         if not stands:

@@ -126,7 +126,7 @@ class CommandPipeline:
         )
 
     def begin(self, now: float) -> None:
-        """Discard the current command, and forget the measurements so far."""
+        """Discard the current command. The motion monitor forgets commands and motion so far."""
         self.policy.discard(now)
         self._monitor.begin()
 
@@ -162,7 +162,7 @@ class CommandPipeline:
         self._actuator.wrote(packets, now)
 
     def said(self, now: float) -> None:
-        """Record that the actuator sent the current set-point, so the robot should follow it."""
+        """Let the motion monitor expect that the robot follows the set-point that was just sent."""
         goal = isinstance(self.policy.current, GoalSetpoint)
         self._monitor.set_point(None if goal else self._actuator.commanded, now)
 
@@ -175,7 +175,10 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Record the number of impossible displacements since the driver began; return notices."""
+        """Check the number of impossible displacements since the driver began; return notices.
+
+        Several new ones in a row show that the robot does not move as commanded.
+        """
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)
             return []

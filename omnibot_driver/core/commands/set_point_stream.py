@@ -22,7 +22,8 @@ PACE_S: Final = 0.01
 MOTION_PACE_S: Final = 0.018
 """Shortest time between two set-points, in s. Commands at 50 Hz are not slowed.
 
-If it is shorter, a damaged set-point has a longer effect (docs/internals/integrity.md).
+With a shorter time, more set-points are sent, and lost bytes damage more of them. Wrong set-points
+would be in effect for a larger part of the time (docs/internals/integrity.md).
 """
 STOP_RATE_HZ: Final = 20.0
 """Lowest repetition rate of Stop and the emergency stop."""

@@ -142,7 +142,7 @@ class GoalSetpoint:
     * ``goal``: the pose in the odometry frame.
     * ``place``: the same pose in the board's earth frame.
     * ``alignment``: how often the relation of these two frames had changed before the command
-      (``Odometry.alignments``).
+      (``Odometry.alignments``). A further change makes ``place`` wrong, so the goal is discarded.
     * ``check``: function that raises CommandRefused if the order cannot be encoded.
     * ``direct``: whether the board drives straight to the goal.
     """

@@ -15,7 +15,7 @@ STILL_MPS: Final = 0.01
 STILL_RADPS: Final = 0.03
 """``STILL_MPS``, ``STILL_RADPS``: largest speeds in m/s and rad/s that count as standstill.
 
-They exceed two encoder counts in 40 ms, but not the slowest command (0.014 m/s).
+Two encoder counts in 40 ms are within these limits. The slowest command, 0.014 m/s, exceeds them.
 """
 STILL_S: Final = 0.1
 """Default duration of standstill for a proof, in s. Three displacements of 40 ms exceed it."""
@@ -31,7 +31,8 @@ PROOFS: Final = 2.0
 RAREST_S: Final = 1.0
 """Longest assumed period of displacements, in s.
 
-A displacement of longer duration includes the motion of lost displacements.
+If a displacement has a longer duration, others before it were lost, and it includes their motion.
+Its duration is not the period.
 """
 UNDER_WAY_S: Final = 0.05
 """Time after Stop in which displacements are ignored, in s. They may have been measured before Stop

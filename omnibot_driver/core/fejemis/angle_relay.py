@@ -20,8 +20,9 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Undetected damage may turn an angle to the right into one to the left. This is the limit for the
-wrong angle, in degrees: texts that could exceed it are avoided."""
+"""Largest tolerated wrong angle to the left, in degrees, that a board may read instead of an angle
+to the right, after damage that the checksum does not detect. A text that could become a larger one
+is avoided."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -167,8 +167,8 @@ class FejemisBoard(Board):
     def stalled(self) -> None:
         """Switch brush and lift off after a stall of the driver.
 
-        The guard process may already have switched them off. The stall is not regarded as silence
-        of the boards.
+        The watchdog process may already have switched them off. The stall is not regarded as
+        silence of the boards.
         """
         self._inbound.watch.stalled()
         if self._upkeep.machine.active:
@@ -296,7 +296,7 @@ class FejemisBoard(Board):
         return self.pause()
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two alternatives for the guard process: Stop, or an emergency stop and then Stop.
+        """Return two alternatives for the watchdog process: Stop, or an emergency stop and Stop.
 
         Both also switch brush and lift off.
         """

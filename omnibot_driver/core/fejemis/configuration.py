@@ -2,7 +2,8 @@
 
 """Reads the configuration that is stored on a board, and writes the user's values to the board.
 
-Two equal readings are needed: 1 in 99 damaged lines has a correct checksum.
+A value is used only after the board has reported it twice in a row, because 1 in 99 damaged lines
+has a correct checksum.
 
 The module knows which line requests which numbers; it does not know when the robot stands still.
 """
@@ -145,10 +146,10 @@ class Configuration:
 
     @property
     def geometry(self) -> Geometry | None:
-        """Track B and wheelbase F in m, as the board uses them; None while unknown.
+        """Track B and wheelbase F in m, as the board uses them.
 
-        The user's values are returned instead if the board's values are unknown, or equal to them
-        except for rounding.
+        If the board has not reported them, they are the user's values, or None if the user has set
+        none. If both are equal except for rounding, the user's values are returned.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

@@ -83,7 +83,8 @@ class Encoder:
     def restless(self) -> bool:
         """Whether to send the motion lines again after each new angle of the front wheel.
 
-        Without checksums, this replaces a damaged line after 15 ms.
+        True while the angle limits the speed, because the limit changes with the angle. Also true
+        without checksums, so that a damaged line is replaced after 15 ms, the period of the angles.
         """
         return self.held or not self._pair.with_sums
 

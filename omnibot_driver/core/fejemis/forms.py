@@ -12,9 +12,9 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""If this many of 24 lines of one kind have another form, this kind is no longer checked.
-
-``VARIES``: for lines with a correct checksum. ``VARIES_WITHOUT_SUM``: for other lines.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: how many of 24 lines of one kind must have another form than
+the learnt one, so that this kind of line is no longer checked. The first number is for lines with a
+correct checksum, the second for lines without one.
 """
 OF: Final = 24
 
@@ -28,7 +28,7 @@ class Forms:
         self._kinds: dict[bytes, _Kind] = {}
 
     def admit(self, text: bytes, *, summed: bool) -> bool:
-        """Return whether the line has the form of its kind.
+        """Return whether the line has the form that was learnt for its kind, and learn from it.
 
         ``summed``: whether the line has a correct checksum.
         """

@@ -111,7 +111,8 @@ class Half:
     def feed(self, data: bytes, now: float) -> Iterator[Message]:
         """Yield the messages in ``data``; the caller handles each before it requests the next.
 
-        This order matters: after a restart, the half forgets earlier times of the board.
+        This order matters, because a message that shows a restart makes the half forget the times
+        of the messages before it.
         """
         for message in self.decoder.feed(data, now):
             if self._admit(message, now):

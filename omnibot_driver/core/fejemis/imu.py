@@ -2,9 +2,11 @@
 
 """Computes when the board took each sample of its IMU, and converts the sample to SI units.
 
-The lines carry no time. The sampling time is a phase plus a whole number of sampling periods.
+The board's lines carry no sampling time, but the board takes a sample every 10 ms. So each sampling
+time is the *phase*, a constant time, plus a whole number of periods. The phase follows from the
+arrival times of the samples.
 
-The module knows pairs of lines and times; ``imu_pairs.py`` finds the pairs.
+Input: pairs of a gyro line and an acceleration line, formed by ``imu_pairs.py``.
 """
 
 import math
@@ -18,9 +20,10 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Interval between the arrivals of two late samples, in periods, above which a sample was lost.
+"""Interval between two arrivals, in periods. If two samples arrive farther apart, and both are late
+by about a period or more, a sample before them was lost.
 
-Without a loss, late samples have waited for a stalled host, and arrive together.
+If none was lost, they are late because they waited for a stalled host, and so arrive together.
 """
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s in which the board sends all lines of one control cycle."""
@@ -90,12 +93,10 @@ class ImuSamples:
         return self._phase_s + self._count * PERIOD_S
 
     def _follow(self, delay_s: float) -> None:
-        """Set the phase of the sampling times as late as possible.
+        """Set the phase of the sampling times, after a sample that arrived ``delay_s`` late.
 
-        No sample may arrive before its sampling time.
-
-        Only recent samples are considered: the last three blocks of 100 samples, and the samples
-        since then.
+        The phase is as late as possible, but no recent sample may arrive before its sampling time.
+        Recent are the last three blocks of 100 samples, and the samples since then.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

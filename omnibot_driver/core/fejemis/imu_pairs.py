@@ -2,8 +2,8 @@
 
 """Combines gyro and acceleration lines into samples of the IMU.
 
-A pair is false if its two lines belong to different samples. This happens if both lines between
-them were lost.
+A pair is a gyro line and an acceleration line. It is false if the two lines belong to different
+samples. This happens if the second line of one sample and the first line of the next were lost.
 """
 
 import itertools
@@ -24,23 +24,25 @@ PERIOD_S: Final = 0.01
 # One kind remains undetected: both lines are late, but close together, and no later pose is in the
 # read.
 PAIR_WITHIN_S: Final = 0.005
-"""Longest time in s between the two lines of a pair for which no further evidence is needed."""
+"""Time in s between the two lines of a pair from which on the pair must wait for the next pose,
+because it may be false."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``, ``SUREST_S``: smallest evidence that proves which line of a sample comes first, and
-largest evidence that is stored. Evidence is a sum of pauses before lines, in s."""
+"""``KNOWN_S``: difference in s that shows which line of a sample comes first. It is the sum of the
+pauses before gyro lines, minus the sum of the pauses before acceleration lines. The longer pauses
+are between two samples. ``SUREST_S``: largest difference that is stored."""
 MARKED_S: Final = PERIOD_S
-"""Evidence in s that counts in addition to the pause itself, if a line of another kind arrives in
-the pause. Such a pause is probably between two samples."""
+"""Time in s that is added to a pause before a gyro or acceleration line, if a line of another kind
+arrives in this pause. Such a pause is probably between two samples."""
 PATIENCE: Final = 60
-"""How many pauses are measured before weak evidence decides which line comes first. Evidence stays
-weak if the two lines are half a period apart."""
+"""After this many pauses, it is decided which line of a sample comes first, even if the difference
+is below ``KNOWN_S``. It stays small if the two lines are half a period apart."""
 MOST: Final = 10
-"""Largest magnitude of the counter by which the driver learns, for each other kind of line, whether
-it comes outside of or within pairs."""
+"""Largest magnitude of a counter that shows whether lines of another kind usually come between
+pairs (positive) or within pairs (negative). Each kind has its own counter."""
 UNPOSED: Final = 20
-"""How many gyro or acceleration lines may come while a pair waits for a pose. If more come, the
-pair is rejected."""
+"""How many gyro or acceleration lines may come while a pair that may be false waits for a pose. If
+more come, the pair is rejected."""
 
 
 @dataclass(slots=True)
@@ -53,7 +55,7 @@ class Pair:
 
     ``skipped``: how many incomplete samples were left out since the pair before.
 
-    ``doubtful``: whether the pair must wait for a pose.
+    ``doubtful``: whether the pair may be false, and so must wait for the next pose.
     """
 
     gyro: Gyro
@@ -69,10 +71,10 @@ Oriented = tuple[Attitude, float]
 
 
 class ImuPairs:
-    """Forms pairs from the lines of the IMU.
+    """Forms pairs of a gyro line and an acceleration line, each from one sample of the IMU.
 
-    It also receives the orientations. ``take`` returns pairs and orientations in one list, in order
-    of arrival.
+    Orientations pass through unchanged: ``take`` returns them between the pairs, in order of
+    arrival.
     """
 
     def __init__(self) -> None:
@@ -83,8 +85,8 @@ class ImuPairs:
         self.first: Kind | None = None
         """The keyword of the line that comes first in a sample; None while unknown."""
         self._evidence_s = 0.0
-        """Pauses before gyro lines minus pauses before acceleration lines, in s. Positive: gyro
-        lines come first."""
+        """Sum of the pauses before gyro lines minus those before acceleration lines, in s. If it is
+        positive, the gyro line of a sample comes first."""
         self._seen = 0
         self._last: tuple[Kind, Gyro | Acceleration, float] | None = None
         self._waiting: tuple[Gyro | Acceleration, float] | None = None
@@ -110,8 +112,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
 
-        If this kind of line usually comes outside of pairs, the present pair has lost its second
-        line.
+        A line may be waiting for the second line of its pair. Unless this ``kind`` usually comes
+        within pairs, the second line is regarded as lost.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:
@@ -124,7 +126,11 @@ class ImuPairs:
         self._queue.append((attitude, now))
 
     def pose(self, time_s: float) -> None:
-        """Receive the board's time of a pose, and find the false pairs since the previous pose."""
+        """Receive the board's time of a pose, and accept or reject all pairs that still wait.
+
+        The time since the previous pose shows how many gyro and acceleration lines were sent. If
+        lines of both kinds are missing, any of the pairs may be false, so all are rejected.
+        """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
         if abs(periods) < 0.5:
@@ -155,7 +161,7 @@ class ImuPairs:
         return taken
 
     def _reject(self, pair: Pair) -> None:
-        """Remove a false pair, and count its two lines as two incomplete samples."""
+        """Remove a pair, and count its two lines as two incomplete samples."""
         at = next(at for at, item in enumerate(self._queue) if item is pair)
         del self._queue[at]
         lost = pair.skipped + 2
@@ -209,9 +215,9 @@ class ImuPairs:
         self._skipped = 0
 
     def _place(self, kinds: set[str], step: int) -> None:
-        """Record that lines of these ``kinds`` came within a pair or between pairs.
+        """Count lines of these ``kinds``, to learn whether a kind comes between or within pairs.
 
-        ``step``: 1 between pairs, -1 within a pair.
+        ``step``: 1 if they came between pairs, -1 if they came within a pair.
         """
         for kind in kinds:
             self._outside[kind] = max(-MOST, min(MOST, self._outside.get(kind, 0) + step))

@@ -83,7 +83,7 @@ class Obedience:
         return not self.estopped and now - self._released_at > RELEASED_S
 
     def start_due(self, now: float) -> bool:
-        """Return whether to send ``start`` now; the caller must then send it."""
+        """Return whether to send ``start`` now. If True, the caller must send it."""
         if now < self.start_at:
             return False
         again = now - self._released_at < RELEASED_S

@@ -23,7 +23,7 @@ poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
 """``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose from the wheels' motion, in m
-and rad. An acceleration of up to ``SPEED_UP_MPS2`` adds to it."""
+and rad. The motion that an acceleration of ``SPEED_UP_MPS2`` can cause is added to it."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -96,9 +96,10 @@ class PoseOdometry:
         return [displacement, PoseReading(place.x_m, place.y_m, place.yaw_rad)]
 
     def pose(self, pose: BoardPose, now: float) -> DisplacementReading | None:
-        """Return the displacement up to ``pose``; None for the first pose and for a rejected pose.
+        """Return the displacement up to ``pose``; None for a rejected pose.
 
-        After a restart of the board, the first displacement is 0.
+        The first pose since the driver began gives None, because there is no pose before it. The
+        first pose after a restart of the board gives a displacement of 0.
         """
         before = self._pose
         if before is None:

@@ -45,9 +45,9 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum detects the loss of two characters.
+    """Return whether the checksum of this text detects the loss of two characters at two places.
 
-    One of them is a line end or a digit of the checksum. The other is ``;`` or part of a number.
+    One character is a line end or a digit of the checksum. The other is ``;`` or part of a number.
     """
     # A lost line end joins two lines. The joined line is accepted if the character whose code is
     # the sum of the second line with its prefix is lost too. So this sum must not be the code of

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes ``rc`` lines without a checksum, so that undetected damage has little effect.
+"""Writes motion lines (``rc``) without a checksum. Their form limits the effect of damage.
 
 If a decimal point or a digit after it is lost, the board obeys a wrong number until the next line.
 """

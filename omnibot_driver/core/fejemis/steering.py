@@ -20,12 +20,14 @@ ACROSS_RAD: Final = math.radians(85.0)
 """Target angle of the front wheel, in rad, from which a command is a turn on the spot."""
 ALIGNED_RAD: Final = math.radians(5.0)
 STILL_ALIGNED_RAD: Final = math.radians(10.0)
-"""``ALIGNED_RAD``, ``STILL_ALIGNED_RAD``: largest deviation of the front wheel from its target
-angle, in rad, at which a turn on the spot may begin, or may continue. Other motion has full speed
-up to a deviation of ``ALIGNED_RAD``."""
+"""``ALIGNED_RAD``: largest deviation of the front wheel from its target angle, in rad, at which a
+turn on the spot may begin. Other motion has full speed up to the same deviation.
+
+``STILL_ALIGNED_RAD``: largest deviation at which a turn on the spot may continue.
+"""
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad, whose effect on the body's motion is
-tolerated."""
+"""Deviation of the front wheel from its target angle, in rad, at which full speed is allowed. At a
+larger deviation, the speed is limited, so that the error of the body's velocity does not grow."""
 
 
 @value(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 """Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-Data arrives late, never early. So the clock is a straight line just below all arrivals, fitted by
+Input: times of the board, and when the lines with them arrived. Lines arrive late, never early. So
+the conversion is a straight line just below all arrival times, fitted by
 ``core/timing/clock_fit.py``. docs/internals/time.md explains why.
 """
 
@@ -21,11 +22,13 @@ LATE_S: Final = 1.0
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
-"""When a new clock begins: after ``AGAIN`` implausible board times in a row. They must arrive over
-at least ``AGAIN_AFTER_S``, and agree with their arrival times within ``AGREE_S``, both in s."""
+"""``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: a new clock begins after ``AGAIN`` implausible board
+times in a row. They must arrive over at least ``AGAIN_AFTER_S``, in s. Since the first of them,
+board time and arrival time must have advanced equally, within ``AGREE_S``, in s."""
 EARLIES_WITHIN_S: Final = 1.0
-"""If ``AGAIN`` (three) lines within this time in s seem early, the clock began with a late line.
-Other lines may come between them, because those can be late too."""
+"""Time in s. If three lines (``AGAIN``) within this time seem to arrive early, the clock began with
+a late line, so it begins again. Other lines may come between the three, because they may be late as
+well, and so seem right."""
 SMALLEST_STEP_S: Final = 1e-6
 
 

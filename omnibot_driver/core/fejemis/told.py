@@ -2,7 +2,8 @@
 
 """Notices for the user of a Fejemis. Each text is shown at most once in 10 s (``TELL_EVERY_S``).
 
-A notice that stops the robot is always passed on. If its text was just shown, the text is empty.
+A notice that stops the robot is always passed on, but its text is empty if the same text was shown
+in the last 10 s.
 """
 
 import math

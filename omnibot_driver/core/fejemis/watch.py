@@ -21,8 +21,8 @@ FLOWS_S: Final = 0.5
 UNHEARD_S: Final = 3.0
 """Silence in s after which the user is notified that the board at an opened port is missing."""
 UNREAD_S: Final = 0.03
-"""Time in s without a line of either board above which no single board is to blame. Each board
-sends every 15 ms or more often, so the driver reads late, or both boards are cut off."""
+"""If no line of either board was read for this time in s, missing data is not blamed on one board.
+Each board sends every 15 ms or more often, so the driver reads late, or both are cut off."""
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
     " or check the USB hub"
@@ -118,9 +118,10 @@ class Watch:
         return False
 
     def _look_at_reads(self, now: float) -> None:
-        """Notice that no line of either board was read for ``UNREAD_S``.
+        """Check whether no line of either board was read for ``UNREAD_S``.
 
-        After that, the front board has ``OLDEST_S`` to show that its angles only waited.
+        If so, missing data is not blamed on one board for the next ``OLDEST_S``. In this time,
+        lines that only waited to be read arrive.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

@@ -13,7 +13,7 @@ from omnibot_driver.core.geometry.twist import BodyTwist
 
 
 class Kinematics(Protocol):
-    """Kinematics of a body on wheels that do not slip. The object is a frozen value."""
+    """Kinematics of a body on wheels that do not slip. Objects are immutable."""
 
     def __hash__(self) -> int:
         """Return a hash, so that values derived from the kinematics can be cached."""

@@ -46,7 +46,7 @@ class BiasCorrector:
         self.calibration = GyroCalibration(correction.gyro_bias, refine=correction.auto_gyro_bias)
 
     def configure(self, correction: ImuCorrection) -> None:
-        """Use new settings, but keep the gyro's bias, which may have been measured meanwhile."""
+        """Use new settings, but keep the gyro's bias, which a calibration may have measured."""
         self.calibration.refine = correction.auto_gyro_bias
         self._correction = correction
 

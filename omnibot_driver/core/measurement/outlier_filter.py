@@ -35,18 +35,21 @@ CALMING: Final = 0.95
 """Factor by which the stored largest recent change shrinks with each reading. After 20 readings, a
 third of it is left."""
 STILL: Final = 0.08
-"""Largest fraction of the leap that remains in the IMU reading after a spike.
+"""An implausible change of the IMU's readings was a spike only if at most this fraction of the
+change remains in the next reading.
 
-If only one acceleration leaps, the other values change by at most this fraction of its leap.
+The change counts as one of a single value only if every other value changes by at most this
+fraction of it.
 """
 END_OF_SCALE: Final = 0.99996
 """Smallest fraction of the accelerometer's full scale that is regarded as the end of the scale. The
 largest positive reading of 16 bits is just above it."""
 MOST_HELD: Final = 10
-"""Largest number of readings that are held: a leaping displacement, and the poses after it."""
+"""Largest number of readings that are held: a displacement that changed implausibly much, and the
+poses after it."""
 BACK: Final = 0.25
-"""A leaping displacement was a spike only if at most this fraction of its leap remains in the next
-displacement."""
+"""A displacement that changed implausibly much was a spike only if at most this fraction of the
+change remains in the next displacement."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +98,7 @@ class OutlierFilter:
         self._motion_leaps = _Spikes(BACK, knocked=0)
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
-        """A displacement that leaps, and the poses after it."""
+        """A displacement that changed implausibly much, and the poses after it."""
         self._displaced_at_s: float | None = None
         self._lost = 0
         self._restarted = self._time_unknown = False
@@ -197,9 +200,9 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading. In a pose, add the number of rejected displacements to ``lost``.
+        """Return the reading. To the ``lost`` of a pose, add the number of rejected displacements.
 
-        The pose already includes the motion of these displacements.
+        The pose includes the motion of these displacements, so it replaces them.
         """
         if not isinstance(reading, PoseReading) or not self._lost:
             return reading
@@ -222,11 +225,11 @@ class OutlierFilter:
 class _Spikes:
     """Finds spikes in a series of readings, each of which is a list of values.
 
-    The caller divides each value by the change that is always allowed.
+    The unit of each value is the change that is always allowed between two readings.
 
     * ``left``: largest fraction of a spike that remains in the next reading.
-    * ``knocked``: how many of the values, from the first on, a knock against the robot may change
-      in a single reading. For these, only a flipped bit is a spike.
+    * ``knocked``: number of values at the beginning of the list that may leap when the robot is
+      knocked. A leap of these may be a spike only if one flipped bit explains it.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -243,7 +246,7 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Return whether the previous values were a spike, and whether these values leap.
+        """Return whether the previous values were a spike, and whether these change implausibly.
 
         ``periods``: number of sampling periods since the previous values.
 
@@ -277,10 +280,11 @@ class _Spikes:
         return was_single, False
 
     def _is_a_bit(self, step: float, value: float, topmost: float) -> bool:
-        """Return whether a flipped bit can explain the step, within the recent variation.
+        """Return whether one flipped bit can explain the step of a value.
 
-        ``value``: magnitude of the reading after the step. At the end of the scale, the result is
-        False, because a knock can cause such a reading.
+        The step may differ from the bit by the recent variation of the readings. ``value``:
+        magnitude after the step. If it is at the end of the scale, the result is False, because a
+        knock can cause it.
         """
         if topmost == inf:  # the readings are not integers
             return False

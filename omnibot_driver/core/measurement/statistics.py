@@ -23,8 +23,8 @@ class StreamStatistics:
 
     Only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
 
-    * ``imu_period_s``: period of the IMU in s, by which displacements show how many IMU readings
-      were lost; None if they do not show this.
+    * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by it, shows
+      how many IMU readings the board has sent. None if lost IMU readings are not counted so.
     """
 
     imu_period_s: float | None = None

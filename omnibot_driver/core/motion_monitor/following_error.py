@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The following error: how far a robot has moved outside its envelope without interruption.
+"""The following error: how far a robot has moved other than its recent set-points allow.
 
-One damaged displacement or a short jerk cannot reach the limit. This module knows velocities in the
-board's own axes, and times; it does not know which fault an error shows.
+The *envelope* is the set of velocities that these set-points allow (``envelope.py``). The error is
+the sum of the motion outside the envelope. A displacement inside the envelope resets the error to
+0. A single damaged displacement or a short jerk cannot reach the limit. This module knows
+velocities in the board's own axes, and times; it does not know which fault an error shows.
 """
 
 from typing import Final
@@ -14,24 +16,26 @@ from omnibot_driver.core.motion_monitor.set_point_history import AT_REST, Setpoi
 from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
-"""Time in s before a displacement. Its motion is compared with the set-points from this time on.
+"""Time in s that a robot may take to follow a set-point. So a displacement is compared with all
+set-points that held in this time before it, or later.
 
 A robot that is clearly slower than all these set-points is assumed to be held.
 """
 UNEXPLAINED_M: Final = 0.003
 UNEXPLAINED_RAD: Final = 0.01
 LARGEST_PART, LARGEST_PART_OF_A_LONG_ONE = 0.45, 0.55
-"""Largest fraction of the error's limit that one short displacement, or one long one, adds.
+"""Largest fraction of the error's limit that one displacement adds: the first for a duration of up
+to 60 ms, the second for a longer one.
 
-So at least three displacements in a row, or two long ones, are needed to exceed the limit.
+So the error exceeds its limit only after three displacements in a row, or after two longer ones.
 """
 
 
 class FollowingError:
     """The following error of one robot: the sum of its motion outside the envelope.
 
-    * ``slack_mps``, ``slack_radps``: tolerated speeds outside the envelope.
-    * ``outside``: whether the last displacement exceeded the envelope and the slack.
+    * ``slack_mps``, ``slack_radps``: speeds outside the envelope that are tolerated as well.
+    * ``outside``: whether the last displacement was outside the envelope by more than the slack.
     """
 
     def __init__(self, slack_mps: float = 0.0, slack_radps: float = 0.0) -> None:

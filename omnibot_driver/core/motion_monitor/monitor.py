@@ -33,9 +33,9 @@ MOVING_RADPS: Final = 0.05
 BLOCKED_S: Final = 1.0
 
 STOOD_S: Final = 0.5
-"""Time at rest, in s, after which a robot has certainly obeyed Stop.
+"""Time at rest, in s, which proves that a robot has obeyed Stop.
 
-Later motion has another cause.
+If it moves after that, the cause is not a lost Stop, but for example a push.
 """
 STOPS_S: Final = 5.0
 """Time in s for which the command policy repeats Stop if the robot keeps moving."""
@@ -184,7 +184,10 @@ class MotionMonitor:
         return self._blocked(motion, seconds, heading_known=heading_known)
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """Return ``fault``, and suspend the checks, because the robot may still roll to a halt."""
+        """Return ``fault``, and suspend the checks until some time after the next set-point.
+
+        Until then, the robot may still roll to a halt.
+        """
         self._error.reset()
         self._history.add(None, now)
         return fault
@@ -208,7 +211,8 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        While a robot is being pushed, Stop is sent at ever longer intervals.
+        While a robot is being pushed, Stop is sent at ever longer intervals. ``begins``: whether
+        the following error exceeds its limit, which is needed for the first Stop.
         """
         if not self._error.outside:
             self._stood_s += seconds

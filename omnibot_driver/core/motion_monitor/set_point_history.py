@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The history of set-points, and the velocities of the robot that they explain.
+"""The history of set-points, and the velocities that the robot may have because of them.
 
-For 0.3 s, a replaced set-point explains its full velocity, and then an ever smaller part. This
-module knows velocities and times; it does not know how the robot moves.
+For 0.3 s, a replaced set-point still allows its full velocity, and after that an ever smaller part.
+This module knows velocities and times; it does not know how the robot moves.
 """
 
 import math
@@ -26,12 +26,13 @@ HELD_S: Final = 0.3
 This includes the line's delay, a lost repetition, and a controller's dead time.
 """
 FADING_S: Final = 0.2
-"""Time constant in s by which the explained part of a replaced set-point decays after ``HELD_S``.
+"""Time constant in s with which the velocity that a replaced set-point still allows decays. The
+decay begins ``HELD_S`` after the replacement.
 
 It is long enough for robots with a time constant of up to 0.35 s.
 """
 FADED_S: Final = 1.1
-"""Time in s after which a replaced set-point is ignored. By then, it explains less than 2 % of its
+"""Time in s after which a replaced set-point is ignored. By then, it allows less than 2 % of its
 velocity."""
 UNKNOWN_S: Final = 0.8
 """Time in s after the first known set-point during which earlier, unknown commands may still move

@@ -3,7 +3,7 @@
 """Wind-up: the distance that wheel controllers make up for after the robot was held or pushed.
 
 The controllers integrate their errors. So a released robot moves too fast or backwards, even after
-another command or Stop. This module knows velocities; it does not know the envelope.
+another command or Stop. This module knows velocities; it does not know which are allowed.
 """
 
 import math
@@ -54,14 +54,14 @@ class WindUp:
         self._unproved_m: float | None = None
         """Distance in m by which the robot fell behind in one long displacement.
 
-        It is added to the wind-up if the robot is also held in the next displacement. Then it is 0.
-        None if the robot was not held.
+        It is not part of the wind-up yet. It is added, and set to 0, if the robot is also held in
+        the next displacement. None if the robot was not held in the last displacement.
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion outside the envelope; return whether the wind-up was large enough for it.
+        """Subtract motion that the set-points do not allow; return whether the wind-up explains it.
 
-        ``way_mps``, ``turn_radps``: excess over the envelope, during ``seconds``.
+        ``way_mps``, ``turn_radps``: excess over the allowed velocities, during ``seconds``.
         """
         self._unproved_m = None
         outside_m = (max(0.0, way_mps) + LEVER_M * max(0.0, turn_radps)) * seconds
@@ -84,7 +84,7 @@ class WindUp:
     ) -> None:
         """Add the distance by which a held robot falls behind. Otherwise the wind-up decays.
 
-        ``motion``: mean twist during ``seconds``; it is inside the envelope.
+        ``motion``: mean twist during ``seconds``; the set-points allow it.
 
         ``newest``: set-points that the robot may still be approaching, the current one first.
 

@@ -77,5 +77,8 @@ class CorrectionSmoother:
 
 
 def _part(wanted: float, room: float) -> float:
-    """Return how much of the wanted correction fits into the room, as a fraction from 0 to 1."""
+    """Return the fraction, 0 to 1, of the wanted correction that ``room`` allows.
+
+    ``room``: the most by which the pose may still move in this step.
+    """
     return min(1.0, max(0.0, room) / wanted) if wanted else 1.0

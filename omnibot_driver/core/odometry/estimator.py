@@ -33,8 +33,8 @@ POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Standard deviation of the heading, in rad, that results from open gaps. A heading with at least
-this deviation counts as unknown."""
+"""Smallest standard deviation of the heading, in rad, at which it counts as unknown. The deviation
+comes from lost displacements whose motion no pose of the board has shown yet."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt
 in this time."""
@@ -176,8 +176,8 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Convert ``place`` from the odometry frame into the board's frame.
 
-        From the robot's present heading, the result needs the shorter turn. Return None before a
-        pose of the board has shown how the frames are related.
+        The board counts full turns. The heading of the result is the one to which the robot has the
+        shorter turn. Return None before a pose of the board has shown how the frames are related.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None
@@ -200,7 +200,8 @@ class Odometry:
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
         """Return whether a pose is the first one, or shows that the board's frame has changed.
 
-        After a suspected restart, a single pose that fits the motion is enough.
+        A single pose shows this after a suspected restart, if it fits the motion since then.
+        Otherwise, the next pose must confirm it.
         """
         if self._board is None:
             return confirmed

@@ -15,7 +15,7 @@ from omnibot_driver.core.readings import DisplacementReading
 LONGEST_BRIDGE_S: Final = 2.0
 """Longest time, in s of the board's clock, over which motion is interpolated.
 
-Without any data, the robot is stopped sooner.
+Longer motion in a gap is unlikely: the driver stops a robot that sends no data sooner than this.
 """
 NO_WAY: Final = Pose()
 

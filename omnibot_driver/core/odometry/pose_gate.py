@@ -2,8 +2,9 @@
 
 """The gate for the board's poses: accepts a pose that is finite, reachable and as expected.
 
-An unexpected pose is accepted only if the next pose confirms it. This module knows poses and gaps;
-it does not know what an accepted pose changes.
+An unexpected pose is accepted only if the next pose confirms it. An *open gap* is a time of lost
+displacements whose motion no accepted pose has shown yet. This module does not know what an
+accepted pose changes.
 """
 
 import math
@@ -17,7 +18,8 @@ from omnibot_driver.core.readings import DisplacementReading
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
 """``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations from the expected pose, in m and rad, above
-which the next pose must confirm a pose. The possible motion in open gaps is added to them."""
+which the next pose must confirm a pose. The possible motion of lost displacements is added to them,
+unless a pose has shown that motion already."""
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5
@@ -51,7 +53,7 @@ class PoseGate:
             self.doubted = self.doubted.moved(chord)
 
     def passed(self, seconds: float) -> None:
-        """Record that ``seconds`` of the board's time have passed."""
+        """Record that the robot may have moved for ``seconds``, by the board's clock."""
         self._unproved_s += seconds
 
     def possible(self, told: Pose) -> bool:
@@ -92,9 +94,9 @@ class PoseGate:
 
 
 def expected(way: Pose, gap: Covariance) -> bool:
-    """Return whether rounding or open gaps can explain that a pose deviates by ``way``.
+    """Return whether rounding or lost displacements can explain that a pose deviates by ``way``.
 
-    ``gap``: covariance of the motion in open gaps.
+    ``gap``: covariance of the motion of lost displacements that no pose has shown yet.
     """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS

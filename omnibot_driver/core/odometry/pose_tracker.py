@@ -51,9 +51,9 @@ class PoseTracker:
         self.follower, self.uncertainty = CorrectionSmoother(), Uncertainty(self.uncertainty.noise)
 
     def rates(self, tangent: Pose, seconds: float) -> tuple[BodyTwist, BodyTwist]:
-        """Return the twist of a motion that took ``seconds``, first in REP-103's axes.
+        """Return the twist of a motion that took ``seconds``, in two systems of axes.
 
-        The second result is the same twist in the board's axes.
+        The first result is in REP-103's axes. The second is the same twist in the board's axes.
         """
         rolling = _times(tangent, self._size).over(seconds)
         if self._signed_size == self._size:

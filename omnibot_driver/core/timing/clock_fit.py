@@ -19,13 +19,15 @@ BLOCK_TICKS: Final = 100
 BLOCKS_KEPT: Final = 75
 """Number of blocks that are kept: 75 s of 10 ms ticks.
 
-If an adapter's timer is 100 ppm off, its phase relative to the tick repeats every 20 s.
+In this time, the smallest delay of an adapter occurs: if the adapter's timer is 100 ppm off, its
+delays repeat every 20 s.
 """
 LARGEST_SKEW: Final = 1.2e-4
 """Largest assumed relative deviation of the board's crystal from the host's: 100 ppm, with a
 margin."""
 SUPPORT: Final = 0.75
-"""Place at which the fitted clock touches the points' hull, as a fraction of the hull's time span.
+"""Which edge of the latest points' lower hull gives the fitted clock: the one at this fraction of
+the hull's time span.
 
 With a larger fraction, the clock follows recent points more closely, but jitter affects it more.
 """
@@ -36,9 +38,10 @@ LATE_PART: Final = 0.1
 """Largest assumed fraction of late reads. A read is late if its delay exceeds ``LATE_S``, in s."""
 LATE_S: Final = 1e-4
 WIDEST: Final = 0.2
-"""Largest accepted distance of an earliest point below a latest point, as a fraction of a period.
+"""Largest difference between the upper and the lower bound of a block, as a fraction of a period.
+If the bounds differ more, the lower bound is not used.
 
-With a 16 ms timer in the adapter, the distance is 2 ms, a fifth of a 10 ms tick.
+An adapter with a 16 ms timer causes a difference of 2 ms, a fifth of a 10 ms tick.
 """
 
 Point = tuple[int, float]

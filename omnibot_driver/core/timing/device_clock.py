@@ -30,13 +30,14 @@ If more ticks are missing, the clock is restarted.
 BEAT_READS: Final = 12
 """Number of consecutive reads of which at least one has little delay.
 
-An adapter with a timer of 16 ms reads at five phases of the tick. Each phase occurs twice in 12
-reads.
+An adapter with a timer of 16 ms reads at five phases of a 10 ms tick. Each phase has its own delay.
+In 12 reads, each phase occurs twice, also the one with the least delay.
 """
 CALM: Final = 0.45
 """Largest difference from the fitted clock, in periods, of a read whose tick number is certain.
 
-The previous read must also be this near to the fitted clock. Keep the value below 0.5.
+The previous read must also be this near to the fitted clock. Keep the value below 0.5: half-way to
+the next tick, the number would be uncertain.
 """
 LARGEST_RISE: Final = 0.02
 """Fraction by which the step from one stamp to the next may exceed the period. If a new fit makes
@@ -246,10 +247,10 @@ class DeviceClock:
         return short
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
-        """Record a new tick that was read at ``now``.
+        """Record the delay ``lag_s`` of a new tick, which was read at ``now``.
 
-        ``lag_s``: how much later the tick arrived than by the fitted clock, in s. Of ticks that
-        were read together, only the delay of the last one is stored.
+        ``lag_s``: arrival of the tick minus its time by the fitted clock, in s. Of ticks that were
+        read within half a period, only the last ``lag_s`` is stored.
         """
         if now - self._seen_at < self._period_s / 2 and self._lags_s:
             self._lags_s[-1] = lag_s
@@ -266,8 +267,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: step from the last stamp, in s, that leaves room for the stamps of later
-        readings.
+        ``room_s``: step from the last stamp, in s, that leaves room for the stamps of the readings
+        after this one. The smallest step is not larger than this.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)

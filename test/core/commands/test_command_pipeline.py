@@ -45,9 +45,9 @@ def bench() -> Bench:
 
 
 def velocities(bench: Bench, mark: int) -> list[tuple[float, list[int]]]:
-    """Return the time in s and the words of each Stop and base velocity (mode 1) on the line.
+    """Return the time in s and the three 16-bit numbers of each Stop and base velocity (mode 1).
 
-    ``mark``: number of the first frame, counted from the beginning of the test.
+    ``mark``: number of the first frame to look at, counted from the beginning of the test.
     """
     frames = [(at, data[-9:]) for at, data in bench.written[mark:]]
     return [
@@ -170,7 +170,10 @@ def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None
 
 
 def test_a_reversal_is_ramped_through_zero() -> None:
-    """A robot that drives forward is commanded backward. No step exceeds the acceleration limit."""
+    """A robot that drives forward is commanded backward.
+
+    The velocity on the line falls through zero, and never faster than the acceleration limit.
+    """
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)

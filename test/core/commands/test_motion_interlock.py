@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the motion interlock: when a robot may move again after a trip of the motion monitor.
+"""Tests of the motion interlock: when a robot may move after the motion monitor has stopped it.
 
-In a trip, the motion monitor stops a robot that does not move as commanded.
+The motion monitor stops a robot that does not move as commanded.
 """
 
 from omnibot_driver.core.commands.motion_interlock import MotionInterlock, Until
@@ -19,14 +19,14 @@ def arrives(interlock: MotionInterlock, now: float, *, stands: bool = False) -> 
 
 
 def test_motion_is_allowed_until_something_trips() -> None:
-    """All commands are accepted as long as the motion monitor has not tripped."""
+    """All commands are accepted as long as the motion monitor has not stopped the robot."""
     interlock = MotionInterlock()
     assert all(arrives(interlock, 0.1 * step) for step in range(20))
     assert interlock.reason(TIMEOUT_S) == ""
 
 
 def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
-    """After a trip of the motion monitor, a sender continues to send motion commands.
+    """The motion monitor stops the robot, and a sender continues to send motion commands.
 
     All of them are refused, because the pause between them is shorter than the command timeout.
     """
@@ -38,9 +38,9 @@ def test_a_sender_that_goes_on_is_refused_for_as_long_as_it_goes_on() -> None:
 
 
 def test_silence_for_the_timeout_ends_the_refusal() -> None:
-    """After a trip of the motion monitor, no command arrives for the command timeout.
+    """The motion monitor stops the robot, and no command arrives for the command timeout.
 
-    Motion is then allowed again. The timeout begins with the last command, not with the trip.
+    Motion is allowed again. The timeout begins with the last command, not with the stop.
     """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
@@ -49,7 +49,10 @@ def test_silence_for_the_timeout_ends_the_refusal() -> None:
 
 
 def test_a_zero_command_ends_the_refusal() -> None:
-    """The user sends a zero command after a trip. Afterwards, motion commands are accepted too."""
+    """The motion monitor stops the robot, and the user sends a zero command.
+
+    After this command, motion commands are accepted too.
+    """
     interlock = MotionInterlock()
     arrives(interlock, 0.0)
     interlock.trip(0.1)
@@ -58,7 +61,7 @@ def test_a_zero_command_ends_the_refusal() -> None:
 
 
 def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
-    """The monitor trips twice within a minute. Motion is then refused until ~/start is called.
+    """The motion monitor stops the robot twice within a minute. ~/start ends the refusal.
 
     Waiting does not help. Zero commands are still accepted.
     """
@@ -75,9 +78,9 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A trip counts as the first one if the last trip was over a minute ago.
+    """A stop by the motion monitor counts as a first one if the last was over a minute ago.
 
-    It also counts as the first one after ~/start.
+    It also counts as a first one if ~/start was called since the last.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
@@ -90,9 +93,9 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 
 
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
-    """The board has no ~/start. After a second trip of the motion monitor, motion is refused.
+    """The board has no ~/start. The motion monitor stops the robot a second time within a minute.
 
-    The release of the e-stop ends this refusal. After a first trip, it has no effect.
+    The release of the e-stop ends the refusal. After a first stop, it has no effect.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

@@ -15,7 +15,10 @@ def stream() -> Stream:
 
 
 def test_a_new_line_hears_a_latched_estop_at_once(stream: Stream) -> None:
-    """The e-stop is sent when the port opens, even just after an e-stop on the old connection."""
+    """The port opens again 1 ms after an e-stop was sent on the old connection.
+
+    The e-stop is sent at once on the new connection too.
+    """
     stream.latch(1.0)
     stream.write(1.0)
     stream.connect(1.001)

@@ -75,9 +75,9 @@ def test_the_current_command_is_repeated_at_the_command_rate(stream: Stream) -> 
 def test_after_the_timeout_stop_is_repeated_until_the_robot_is_seen_to_stand(
     stream: Stream, stands: bool, for_s: float, rate_hz: float
 ) -> None:
-    """A command expires. The driver then sends Stop at 20 Hz.
+    """A command expires. The driver sends Stop at 20 Hz.
 
-    It ends after 1 s if the robot is seen at rest, otherwise after 5 s.
+    It does so for 1 s if the robot is seen at rest, otherwise for 5 s.
     """
     stream.configure(CommandSettings(timeout_s=TIMEOUT_S, rate_hz=rate_hz))
     order(stream, GO, 1.0)
@@ -122,9 +122,10 @@ def test_a_zero_command_is_repeated_as_often_as_any_stop() -> None:
 def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
     stream: Stream,
 ) -> None:
-    """A letter, such as S (start), is sent while the robot drives. The command is then sent again.
+    """A letter, such as S (start), is sent while the robot drives. Zeros precede the letter.
 
-    Zeros precede the letter. They may turn an incomplete frame in the board into a wrong command.
+    The zeros may complete a damaged frame in the board to a wrong command. So the driver sends the
+    command again after the letter.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -159,9 +160,9 @@ def test_a_motion_that_still_changes_goes_out_at_the_pace_of_new_ones(
 
 
 def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream) -> None:
-    """Another topic commands the robot (another authority). The driver sends Stop at once.
+    """A second topic begins to command the robot. The driver sends Stop at once.
 
-    The new command follows one control tick (10 ms) later.
+    The new command follows 10 ms later.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -172,9 +173,9 @@ def test_another_authority_is_stopped_before_the_newest_is_obeyed(stream: Stream
 def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
     stream: Stream,
 ) -> None:
-    """Three topics command the robot within 2 ms. The second and third replace the one before.
+    """Three topics command the robot within 2 ms.
 
-    The driver sends the first command, one Stop, and the newest command.
+    The driver sends the first command, one Stop, and the third command. It never sends the second.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)
@@ -189,9 +190,9 @@ def test_the_newest_of_three_authorities_wins_with_one_stop_before_it(
 def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
     stream: Stream,
 ) -> None:
-    """The command of the first authority expires, and the driver sends Stop.
+    """The command of one topic expires, and the driver sends Stop.
 
-    When the authority then changes, a second Stop is not needed.
+    When another topic commands the robot later, the driver does not send a second Stop.
     """
     order(stream, GO, 1.0)
     run(stream, 1.0, 1.6)
@@ -202,7 +203,10 @@ def test_an_authority_whose_command_has_expired_needs_no_stop_of_its_own(
 def test_a_stop_that_has_just_gone_out_is_the_one_between_two_authorities(
     stream: Stream,
 ) -> None:
-    """The driver has just sent Stop when the authority changes. It does not send a second Stop."""
+    """The driver has just sent Stop when another topic begins to command the robot.
+
+    It does not send a second Stop.
+    """
     order(stream, GO, 1.0)
     stream.write(1.0)
     order(stream, STOP, 1.001)

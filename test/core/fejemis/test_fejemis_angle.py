@@ -48,7 +48,10 @@ def refusal(bench: Bench) -> str:
 
 
 def test_without_angles_a_command_is_refused_because_of_the_front_board() -> None:
-    """The front board sends no more angles. The drive board sends as before."""
+    """The front board sends no more angles, and the drive board sends as before.
+
+    The refusal of a command names the front board.
+    """
     bench = nominal()
     bench.carry = lambda channel, data: b"" if channel == FRONT else data
     bench.run(0.08)
@@ -56,9 +59,9 @@ def test_without_angles_a_command_is_refused_because_of_the_front_board() -> Non
 
 
 def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
-    """The driver reads nothing for 0.1 s, because the computer is busy. Its timers are in time.
+    """The driver reads nothing for 0.1 s, because the computer is busy. Its timers still run.
 
-    The refusal names the computer, and not the front board.
+    The refusal of a command names the computer, and not the front board.
     """
     bench = nominal()
     bench.run(0.1)

@@ -43,7 +43,8 @@ def test_every_angle_is_told_within_half_a_degree() -> None:
 def test_no_two_lost_characters_of_an_angle_make_another_angle_or_it_is_known_which() -> None:
     """Two characters of an angle's text are lost. Usually the checksum detects this.
 
-    Only an angle to the right with a digit 6 can change, into one of 0° to 10° to the left.
+    Only an angle to the right with a digit 6 can change undetected. The board then reads an angle
+    of 0° to 10° to the left.
     """
     across = 0
     for angle_deg in EVERY:

@@ -58,7 +58,7 @@ def test_a_wheel_that_is_called_back_half_way_has_its_time_again() -> None:
 def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_time() -> None:
     """A wheel is blocked, and its commanded angle alternates between 0.9 and 1.5 rad.
 
-    The wheel is reported as soon as with a constant command.
+    The fault is reported, although the commanded angle changes before the time limit.
     """
     follower = Follower()
     seen = 0
@@ -71,7 +71,8 @@ def test_a_blocked_wheel_is_noticed_although_its_angle_is_commanded_anew_each_ti
 def test_motion_is_refused_until_the_wheel_has_moved() -> None:
     """The wheel is blocked, and motion is refused until the wheel has moved.
 
-    Otherwise each new command would move the robot for 1 s.
+    Without the refusal, each new command would move the robot for 1 s, until the driver has noticed
+    the fault again.
     """
     follower = Follower()
     at = blocked(follower, 0.0)

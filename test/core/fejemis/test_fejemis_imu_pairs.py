@@ -43,7 +43,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: whether lines other than gyro and acceleration come with odd sample numbers, not even.
+    ``odd``: whether the other lines come with the odd sample numbers. If False, they come with the
+    even ones.
     """
 
     order: str
@@ -265,7 +266,8 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
 
-    The only exception: the lines are late, and no pose follows in the same read.
+    A pair with lines of two samples is found only if its lines are late, and no pose follows in the
+    same read. Nothing in the stream shows such an error.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

@@ -272,9 +272,10 @@ def test_a_line_that_lost_a_decimal_is_not_believed_even_without_a_sum() -> None
 
 
 def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
-    """A board's lines change to another number of decimals. Only the first two are discarded.
+    """Lines of one kind begin to arrive with fewer decimals than before.
 
-    If the decimals of a kind of line vary often, each number of decimals is accepted.
+    The first two are discarded as damaged. From the third on, they are accepted. If the decimals of
+    a kind of line vary all the time, lines of this kind are accepted with any number of decimals.
     """
     decoder = FejemisDecoder("off")
     feed(decoder, b"gyro 1.00 2.00 3.00\n")

@@ -221,7 +221,10 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
 
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
-    """The computer stalls. The next heartbeat shows that the boards have not restarted."""
+    """The computer stalls, so the boards may have restarted unnoticed.
+
+    Within 0.25 s, a heartbeat shows that they have not, and the robot is driven again.
+    """
     bench = nominal()
     bench.run(2.0)
     read_s, bench.read_s = bench.read_s, stall_s

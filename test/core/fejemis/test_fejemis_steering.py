@@ -142,9 +142,10 @@ COMMANDS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
-    """The robot is commanded for 2.5 s. Its speed is then right within 1.2 %.
+    """The robot is commanded for 2.5 s. Its speed and its turn rate are then as commanded.
 
-    Its turn rate is right within 3 %. Both refer to the speed of the outer wheel.
+    The tolerances are 1.2 % and 3 % of the outer wheel's speed (for the turn rate, this speed is
+    divided by the track width).
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)

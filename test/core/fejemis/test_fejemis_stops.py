@@ -24,7 +24,7 @@ def without_relays(lines: list[str]) -> list[str]:
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
     """An e-stop is latched on both boards. At its release, only the drive board gets ``start``.
 
-    A Stop precedes ``start``, because some firmware then resumes the old motion command.
+    A Stop precedes ``start``, because some firmware resumes the old motion command after ``start``.
     """
     bench = nominal(Simulated(firmware=Firmware(start_resumes=resumes)))
     bench.drive_on()
@@ -270,7 +270,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
 
 
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
-    """The guard's lines stop wheels, brush and lift, whether the e-stop is latched or not.
+    """The watchdog process sends lines that stop wheels, brush and lift, with or without an e-stop.
 
     The lines that the driver sends at its exit stop them too.
     """
@@ -315,7 +315,10 @@ def test_a_start_that_is_still_repeated_ends_with_the_next_stop(again: str) -> N
 
 
 def test_a_brush_that_the_guard_switched_off_does_not_come_back() -> None:
-    """The driver stalls, and the guard switches the brush off. ``brush 1`` is then not repeated."""
+    """The driver stalls, and its watchdog process switches the brush off.
+
+    After the stall, the driver does not repeat ``brush 1``.
+    """
     bench = nominal()
     bench.board.services.set_brush(True, bench.now)
     bench.settle()

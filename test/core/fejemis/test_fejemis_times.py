@@ -113,8 +113,8 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
     """The first line waited for the host. Then every read brings two lines, sent 20 ms apart.
 
-    Compared with the first line, the newer line of each read seems early. The clock rejects at most
-    three times, and is then right.
+    Compared with the first line, the newer line of each read seems to arrive early. The clock
+    rejects the board times of at most three lines, and is right afterwards.
     """
     clock = TeensyClock()
     clock.see(100.0, 5.0 + waited_s)
@@ -128,7 +128,7 @@ def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
 
 
 def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
-    """Every third time is damaged in the same digit, so that the damaged times agree.
+    """Every third board time is damaged in the same digit, so the damaged times fit each other.
 
     The correct times between them are smaller, which shows the damage. The clock stays right.
     """
