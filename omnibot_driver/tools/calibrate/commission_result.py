@@ -103,10 +103,9 @@ def _remarks(found: Found) -> list[str]:
         )
     if found.axis_signs is not None and mirrored(found.axis_signs):
         remarks.append(
-            "The signs of the axes describe a mirror image of the robot. You do not get such signs"
-            " by regarding another side of the robot as its front, so check your answers. If your"
-            " answers are right, use the signs for velocities only: with these signs, the driver"
-            " refuses cmd_pose."
+            "The signs of the axes describe a mirror image of the robot. A wrong choice of the"
+            " robot's front cannot cause this, so check your answers. If your answers are right,"
+            " use the signs for velocities only: with these signs, the driver refuses cmd_pose."
         )
     if found.delta_frame not in (None, found.before["delta_frame"]):
         remarks.append(

@@ -75,9 +75,9 @@ def wheel_sign(wheel: int, seen: Pattern) -> int:
     if turned != [wheel]:
         raise Contradiction(
             f"wheel {name} was commanded, but wheel {WHEELS[turned[0]]} was seen to turn. According"
-            " to the manual, A is front right, B front left, C at the back. Perhaps another side of"
-            " the robot is the front: look again from there. No parameter corrects the order of the"
-            " wheels"
+            " to the manual, A is front right, B front left, C at the back. Perhaps you take the"
+            " wrong side of the robot for its front. If not, the wheels are in the wrong order,"
+            " which no parameter corrects"
         )
     return seen[wheel]
 
@@ -101,8 +101,8 @@ def axis_sign(axis: int, seen: Pattern) -> int:
 def mirrored(signs: Sequence[int]) -> bool:
     """Return whether these signs of the axes describe a mirror image of the robot.
 
-    They do unless sign(x) sign(y) = sign(yaw). Signs that are not mirrored can come from another
-    choice of the robot's front.
+    They do if sign(x) sign(y) differs from sign(yaw). Choosing another side of the robot as its
+    front does not mirror the signs.
     """
     x, y, yaw = signs
     return x * y != yaw
