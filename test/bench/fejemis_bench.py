@@ -132,7 +132,10 @@ def relayed_ms(seconds: float, busy: int) -> list[float]:
 
 
 def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
-    """Return an empty list, because nothing is compared with a floor, and the rows of a table."""
+    """Measure the delays; return an empty list, and the rows of a table.
+
+    The list would have comparisons with the floor: the smallest program with the same output.
+    """
     rows = [
         "How long the angle of the front wheel takes from one board to the other, in ms:",
         "",

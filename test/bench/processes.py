@@ -83,12 +83,12 @@ def driver(path: str, namespace: str, before: str = "", **environment: str) -> P
 
 
 def floor(what: str, path: str, namespace: str) -> Program:
-    """Start ``floor.py`` on this port with the task ``what``."""
+    """Start the smallest program with the driver's output (``floor.py``) for the task ``what``."""
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 
 def step(what: str, path: str, namespace: str) -> Program:
-    """Start ``steps.py`` on this port, with ``what`` as its last step."""
+    """Start a relay that has the driver's tasks up to the task ``what`` (``steps.py``)."""
     return Program(str(HERE / "steps.py"), what, path, namespace)
 
 

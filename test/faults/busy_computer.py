@@ -22,13 +22,14 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""Pause of the simulated board, in s, from which on the driver may warn about the cable."""
+"""Shortest pause of the simulated board, in s, for which the driver may warn about the cable."""
 TRANSIT: Final = 200
-"""Number of frames that are possibly still on their way when the comparison of messages begins."""
+"""Largest number of frames on their way to the driver when the comparison of messages begins."""
 REACH: Final = 200
-"""Number of frames, after that of the previous message, among which a message's frame is searched.
+"""Number of sent frames with which a published message is compared.
 
-If none of these frames is equal to the message, the message is wrong.
+They are the next frames after the one that matched the previous message. If none of them is equal
+to the message, the message is wrong.
 """
 
 
@@ -82,8 +83,8 @@ def busy_loops() -> Iterator[None]:
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
     """Return how many messages were never sent, and how many sent frames have no message.
 
-    The first message often equals several frames. The comparison begins at each of these frames,
-    and the result with the fewest errors is returned.
+    Messages and frames are compared in order. Several frames may equal the first message, so the
+    comparison is made from each of them. The result with the fewest errors is returned.
     """
     starts = [n for n, key in enumerate(sent) if same(published[0], key)]
     return min((_compared(published, sent[n:]) for n in starts), default=(len(published), 0))

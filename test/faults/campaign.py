@@ -117,7 +117,7 @@ class Campaign(Outcome):
         return kind(Path(tempfile.mkdtemp(dir=self._folder.name)), self._kind, before=before)
 
     def run(self, row: Row, case: Case[Any], rig: Rig, *, again: bool = True) -> None:
-        """Run a case once. Add its result to ``row``, and collect its complaints.
+        """Run a case once. Add its result to ``row``, and collect what went wrong.
 
         ``again``: whether the robot must obey a fresh command afterwards.
         """
@@ -160,7 +160,7 @@ class Campaign(Outcome):
         self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
 
     def ending(self, name: str) -> None:
-        """Run the ending with this name in every round. Each round has a new driver."""
+        """Test one way in which a driver can end, in every round. Each round has a new driver."""
         ending = ENDINGS[name]
         self._ends(f"the driver ends: {name}", ending, before=ending.before)
 
@@ -200,9 +200,9 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Test stops on a line that loses bytes to the board, until the last stop has been judged.
+        """Test stops on a line that loses bytes to the board. The loss lasts until the last stop.
 
-        ``number_of_life``: index of the group of stops that each driver performs.
+        ``number_of_life``: index of the group of stops (``LIVES``) that each driver performs.
 
         ``numbers``: one number for each driver, which selects the lost bytes.
         """

@@ -70,7 +70,7 @@ def _befall(rig: Rig, half: str, what: str) -> None:
 def half_restarts(half: str) -> Any:
     """Make a case in which one Teensy (``half``) restarts.
 
-    The commander leaves before the restart, because a restarted Teensy obeys at once.
+    The commands end before the restart, because a restarted Teensy would obey them at once.
     """
 
     def case(rig: Rig) -> None:

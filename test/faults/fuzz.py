@@ -19,7 +19,7 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""Least share of the readings that the driver must publish during random input and in 2 s after."""
+"""Least share of the readings that the driver must publish, during random input and 2 s longer."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 

@@ -189,7 +189,10 @@ def estop_through_a_restart(rig: Rig) -> None:
 
 
 def another_client(said: bytes, rig: Rig) -> None:
-    """Let another client start a motion with the datagram ``said`` while the robot is at rest."""
+    """Let another client start a motion with the datagram ``said``. The driver must end the motion.
+
+    The robot is at rest before.
+    """
     rig.wait_ticks(350)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
         port = int(rig.port.rpartition(":")[2])

@@ -46,9 +46,9 @@ ENDS_WITHIN_S: Final = 2.0
 
 @dataclass(slots=True)
 class Findings:
-    """Complaints about a driver or its robot, and measured numbers.
+    """Results of the checks of a driver and its robot: failed checks, and counts of messages.
 
-    If all is well, the list of complaints is empty.
+    ``complaints``: a text for each failed check.
     """
 
     complaints: list[str] = field(default_factory=list)

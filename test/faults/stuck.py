@@ -16,11 +16,13 @@ LOST: Final = "lost .*retrying"
 
 
 def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
-    """Drive while the adapter holds back the driver's data. Later, all data arrives at once.
+    """Let the adapter hold back the driver's data, and then deliver all of it at once.
 
-    ``seconds``: time with commands. Then the commands stop, and the data is held for 1 s more.
+    The robot must be at rest after the delivery.
 
-    ``mute``: whether the board's data is cut meanwhile.
+    ``seconds``: time for which commands continue. The adapter holds the data for 1 s longer.
+
+    ``mute``: whether the board's data is cut while the adapter holds the driver's data.
     """
     rig.drive()
     rig.terminal.deaf = True
@@ -36,7 +38,7 @@ def stuck(seconds: float, rig: Rig, *, mute: bool = False) -> None:
 def full(rig: Rig, *, mute: bool = False) -> None:
     """Fill the port with old commands. When the port accepts data again, the robot must stop.
 
-    ``mute``: whether the board's data is cut meanwhile.
+    ``mute``: whether the board's data is cut while the port is full.
     """
     rig.drive()
     mark = len(rig.driver.lines)
@@ -51,7 +53,7 @@ def full(rig: Rig, *, mute: bool = False) -> None:
 
 
 def full_for_long(rig: Rig) -> None:
-    """Keep the port full for long. The driver opens the port repeatedly but reports this once.
+    """Keep the port full while the driver opens it repeatedly. The driver must report this once.
 
     When the port accepts data again, the robot must stop.
     """
@@ -132,7 +134,10 @@ def server_closes_one_direction(rig: NetworkRig) -> None:
 
 
 def server_dies(rig: NetworkRig) -> None:
-    """Close the server for a while, so that it refuses connections."""
+    """Close the server for a while, so that it refuses connections.
+
+    The robot must be at rest when the driver has connected again.
+    """
     rig.drive()
     mark = len(rig.driver.lines)
     rig.unplug()
@@ -144,9 +149,9 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """Cut the network without closing the connection.
+    """Cut the network without closing the connection. Later, restore it with a restarted server.
 
-    The server then comes back without connections.
+    The robot must be at rest when the driver has connected again.
     """
     rig.drive()
     before = len(rig.server.accepted_at)

@@ -28,7 +28,7 @@ def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> N
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_a_random_walk_calls_only_services_that_the_board_has(board: str) -> None:
-    """A random walk has faults for every board. Of the services, it calls those of the board."""
+    """A random walk has faults for every board. It calls only services that the board has."""
     kind = load(board)
     steps = steps_of(kind)
     assert {CALLS[name] for name in steps if name in CALLS} == kind.services & {*CALLS.values()}

@@ -20,8 +20,8 @@ TRIES: Final = 15
 STANDS_AGAIN_S: Final = 1.0
 """Longest time in s from the end of the commands until the robot must be at rest.
 
-The time is longer than the command timeout, because a driver that had no data must first detect
-the motion.
+The time is longer than the command timeout, because a driver that has received no data must first
+detect that the robot moves.
 """
 
 
@@ -134,6 +134,6 @@ CALLS: Final = {
 
 
 def steps_of(kind: RigBoard) -> dict[str, Callable[[Rig, Random], None]]:
-    """Return the faults of this board's line, and the calls that it offers."""
+    """Return the faults of this board's line, and the service calls that its driver offers."""
     calls = {name: _call(call) for name, call in CALLS.items() if call in kind.services}
     return {**(STEPS if kind.steps is None else kind.steps), **calls}

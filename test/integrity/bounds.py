@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The limits of the integrity report, and the streams whose results are compared with them."""
+"""The limits of the integrity report, and the streams whose results are compared with them.
+
+A *chunking* is a way in which the computer reads a stream in pieces. The *plain* parser decodes
+without checks, for comparison with the driver's parser.
+"""
 
 from dataclasses import dataclass
 from random import Random
@@ -19,11 +23,13 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 class Bound:
     """The limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``: N of "one decoded frame in N may be wrong". None means no frame.
+    ``one_wrong_in_visible``: N of "one decoded frame in N may be wrong". None means no frame. This
+    limit is for chunkings that show the line's idle gaps to the parser.
 
-    ``one_wrong_in_hidden``: the same, if the chunking hides the line's idle gaps.
+    ``one_wrong_in_hidden``: the same for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of intact frames. 1.0 means all after the first two.
+    ``delivered``: least share of the intact frames that must be decoded. 1.0 means all after the
+    first two.
     """
 
     one_wrong_in_visible: int | None
@@ -82,13 +88,13 @@ Scores = dict[tuple[str, str, str], Score]
 """The scores. A key is the names of fault, chunking and scenario."""
 
 PLAIN_CHUNKING = "whole bursts"
-"""The chunking for the plain parser, whose result is the same with every chunking."""
+"""The only chunking for the plain parser. With any other, this parser's result is the same."""
 
 
 def chunkings(fault: str) -> dict[str, Chunker]:
     """Return the chunkings that are tested with a fault.
 
-    Late readers are tested with a few faults only.
+    Chunkings in which the reading process is late are tested with only some of the faults.
     """
     return CHUNKINGS if fault in BUSY_FAULTS else CHUNKERS
 
@@ -96,7 +102,8 @@ def chunkings(fault: str) -> dict[str, Chunker]:
 def run(scenario: str, seed: int, seconds: float, parser: str) -> Scores:
     """Return a parser's scores on one stream with every fault.
 
-    The driver's parser gets every chunking. The plain parser gets only ``PLAIN_CHUNKING``.
+    The driver's parser gets every chunking. The plain parser gets only one, because its result does
+    not depend on the chunking.
     """
     truth = generate(SCENARIOS[scenario], seed, seconds)
     scores: Scores = {}

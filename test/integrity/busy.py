@@ -2,7 +2,9 @@
 
 """A busy computer: the line is undamaged, but the reading process runs late.
 
-A chunker turns the pieces of an adapter into reads: the end and the time of each, in s.
+An adapter delivers bytes in *pieces*. A late reader may get several pieces in one read, or only a
+part of a piece. A *chunker* is a function that returns the reads: for each read, the index after
+its last byte, and the time in s.
 """
 
 from bisect import bisect_right
@@ -36,7 +38,7 @@ SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""Range of the number of bytes after which another kind of pieces is drawn."""
+"""Range of the number of bytes after which another kind of pieces, such as single bytes, begins."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:
@@ -108,7 +110,10 @@ def few_bytes_straddling(received: Received, random: Random) -> Chunks:
 
 
 def all_at_once(pieces: Chunker) -> Chunker:
-    """Return a chunker in which a late reader reads everything that has arrived in ``pieces``."""
+    """Return a chunker of late reads. Each read gets all bytes that have arrived.
+
+    ``pieces``: how the adapter delivers the bytes.
+    """
     return lambda received, random: read(pieces(received, random), random, lambda: 1 << 30)
 
 

@@ -13,12 +13,13 @@ from truth import Key
 Feed = Callable[[bytes, float], list[Key]]
 
 MOST_DROPPED = 30
-"""Largest number of intact frames that a match of a decoded frame may skip without proof.
+"""Largest number of intact frames that may be skipped to find the true frame of a decoded frame.
 
-Beyond it, the next decoded frame must match, too. A false frame may equal a much later true frame.
+If more are skipped, the decoded frame is right only if the next decoded frame matches, too. This
+excludes false frames that happen to equal a much later true frame.
 """
 REACH_BYTES = 600
-"""The search for a decoded frame begins this number of bytes before the current read."""
+"""The search for the true frame of a decoded one begins this number of bytes before the read."""
 
 
 @dataclass(slots=True)

@@ -2,6 +2,9 @@
 
 """The outbound report: ``make integrity`` writes it into docs/internals/integrity.md.
 
+In each simulated trial, a damaged line carries the driver's bytes, and a receiver on the board
+interprets them. The report counts the receiver's errors.
+
 ``--share``: run only this share of the trials, and write nothing. ``--examples``: show bytes that
 led to errors. The exit code is 1 when a receiver misses a bound.
 """
@@ -31,11 +34,13 @@ BEGIN, END = "<!-- outbound: begin -->", "<!-- outbound: end -->"
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """Limits of the errors. Stray motion and false letters are never allowed.
+    """Limits of the errors that ``outbound_judge`` defines.
+
+    Stray motion and false letters are never allowed.
 
     ``share``: largest share of the driving time with an uncommanded set-point.
 
-    ``long_in``: least number of control frames for each uncommanded set-point of over 2 ms.
+    ``long_in``: N of "at most one uncommanded set-point of over 2 ms in N control frames".
 
     ``overdue``: whether a robot that still drives is an error.
     """

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the driver writes in a scene.
+"""What the driver writes in a scene, which is a script of commands and requests.
 
-The writes depend only on the states that the board shows. A ``Course`` has the writes for one
-sequence of states. All trials of a scene share its courses.
+The writes depend only on the states that the board reports. A ``Course`` has the writes for one
+sequence of states. It is computed once, and used in all trials of the scene with these states.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ from omnibot_driver.simulator.omnibot.wire import BYTE_S, ControlFrame
 class Understood:
     """What a receiver understands of the writes of a course if no byte is damaged.
 
-    ``held``: the bytes that the receiver holds after each write.
+    ``held``: for each write, the bytes that the receiver still holds after the write.
 
-    ``alike_until``: for each write, the index of the next write that differs. A write differs if it
-    begins or ends a motion, or if the receiver misunderstands it.
+    ``alike_until``: for each write, the index of the next write that begins or ends a motion, or
+    that the receiver misunderstands.
     """
 
     held: list[bytes]
@@ -62,7 +62,7 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """Number of runs of the session for this course and for all courses that continue it."""
+        """Number of runs of the session for this course and all courses that branch off from it."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

@@ -68,7 +68,7 @@ class Score:
 
 
 class Judge:
-    """Follows every write, and everything that the board understands, in the order of time.
+    """The judge of one trial. It gets each write, and what the board understands, in time order.
 
     ``driving``: whether the driver drives.
     """
@@ -123,7 +123,7 @@ class Judge:
     def frame(self, frame: ControlFrame, at_s: float) -> str:
         """Record a control frame that the board understands.
 
-        Return the name of the error that this frame is, or "".
+        Return the name of the error if this frame is one, else "".
         """
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)

@@ -24,8 +24,8 @@ SCRIPTS: Final = 6
 NEEDED: Final = 10_000
 """Least number of trials for each receiver and each rate of lost bytes.
 
-The trials are shared among all scenes that end a drive. With 1 byte in 100 lost, each scene in
-``HURRIES`` has this number of trials.
+The trials are divided among all scenes that end a drive. With 1 byte in 100 lost, each of the three
+scenes in ``HURRIES`` has this number of trials by itself.
 """
 HURRIES: Final = ("timeout", "e-stop", "exit")
 AT_HURRIES: Final = "1 byte in 100 lost"
@@ -50,7 +50,7 @@ Scores = dict[tuple[str, str, str], Score]
 def boards(scene: str, receiver: str) -> Iterator[tuple[str, BoardKind]]:
     """Yield the kinds of board on which a scene runs, all with this receiver.
 
-    Each item is a name and the kind of board. The scores are added under the name.
+    Each item is a name and a kind of board. The scores of kinds with the same name are added.
     """
     framing, letters = RECEIVERS[receiver]
     for obeys in (True, False) if scene in ESTOPS else (True,):

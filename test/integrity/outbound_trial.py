@@ -34,9 +34,9 @@ Made = tuple[bytes, list[tuple[int, ControlFrame]]] | None
 Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
-The key is the bytes that the receiver held, whether a pause preceded the new bytes, and the new
-bytes. The value is the bytes that it then holds, and each found frame with the position of its last
-byte. The value is None if the bytes contain a letter.
+A key has the bytes that the receiver held before, whether a pause preceded the new bytes, and the
+new bytes. A value has the bytes that the receiver holds afterwards, and each frame found with the
+position of its last byte. The value is None if the bytes contain a letter.
 """
 
 
@@ -75,7 +75,8 @@ class Example:
 class Trial:
     """A trial of a scene on one kind of board.
 
-    Each call of ``run`` begins at the time from which the line has faults.
+    The constructor plays the scene up to the time from which the line has faults. Each call of
+    ``run`` continues from there.
 
     ``memo``: cached results, which trials with the same kind of receiver may share.
     """

@@ -197,9 +197,9 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """The sum over all endings omits the scenes that only drive.
+    """The scores of all scenes are added. Scenes that only drive are omitted from the sum.
 
-    A scene that drives has its own sum.
+    If a scene is named, only its scores are added, even if the scene only drives.
     """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),

@@ -190,7 +190,7 @@ def result(**parameters: object) -> Result:
 
 
 def test_what_is_written_is_what_the_driver_loads(tmp_path: Path) -> None:
-    """The driver loads the values that a calibration saves. Other entries of the file stay."""
+    """The driver loads the values that a calibration saves. Other entries of the file are kept."""
     path = tmp_path / "robot.yaml"
     path.write_text("name: number 7\ngyro_bias: [0.0, 0.0, 0.1]\nlinear_scale: 71.0\n")
     save(result(linear_scale=80.5, axis_signs=[1, -1, 1]), path, PARAMETERS)

@@ -141,7 +141,7 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
 def test_a_robot_that_does_not_move_is_told_so(robot: Robot, rigged: Rig) -> None:
     """The robot is commanded, but does not move. The tool reports this.
 
-    With a scale of one count per m/s, every command is rounded to zero.
+    The test sets a scale of one count per m/s, so that every command is rounded to zero.
     """
     robot.set_parameters({"linear_scale": 1.0})
     with pytest.raises(ToolError, match="does not move when commanded"):

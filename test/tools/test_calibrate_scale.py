@@ -133,7 +133,7 @@ def test_planted_scales_are_found_and_applied(
 ) -> None:
     """``calibrate scale`` finds the board's unusual scales, and ``--apply`` sets them.
 
-    The driver accepts only commands with timestamps.
+    The driver of this test accepts only TwistStamped as velocity commands.
     """
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:

@@ -19,7 +19,7 @@ PARTS: Final = ("board", "wheels", "imu")
 
 
 GAINS: Final = "left_kp"
-"""Name of a parameter that only boards with recorded encoder ticks and settable gains have."""
+"""A parameter that a driver has only if its board records encoder ticks and accepts gains."""
 NEEDS: Final = {
     "commission": (("delta_frame",), "the OmniBot's wheels and odometry"),
     "imu": (("gyro_bias",), "an IMU"),
@@ -33,10 +33,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand, parameters of the driver and a text.
+"""For each subcommand, some parameters of the driver, and what a board lacks without them.
 
 The subcommand needs at least one of these parameters. If the driver has none, the error message
-contains the text, which names what the board lacks.
+names what the board lacks.
 """
 
 

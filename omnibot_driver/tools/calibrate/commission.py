@@ -219,9 +219,10 @@ class Walk:
         return sign
 
     def _show(self, what: str, command: Vector3, topic: str) -> Pattern:
-        """Run a motion that the user watches; return the wheels' directions in the user's answer.
+        """Run a motion, and ask in which direction each wheel turned; return the answer.
 
-        The user may request the motion again.
+        The answer has 1, -1 or 0 for wheels A, B and C: counter-clockwise, clockwise, still. The
+        user can first request the motion again.
         """
         while True:
             self._console.say(f"\n{what}:")
@@ -300,8 +301,9 @@ class Walk:
 
 
 def _understand(answer: str) -> tuple[int, ...] | None:
-    """Return the directions of the wheels in the user's answer; None if the answer is not valid.
+    """Convert the user's answer, such as ``+0-``, to a direction (1, -1 or 0) for each wheel.
 
-    An empty tuple means that the user typed ``r``, to see the motion again.
+    Return an empty tuple if the user typed ``r`` to see the motion again, and None if the answer is
+    not valid.
     """
     return () if answer == "r" else understand(answer)

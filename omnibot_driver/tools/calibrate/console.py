@@ -88,9 +88,9 @@ class Console:
 
     @contextmanager
     def progress(self, what: str) -> Iterator[Callable[[float], None]]:
-        """Show the progress of the task ``what`` within a ``with`` block.
+        """Show the progress of the task ``what`` until the end of the ``with`` block.
 
-        The block gets a function. It calls the function with the completed fraction, 0 to 1.
+        The ``with`` statement gives a function that sets the completed fraction, 0 to 1.
         """
         if not self.rich.is_terminal:
             self.say(f"{what} ...")

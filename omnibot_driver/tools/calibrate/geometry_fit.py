@@ -20,7 +20,7 @@ from omnibot_driver.tools.calibrate.log import Column
 from omnibot_driver.tools.needs import ToolError
 
 WHEELS_ALIKE: Final = 0.01
-"""Relative standard deviation of the wheels' radii, which comes from manufacturing tolerances."""
+"""Assumed relative standard deviation of the wheels' radii, due to manufacturing tolerances."""
 UNKNOWN: Final = 0.2
 """Largest accepted relative error of an assumed radius.
 
@@ -116,9 +116,11 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
 
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
-    """Return the poses that the same wheel rotations give with other radii, (n, 3).
+    """Return the poses that a path has if the radii differ from the assumed ones, (n, 3).
 
-    ``path``: poses that were computed with the assumed radii. The result begins at the origin.
+    The wheel rotations are the same. The result begins at the origin.
+
+    ``path``: poses that were computed with the assumed radii.
 
     ``factors``: new radius / assumed radius of each wheel, (3,), or for each step, (n - 1, 3).
 

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 AXES: Final = "xyz"
 COLOURS: Final = ("tab:red", "tab:green", "tab:blue")
 DRAWN: Final = 1000
-"""Largest number of drawn readings. More readings would enlarge the file without a visible
-effect."""
+"""Largest number of readings in a plot. More would enlarge the file without a visible effect."""
 GRAVITY_SIGMA: Final = 0.01
 """Standard deviation of the user's value for the local gravity, in m/s²."""
 

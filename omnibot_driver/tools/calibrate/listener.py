@@ -145,7 +145,8 @@ class Listener(Client):
     def _lost(self) -> list[str]:
         """Return the required topics without recent data.
 
-        Pending messages are read first, because this program may have been too slow to read them.
+        If a topic seems silent, pending messages are read and the topics are checked again, because
+        this program may have been too slow to read the messages.
         """
         wanted = (IMU,) if self._states[-1] == "imu_only" else self._topics
         if silent(self._heard_s, wanted, time.monotonic()):

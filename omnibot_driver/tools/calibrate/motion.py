@@ -124,7 +124,10 @@ class Obedience:
         self._told, self._done = [0.0, 0.0], [0.0, 0.0]
 
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
-        """Note the motion; raise ToolError if commands lasted for some time without motion.
+        """Add the commanded and the measured motion since the last call, and compare the sums.
+
+        The sums cover 1 s or 3 s. Raises ToolError if the robot moved by less than a fifth of the
+        commanded motion.
 
         ``seconds``: time since the last call. ``measured``: in the units of ``command``.
         """

@@ -31,12 +31,13 @@ LINES: Final = 2
 With two drives the tool notices a single wrong reading, because the results of the drives differ.
 """
 UNLIKE: Final = 4.0
-"""The tool reports a difference of two ratios of more than this number of standard deviations."""
+"""The tool warns if two ratios differ by more than this number of standard deviations."""
 NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s.
 
-If the first one grows, the second one must be reduced in proportion.
+The tool finds the first one. It divides the second one by the same factor by which the first one
+grows.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.

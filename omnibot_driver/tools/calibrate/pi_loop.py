@@ -21,9 +21,9 @@ NOMINAL_S: Final = 0.2
 """Control period of the manual, in s. The board computes its coefficients for this period."""
 STALE_S: Final = 0.5
 SENDS_S: Final = 9 * 14 * 10 / 115200
-"""Time, in s, that the public firmware needs to send its ticks and its odometry.
+"""Time, in s, that the public firmware needs to send its tick counts and its odometry.
 
-Ticks and odometry together are nine lines of 14 characters.
+Together, these messages are nine lines of 14 characters.
 """
 MOST_PERCENT: Final = 100.0
 PHASE_POINTS: Final = 600
@@ -55,7 +55,7 @@ class Loop:
 
     ``low_pass``: coefficient of the low-pass filter of the set-point. 1: no filter.
 
-    ``sends_each_s``: period with which the board sends ticks.
+    ``sends_each_s``: period with which the board sends its tick counts.
     """
 
     period_s: float
@@ -89,14 +89,15 @@ def answer(
 ) -> Array:
     """Return the speed of a wheel, in RPM, after a step of the set-point from standstill.
 
-    The first dimension is time, in steps of 1 ms. The further dimensions are the common shape of
-    the gains and the last three arguments.
+    The first dimension is time, in steps of 1 ms. The other dimensions are the common shape to
+    which the gains, ``dead_s``, ``begun`` and ``sent_s`` are broadcast.
 
     ``dead_s``: dead times that replace the dead time of ``loop``.
 
-    ``begun``: initial position of the wheel between two marks, 0 to 1.
+    ``begun``: initial position of the wheel between two ticks of the encoder, 0 to 1.
 
-    ``sent_s``: time at which the board first sends ticks. None: it sends none.
+    ``sent_s``: time at which the board first sends its tick counts. While it sends, it notices
+    encoder ticks late. None: it sends nothing.
     """
     late, calm = loop.dead_s if dead_s is None else dead_s, sent_s is None
     every = np.broadcast_arrays(

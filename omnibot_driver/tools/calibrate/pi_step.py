@@ -3,8 +3,8 @@
 """``calibrate step`` for a board that records encoder ticks and accepts gains.
 
 1. Record steps with the present gains.
-2. Find the encoders' corrections at a constant duty.
-3. Fit each plant to starts at full duty.
+2. At a constant duty, find how unequal the two levels of each encoder's signal are.
+3. Fit each plant (motor with wheel) to starts at full duty.
 4. In several rounds, compute gains, record steps, and fit the dead time for the next round.
 """
 
@@ -43,9 +43,9 @@ The board does not acknowledge settings. The driver therefore sends each setting
 """
 
 QUIET_S: Final = 0.5
-"""Period, in s, with which the board sends ticks during a record.
+"""Period, in s, with which the board sends its tick counts during a record.
 
-The period is long, because the board misses ticks of the wheel while it sends.
+The period is long, because the board can miss encoder ticks while it sends.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
@@ -102,7 +102,7 @@ class _Bench:
         self.robot.rest(WRITTEN_WITHIN_S)
 
     def record(self, topic: str, command: Sequence[float], count: int = 1) -> Records:
-        """Record ``count`` starts from standstill; return the times between ticks, in s."""
+        """Record ``count`` starts from standstill; return the times between ticks of each start."""
         found: Records = {side: [] for side in SIDES}
         for _ in range(count):
             for side, column in read(self.robot.record("record_rpm", topic, command)).items():
@@ -114,7 +114,7 @@ class _Bench:
     def steps(self, rpm: Sequence[float]) -> Records:
         """Record several steps of the set-point from rest to the wheel speeds ``rpm``.
 
-        Return the times between ticks, in s.
+        Return the times between ticks of each step.
         """
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)
@@ -172,9 +172,10 @@ def _with_set_point(loop: Loop, parameters: Mapping[str, Any], side: str) -> Loo
 
 
 def _encoders(bench: _Bench) -> dict[str, Levels]:
-    """Measure and set the corrections that make both levels of each encoder equally long.
+    """Measure and set the corrections of the encoders, by wheel.
 
-    During the measurement all corrections are 1, because the board records corrected times.
+    An encoder's signal has two levels of unequal duration. The corrections are factors that make
+    the recorded durations equal. During the measurement, all factors are 1.
     """
     ones = dict.fromkeys(_names("short_correction", "long_correction"), 1.0)
     bench.set({"drive_mode": "duty", **ones})

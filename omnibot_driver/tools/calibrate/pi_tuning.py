@@ -2,7 +2,7 @@
 
 """Find gains of a band-limited PI controller that suit a plant.
 
-This module also fits the plant's dead time to recorded steps with such gains.
+This module also finds the dead time of the plant that explains recorded steps best.
 """
 
 from collections.abc import Sequence
@@ -31,19 +31,19 @@ ROUNDS: Final = 2
 DEAD_S: Final = np.arange(0.0, 0.101, 0.005)
 FIRST_BEGUN: Final = np.arange(0.05, 1.0, 0.1)
 BEGUN: Final = np.array([0.0, 0.4, 0.8])
-"""Starting positions of a simulated wheel between two marks, as fractions of their distance.
+"""Starting positions of a simulated wheel between two encoder ticks, as fractions of a tick.
 
 The starting position decides in which control period a tick arrives.
 """
 SENT: Final = np.arange(0.0, 1.0, 0.125)
-"""Times at which the board first sends ticks, as fractions of its sending period.
+"""Simulated times at which the board first sends tick counts, as fractions of the sending period.
 
-While the board sends, it notices ticks late.
+While the board sends, it notices encoder ticks late.
 """
 DISTURBED: Final = 0.02
-"""Additional overshoot that is allowed if the board sends ticks during a step.
+"""Additional overshoot that is allowed if the board sends its tick counts during a step.
 
-It is a fraction of the speed, which is added to the user's limit.
+It is a fraction of the speed, and is added to the user's limit.
 """
 OVER_S: Final = 1.5
 LEAST_DEAD_S: Final = 0.02
@@ -154,7 +154,7 @@ def _foreseen(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Traits:
 
 
 def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
-    """Return the largest overshoot of a step if the board sends its ticks during the step."""
+    """Return the largest overshoot of a step if the board sends tick counts during the step."""
     target = target_of(plant, goals)
     begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
@@ -172,14 +172,14 @@ Steps = tuple[PiGains, float, Sequence[Column]]
 def dead_time_s(wheels: Sequence[tuple[Plant, Loop, Sequence[Steps]]]) -> float:
     """Return the dead time, in s, with which the model explains the steps of all wheels best.
 
-    The result is at least 0.02 s. Gains that are tuned for too short a dead time overshoot.
+    The result is at least 0.02 s, because gains that are tuned for too short a dead time overshoot.
     """
     costs = sum((_costs(*wheel) for wheel in wheels), np.zeros(len(DEAD_S)))
     return max(float(DEAD_S[int(np.argmin(costs))]), LEAST_DEAD_S)
 
 
 def _costs(plant: Plant, loop: Loop, made: Sequence[Steps]) -> Array:
-    """Return the misfit of the model to the recorded steps, for each dead time in ``DEAD_S``."""
+    """Return the misfit of the model to the recorded steps, for each candidate of the dead time."""
     costs = np.zeros(len(DEAD_S))
     for gains, target_rpm, records in made:
         shown = [response(record, loop.ticks_per_revolution) for record in records]

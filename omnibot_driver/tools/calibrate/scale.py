@@ -26,7 +26,7 @@ ACCELERATION: Final = 1.0
 GYRO_TOLERANCE: Final = 0.03
 """Relative tolerance of the gyro's scale: MPU-6050 product specification, section 6.1."""
 UNLIKE: Final = 4.0
-"""The tool reports a difference of two scales of more than this number of standard deviations."""
+"""The tool warns if two scales differ by more than this number of standard deviations."""
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:

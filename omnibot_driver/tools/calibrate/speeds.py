@@ -24,7 +24,8 @@ After 1 s, the speed still differs by 0.1 %, because the board's integrator has 
 REPEATED_WITHIN_S: Final = 0.2
 FEWEST: Final = 5
 LEAST_SIGMA: Final = 1e-4
-"""Least assumed standard deviation of a pose in m and rad, and of a speed over 1 s."""
+"""Lower limit of two estimated standard deviations: of a pose (m, rad), and of the gyro's mean rate
+(rad/s)."""
 CORRECTED_WITH: Final = 5
 """Number of successive odometry steps that are regarded as one independent measurement.
 
@@ -168,9 +169,9 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the coordinate of each pose along one of the robot's axes.
+    """Return the coordinate of each pose along one axis of the robot at its mean heading.
 
-    The axes are those at the mean heading. ``axis``: 0 for x, 1 for y, 2 for yaw.
+    ``axis``: 0 for x, 1 for y, 2 for yaw.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -34,7 +34,7 @@ BEFORE: Final = 3
 FEWEST_DELTAS: Final = 10
 ROUNDS: Final = 4
 SOONER: Final = range(-20, 3)
-"""Tested shifts of an onset, in ticks. A positive shift moves the onset to an earlier time."""
+"""Shifts of an onset that the tool tries, in ticks. A positive shift is to an earlier time."""
 UNLIKE: Final = 3.0
 """A step is rejected if its misfit exceeds the median misfit of all steps by this factor."""
 
@@ -71,10 +71,10 @@ class Step:
         return replace(self, end_ticks=self.end_ticks + ticks, last_ticks=self.last_ticks - ticks)
 
     def told_by(self, mean: Callable[[Column], Column]) -> Column:
-        """Return the predicted rates of this step's odometry deltas, in rad/s.
+        """Return the predicted rate in each odometry delta of this step, in rad/s.
 
-        ``mean``: function that returns the mean response to a unit step in each odometry delta, for
-        the ticks at which the deltas end.
+        ``mean``: the model. Its argument is the end of each delta, in ticks after a unit step. It
+        returns the mean rate in each delta.
         """
         earlier = self.before_radps - self.last_radps
         height = self.after_radps - self.before_radps

@@ -85,9 +85,10 @@ def second_order(parameters: Array, time_s: Array) -> Array:
 
 
 def motor_in_loop(gains: Gains) -> Turned:
-    """Return the step response of a motor in the manual's control loop with these gains.
+    """Return a function: the step response of a motor in the manual's control loop.
 
-    Its parameters are PWM steps per (count per tick), time constant in s, and delay in s.
+    The function's parameters are the motor's PWM steps per (count per tick), its time constant in
+    s, and its delay in s.
     """
 
     def turned(parameters: Array, time_s: Array) -> Array:

@@ -2,9 +2,9 @@
 
 """Find the positions of an encoder's marks from several records of a wheel.
 
-Uneven marks cause errors of the times between ticks. These errors repeat in each turn of the wheel.
-Records begin at unknown marks. This module knows these errors; it does not know how the wheel
-moved.
+A *mark* is a place on the encoder's disc at which the board counts a tick. Uneven distances between
+marks cause errors of the times between ticks, which repeat in each turn of the wheel. It is not
+known at which mark a record begins. Input: these errors; output: the distances between the marks.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,8 @@ LARGEST: Final = 0.5
 A larger error shows that the board has missed an edge of the encoder's signal.
 """
 OUTLIER: Final = 4.5
-"""Largest relative error with which a time is used, in standard deviations of all errors."""
+"""Relative error above which a time is not used. The unit is the standard deviation of all errors.
+"""
 EXPLAINED: Final = 0.4
 """Least fraction of the variance that fitted marks must explain to be accepted.
 
@@ -36,7 +37,8 @@ records of two turns each.
 class Marks:
     """The marks of an encoder.
 
-    ``steps``: relative difference of each distance between successive marks from the mean distance.
+    ``steps``: for each mark, the distance to the next mark, as a relative difference from the mean
+    distance.
     """
 
     steps: Column
@@ -48,22 +50,22 @@ class Marks:
         return np.asarray(places - places.mean())
 
     def first(self, off: Column) -> int:
-        """Return the index in ``steps`` of the distance at which a record begins.
+        """Return the number of the mark at which a record begins. Marks are numbered from 0.
 
-        ``off``: relative errors of the times between ticks in the record.
+        ``off``: relative errors of the record's times between ticks.
         """
         return _first(np.clip(off, -LARGEST, LARGEST), self.steps)
 
     def expected(self, first: int, count: int) -> Column:
-        """Return the relative errors that the marks cause in ``count`` times between ticks.
+        """Return the relative errors that the marks cause in ``count`` successive times.
 
-        ``first``: index in ``steps`` for the first of these times.
+        ``first``: number of the mark at which the first of these times between ticks begins.
         """
         return np.asarray(self.steps[(first + np.arange(count)) % len(self.steps)])
 
 
 def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
-    """Return the marks that explain the records' errors, or None if no pattern repeats.
+    """Return the marks that explain the records' errors, or None if no pattern repeats each turn.
 
     ``rows``: for each record, the relative errors of its times between ticks, NaN if unknown.
 
@@ -89,11 +91,11 @@ def marks_in(rows: Sequence[Column], marks: int) -> Marks | None:
 
 
 def _first(row: Column, steps: Column) -> int:
-    """Return the index in ``steps`` at which a record begins, by the best agreement.
+    """Return the number of the mark at which a record begins, by the best agreement of the errors.
 
     ``row``: relative errors of the record's times between ticks.
 
-    ``steps``: relative errors of the distances between the encoder's marks.
+    ``steps``: for each mark, the relative error of the distance to the next mark.
     """
     marks = len(steps)
     turn = np.bincount(np.arange(len(row)) % marks, weights=np.nan_to_num(row), minlength=marks)
@@ -102,11 +104,13 @@ def _first(row: Column, steps: Column) -> int:
 
 
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
-    """Return the median error of each distance between marks, shifted to a mean of zero.
+    """Return, for each mark, the relative error of the distance to the next mark.
+
+    It is the median of all times over this distance. The mean of the result is shifted to zero.
 
     ``rows``: for each record, the relative errors of its times between ticks.
 
-    ``firsts``: for each record, the index of the distance at which it begins.
+    ``firsts``: for each record, the number of the mark at which the record begins.
     """
     of = np.concatenate(
         [(first + np.arange(len(row))) % marks for row, first in _both(rows, firsts)]

@@ -20,9 +20,9 @@ SIDES: Final = ("left", "right")
 UNTOLD: Final = 0.2
 """Largest accepted fraction of missing times in a record."""
 UNLIKE: Final = 1.5
-"""Largest accepted ratio of a time between ticks to the median time, or of the median to the time.
+"""Largest accepted factor by which a time between ticks differs from the median, up or down.
 
-A larger ratio shows that the board missed an edge or noticed it late.
+A larger factor shows that the board missed an edge of the encoder's signal or noticed it late.
 """
 SMOOTHED: Final = 4
 """Number of successive times between ticks from which one speed is computed.

@@ -2,6 +2,8 @@
 
 """A least-squares fit of a plant to the times between encoder ticks of several starts.
 
+The plant is the motor with its wheel. A *mark* is a place on the encoder's disc at which the board
+counts a tick, unless it misses the mark. A *record* has the times between the ticks of one start.
 This module knows the motion of a plant, the marks and the noise; it does not know files, and does
 not choose the plant's order.
 """
@@ -36,7 +38,7 @@ RATIOS: Final = (0.15, 0.4, 0.8)
 A search that started at 1 would not move away from 1.
 """
 LATEST_S: Final = 2.0
-"""Longest allowed time from the start of the wheel to the first mark, in s."""
+"""Longest allowed time from the start of the wheel to its first tick, in s."""
 MOST_OFF: Final = 0.4
 """Largest allowed displacement of a mark from its evenly spaced position, in ticks."""
 LAGS: Final = 60
@@ -47,13 +49,14 @@ Even such distant residuals are correlated, because the load changes slowly.
 MISSED: Final = 0.42
 """Least sum of the relative errors of two successive times that shows a missed mark.
 
-For a mark that was only noticed late, the sum is near 0. For a missed mark it is below 1, because
-the board's clock loses up to 6 ms.
+A missed mark doubles a time, which is a sum of 1. The board's clock can lose up to 6 ms, which
+makes the sum smaller. If the board only noticed a mark late, the next time is shorter, so that the
+sum is near 0.
 """
 SURE_TICKS: Final = 4
-"""Number of ticks at the start of a record among which the board cannot miss a mark.
+"""Number of times at the start of a record in which the tool does not search for missed marks.
 
-The wheel is still slow during these ticks.
+The wheel is still so slow that the board notices every mark.
 """
 OUTLIER: Final = 5.0
 """Error of a time between ticks, in standard deviations, above which the time is not used."""
@@ -62,9 +65,9 @@ FEWEST_RECORDS: Final = 6
 
 
 def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
-    """Return the distance turned since a step of the duty at time 0.
+    """Return the distance that a wheel has turned since a step of the duty at time 0.
 
-    It is divided by the final speed, and therefore in s.
+    The distance is divided by the final speed, so its unit is s.
     """
     slow = np.exp(-times_s / slow_s)
     if fast_s < 1e-4 * slow_s:
@@ -79,8 +82,8 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    ``values`` contains the sum and the ratio of the time constants instead. With these, the search
-    has only one optimum.
+    ``values``: the values of a search. They contain the sum and the ratio of the time constants
+    instead, because a search for these has only one optimum.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -97,8 +100,8 @@ class Search:
     - log of the final rate (ticks/s)
     - log of the sum of both time constants (s)
     - ratio of the time constants, if the order is 2
-    - time of each record's first mark (s)
-    - positions of the marks (ticks), while they are fitted
+    - for each record, the time from the wheel's start to its first tick (s)
+    - displacements of the marks (ticks), only while they are fitted
     """
 
     def __init__(self, intervals: Sequence[Column], order: int = 2) -> None:
@@ -134,17 +137,17 @@ class Search:
         return self._best([np.array([*values[:2], ratio, *values[3:]]) for ratio in RATIOS])
 
     def first_order(self, values: Column) -> Column:
-        """Search again for a plant of first order, starting from the values of second order.
+        """Set ``order`` to 1, and search for a plant of first order.
 
-        The attribute ``order`` is then 1.
+        ``values``: the values of second order, from which the search starts.
         """
         self.order = 1
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return, by record, the relative errors of the times between evenly spaced marks.
+        """Return, for each record, the relative errors of its times if the marks were even.
 
-        The errors before and after a missed mark are NaN.
+        A record has one error for each distance between marks. Beside a missed mark, it is NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -157,7 +160,7 @@ class Search:
     def find_missed(self, values: Column) -> bool:
         """Find the marks that the board missed; return whether it missed any.
 
-        From then on, the search regards a time with a missed mark as that of two distances.
+        All later searches count two distances for a time in which a mark was missed.
         """
         any_missed = False
         for place, row in enumerate(self._off_even(values)):
@@ -174,7 +177,12 @@ class Search:
         return np.split(off, np.cumsum(self._lengths)[:-1])
 
     def with_marks(self, marks: Marks, values: Column) -> Column:
-        """Fit the marks' positions too, and use them from now on; return the plant's values."""
+        """Fit the plant together with the marks' positions; return the values without positions.
+
+        All later searches use the fitted positions.
+
+        ``marks``: the positions from which the fit starts.
+        """
         self._marks, own = len(marks.steps), len(values)
         self._first_marks = [marks.first(row) for row in self.off(values)]
         values = np.concatenate((values, marks.places))
@@ -184,9 +192,9 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Measure the correlation of the residuals at these values, and remove it from now on.
+        """Measure the correlation of the residuals at these values. Later searches remove it.
 
-        Misplaced marks cause the correlation until they are fitted. After their fit, only the
+        Before the marks are fitted, uneven marks cause the correlation. After their fit, only the
         changing load causes correlation.
         """
         rows = np.split(self._relative(values), np.cumsum(self._lengths)[:-1])
@@ -198,15 +206,15 @@ class Search:
         self._whitener = whitener(correlation(rows, lags), max(self._lengths))
 
     def left(self, values: Column) -> Column:
-        """Return the relative residuals at these values, whitened and without outliers."""
+        """Return the relative residuals at these values, without correlation and outliers."""
         left = self._residuals(values) * self._sigma
         spread = 1.4826 * float(np.median(np.abs(left)))
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
 
     def covariance(self, values: Column) -> Column:
-        """Return the covariance of the values that all records share.
+        """Return the covariance of the plant's values, which all records share.
 
-        A slowly changing load affects whole records. If the scatter between records is larger than
+        A slowly changing load affects whole records. If the records therefore scatter more than
         the residuals predict, the covariance is increased to this scatter.
         """
         own = 1 + self.order
@@ -256,7 +264,7 @@ class Search:
         )
 
     def _sparsity(self) -> csr_matrix:
-        """Return which times depend on which values, as the sparsity pattern of the Jacobian."""
+        """Return the sparsity pattern of the Jacobian: (times between ticks, values)."""
         own, records, times = 1 + self.order, len(self._lengths), len(self._measured)
         pattern = np.zeros((times, own + records + self._marks))
         pattern[:, :own] = 1.0
@@ -284,7 +292,7 @@ class Search:
         return np.concatenate([self._whitener[: len(row), : len(row)] @ row for row in rows])
 
     def _told(self, values: Column, off: Column | None = None) -> Column:
-        """Return the predicted times between marks in s, record after record.
+        """Return the predicted times between ticks in s, record after record.
 
         ``off``: displacements of the marks, if ``values`` does not contain them.
         """

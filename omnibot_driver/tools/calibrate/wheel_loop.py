@@ -2,9 +2,9 @@
 
 """The simulation of one wheel in the manual's control loop, for small changes of speed.
 
-Units: counts per tick of 10 ms, PWM steps, ticks. The wheel must not change its direction, because
-the dry friction is assumed to be constant. This module knows the motor and the control law; it
-does not know measurements or radians.
+A tick is the control period of 10 ms. Speeds are in encoder counts per tick, efforts in PWM steps,
+times in ticks. The wheel must not change its direction, because the dry friction is assumed to be
+constant. This module knows the motor and the control law; it does not know measurements or radians.
 """
 
 from dataclasses import dataclass
@@ -60,9 +60,13 @@ class Answer:
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
 ) -> Answer:
-    """Return the response to simultaneous steps of the commanded speed and the load.
+    """Simulate a wheel with the manual's control law; return its response in each tick.
 
-    ``load``: in PWM steps. The control law is that of the manual ("Wheel control").
+    The commanded speed and the load change from 0 to ``command`` and ``load`` at the same time.
+
+    ``ticks``: duration of the simulation. ``command``: in counts per tick.
+
+    ``load``: effort that the load needs, in PWM steps.
     """
     shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
     whole, part = divmod(motor.delay_ticks, 1.0)

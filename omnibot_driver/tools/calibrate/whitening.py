@@ -17,8 +17,11 @@ Column = NDArray[np.float64]
 def correlation(rows: Sequence[Column], lags: int) -> Column:
     """Return a robust estimate of the residuals' autocorrelation, for lags 0 to ``lags``.
 
-    With a single lag, a value of -0.5 shows displaced marks, and 0 shows independent errors. With
-    more lags, the values are tapered.
+    ``rows``: rows of successive residuals. ``lags``: the largest lag.
+
+    With a single lag, the result is limited to the range from -0.5 to 0: displaced encoder marks
+    cause -0.5, and independent errors cause 0. With more lags, the result is tapered: larger lags
+    get smaller factors.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

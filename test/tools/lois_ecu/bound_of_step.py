@@ -6,11 +6,12 @@ Run this by hand:
 
     PYTHONPATH=. python test/tools/lois_ecu/bound_of_step.py
 
-The robots are random, as those of ``judge_step.py``. There are three kinds of noise:
+The robots are random, as those of ``judge_step.py``. A *mark* is a place on the encoder's disc at
+which the board counts a tick. The calculation is for three kinds of noise:
 
-- "each time": every time has an independent error of 10 %.
-- "other marks": the marks have other places in each turn, 10 % off.
-- "same marks": the marks keep their places. Only the rounding to 0.1 ms remains.
+- "each time": every time between ticks has an independent error of 10 %.
+- "other marks": the marks are displaced by 10 %, differently in each turn.
+- "same marks": the marks have known positions. Only the rounding to 0.1 ms remains.
 
 The load and the rate change by 0.5 % between records.
 """
@@ -31,9 +32,9 @@ Column = NDArray[np.float64]
 
 
 def times_s(values: Column) -> Column:
-    """Return the times in s at which a starting wheel passes its marks.
+    """Return the times, in s, at which a starting wheel passes the marks of its encoder.
 
-    ``values``: final rate (marks/s), slow and fast time constant (s), places of the marks.
+    ``values``: final rate (marks/s), slow and fast time constant (s), positions of the marks.
     """
     rate, slow_s, fast_s = values[:3]
     grid_s = np.linspace(0.0, 1.0, 20_000) ** 2 * (SAMPLES + 3) / rate * 1.5

@@ -80,7 +80,7 @@ def stepped(motor: MotorSettings, gains: PiGains, target_rpm: float) -> Column:
 def recorded(rpm: Column) -> Column:
     """Return the times between ticks, in s, of a wheel that turns at these speeds.
 
-    The marks of the wheel are evenly spaced.
+    The encoder's marks, at which the board counts ticks, are evenly spaced.
     """
     ticks = np.cumsum(rpm) * 0.01 * TICKS / 60
     at_s = np.interp(np.arange(0.4, ticks[-1]), ticks, 0.01 * np.arange(1, len(ticks) + 1))

@@ -2,7 +2,8 @@
 
 """Tests of ``calibrate step`` for a LOIS ECU: it finds unknown encoders, plants and gains.
 
-A plant is what the controller controls: the motor with its wheel.
+A plant is what the controller controls: the motor with its wheel. A mark is a place on the
+encoder's disc at which the board counts a tick.
 """
 
 import math
@@ -186,9 +187,9 @@ def test_on_a_board_that_sends_meanwhile_hardly_a_step_overshoots_much_more(plan
 
 
 def test_a_board_that_sends_when_the_step_is_over_disturbs_nothing() -> None:
-    """A board that sends its ticks during a step changes the step's response.
+    """A board that sends its tick counts during a step changes the step's response.
 
-    If it sends them afterwards, the response stays the same.
+    If it sends them after the step, the response stays the same.
     """
     loop, gains = replace(LOOP, sends_each_s=100.0), PiGains(0.8, 0.6, 0.1)
     calm = answer(PLANT, gains, loop, 31.0, 3.0)
@@ -342,7 +343,7 @@ def test_a_robot_is_calibrated_from_its_records(
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
-    """A step with slow gains has a larger predicted control error than a step with tuned gains."""
+    """The predicted control error of a step is larger with slow gains than with tuned gains."""
     good = tune(PLANT, LOOP, Goals()).gains
     slow = PiGains(0.05, 2.0, 1.0)
     assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
