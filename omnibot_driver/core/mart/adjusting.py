@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The adjustment of the motors during a drive, and the learning from its results.
+"""How the driver corrects the motors' units during a drive, and what it learns from the result.
 
 This module knows the present motion and its measured speed; it does not know how a motion begins or
 ends. The caller passes the time.
@@ -17,7 +17,9 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A small turn that shows whether a constant heading means a dead IMU or a straight drive.
+"""A small turn that the driver makes when the heading is constant.
+
+A working IMU shows the turn. Without it, a straight drive and a dead IMU would look the same.
 
 ``WAG_S``: time in s for which the heading is constant before the driver makes this turn.
 
@@ -71,7 +73,7 @@ class Adjusting(Moves):
     def _predict_turn(self) -> None:
         """Pass the expected ratio of wheel speeds (left / right) to the odometry.
 
-        The ratio gives the turn if the server does not report the heading.
+        The odometry computes the turn from this ratio while the server does not report the heading.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
@@ -97,7 +99,8 @@ class Adjusting(Moves):
     def _learn_standing(self) -> None:
         """Record that the present motor units are too small to turn the motors.
 
-        Nothing is recorded if the robot has moved in this motion: then an obstacle blocks it.
+        If the robot has already moved in this motion, nothing is recorded: the units were
+        sufficient, and an obstacle blocks the robot.
         """
         odometry = self.odometry
         moved_m = abs(odometry.moved_m) + abs(odometry.turn.spun_rad) * self._settings.track_m / 2

@@ -2,8 +2,9 @@
 
 """Queries that show which motion is in progress after the driver has used the stop port.
 
-After the stop port was used, SM or SRM may hang the server (docs/boards/mart.md). This module knows
-commands and replies; it does not know why the stop port was used. The caller passes the time.
+The stop port is the server's second UDP port. After its use, a stop command on the first port (SM
+or SRM) may hang the server (docs/boards/mart.md). So the driver sends queries first. This module
+knows commands and replies; it does not know why the stop port was used. The caller passes the time.
 """
 
 import math
@@ -20,9 +21,10 @@ from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import Packets
 
 STOP_AGAIN_S: Final = 3.0
-"""Interval in s at which SL and SS are repeated while the server is silent.
+"""Interval in s at which the driver repeats the stop commands SL and SS to a silent server.
 
-SL and SS also end a controlled move, in which the server is silent.
+A server that executes a controlled move is silent too. SL and SS end this move, and the server
+answers again.
 """
 APART_S: Final = 0.4
 """Least time in s between two encoder counts that are compared to see whether the robot moves."""
@@ -80,7 +82,10 @@ class Asking(Stops):
             self._lose(now, "the robot is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
-        """Stop any motion with SRM and SM, which are now certain not to hang the server."""
+        """Send the stop commands SRM and SM to end any motion.
+
+        The queries have shown that SRM and SM cannot hang the server now.
+        """
         if self._lost_told:
             self._lost_told = False
             self._notice("the server answers again; the driver first stops any motion", halt=True)
@@ -88,5 +93,8 @@ class Asking(Stops):
         self._halt(now)
 
     def _unanswered(self, word: Word) -> None:
-        """Query the server's name again: it did not answer ``word``, so it may be gone."""
+        """Record that the server may be gone, because it did not answer ``word``.
+
+        The driver sends HELLO until the server answers with its name.
+        """
         self._named_s = -math.inf

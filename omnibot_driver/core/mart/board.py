@@ -49,10 +49,10 @@ TRAITS: Final = Traits(
     },
 )
 UNREAD_S: Final = 0.5
-"""Longest usual time in s between two readings from the replies of a server that answers.
+"""Longest time in s without a reading from a server that answers.
 
-After it, the next reply yields at least NOTHING_MEASURED, which shows that the server answers. A
-moving robot is measured more often.
+After this time, the next reply yields at least NOTHING_MEASURED, a reading without values. It shows
+the driver that the server answers. A moving robot is measured more often.
 """
 EXPECTED_EVERY_S: Final = 0.2
 
@@ -146,9 +146,9 @@ class MartBoard(Board):
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:
-        """End the present job, because the port has closed; return the readings that are left.
+        """End the present job (a request besides motion), because the port has closed.
 
-        The job's result is one of these readings.
+        Return the readings that are left. The job's result is one of them.
         """
         self._pilot.jobs.cancel("the port was lost meanwhile; call again once it is back")
         return self._pilot.take()
@@ -229,9 +229,10 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server has not run RM since it was started.
+        """Whether the server has not yet driven forward (RM) since it was started.
 
-        Only then may the clock be set back: RM integrates the heading since the previous RM.
+        Only then may its clock be set back. Later, the next RM would report a wrong heading,
+        because it integrates the turn rate over the time since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero
 
@@ -246,7 +247,10 @@ class Conductor:
 
     @property
     def commanded(self) -> BodyTwist | None:
-        """The body velocity of the last motor command, or None in a controlled move."""
+        """The body velocity of the last motor command, or None in a controlled move.
+
+        The server itself chooses the velocity of a controlled move.
+        """
         return self._pilot.commanded
 
     @property

@@ -31,28 +31,36 @@ QUICKEST_S: Final = 0.1
 """Shortest time in s to wait for the reply to a query, in addition to the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
-"""Increase of the average duration of a query (``trip_s``) after an unanswered query.
+"""Increase of ``trip_s``, the average duration of a query, after an unanswered query.
 
-It becomes ``LOSS * trip_s + LOSS_S`` (s). The driver then waits longer for the next reply, because
-the missing reply may only be late.
+The new value is ``LOSS * trip_s + LOSS_S`` (s). The driver then waits longer for the next reply,
+because the missing reply may only be late.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
-"""Times in s. While the network is disturbed, a reply may answer an earlier query.
+"""Times in s that determine whether the network is regarded as disturbed.
 
-``SLOW_S``: a longer exchange is a sign of a disturbance.
+In a disturbed network, a reply may answer an earlier query instead of the last one.
+
+``SLOW_S``: a query whose reply takes longer is a sign of a disturbance.
 
 ``DISTURBED_S``: the network is regarded as disturbed for this time after the last sign.
 """
 PRESSING: Final = frozenset({ENC, RMRA, MCSTAT})
-"""Queries that are sent at once, even if a late reply of the same form may still come."""
+"""Urgent queries: they are sent even while a late reply to an earlier query may still come.
+
+That late reply could be mistaken for the reply to the new query.
+"""
 
 NUMBERS: Final = frozenset({Kind.QUERY, Kind.MOVE})
-"""The kinds of commands whose replies can look like the reply to another query."""
+"""The kinds of commands whose replies can be mistaken for the reply to another query.
+
+Most of these replies are only a number.
+"""
 
 AT_ONCE: Final = frozenset({CONFLICT, NO_IMU, UNSUPPORTED})
 """Failure texts with which the server may answer a check of the IMU at once.
 
-All other replies to a check take at least the shortest duration of the check.
+Any other reply that comes so early belongs to another request, because a check takes time.
 """
 
 
@@ -134,7 +142,10 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def answered(self, word: Word, reply: Ok, now: float) -> None:
-        """Record a reply to ``word`` that was not passed to ``hear``. A copy of it may follow."""
+        """Record that ``reply``, which the caller has evaluated itself, answers ``word``.
+
+        The driver can then recognise a later copy of this reply.
+        """
         self._answers[word] = reply, now + self.delay_s
 
     def came(self, reply: Ok, now: float) -> None:
@@ -148,7 +159,10 @@ class Conversation:
             self._owed_until_s.pop(reply.form, None)
 
     def certain_from_s(self, word: Word) -> float:
-        """Return the time from which no late reply can be mistaken for the reply to ``word``."""
+        """Return the time from which ``word`` may be sent without confusion.
+
+        From this time on, no late reply can be mistaken for the reply to ``word``.
+        """
         return max(map(self.late_until_s, word.forms)) - word.least_s
 
     def late_until_s(self, form: Form) -> float:
@@ -193,7 +207,8 @@ class Conversation:
     def give_up(self, now: float) -> Word | None:
         """Stop waiting for the pending request; return its command, or None without a request.
 
-        Its reply is recorded as missing. Exception: ``Stopping`` waits for a controlled move's.
+        Its reply is recorded as missing and may come late. The reply to a controlled move is not
+        recorded here, because the stop of the move waits for it.
         """
         if self.pending is None:
             return None

@@ -23,7 +23,7 @@ GYRO_WALK: Final = 0.002
 It grows with the square root of the time (random walk).
 """
 WHEEL_HEADING: Final = 0.06
-"""Relative standard deviation of a turn on the spot that only the right wheel measures."""
+"""Relative standard deviation of a turn on the spot that is measured only by the right wheel."""
 END_M, END_RAD = 0.004, math.radians(0.4)
 """Standard deviations of the errors that the start and the coasting of a motion cause.
 
@@ -44,19 +44,21 @@ It is a fraction of the track width, and applies to turns on the spot.
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
 BEND_WALK: Final = 0.5
-"""Ratio of the random and the constant error of a turn that is known only from the commands.
+"""Random error of a turn that is computed from the commands, not measured.
 
-Both errors are standard deviations. The random error is independent in each step.
+It is a fraction of the constant error of this turn. Both errors are standard deviations. The random
+error is independent in each interval between two encoder counts.
 """
 ASTRAY: Final = 0.7
-"""Relative error of a driven distance, divided by the variance of the heading (rad²).
+"""How much an uncertain heading increases the error of a driven distance.
 
-The relative error is at most 1. It applies along the motion, and also across the motion.
+The relative error of the distance is ASTRAY times the variance of the heading (rad²), at most 1. It
+applies along the motion and across it.
 """
 SPREAD: Final = 0.3
-"""Standard deviation of a time that is equally likely anywhere in an interval of length 1.
+"""Standard deviation of a time that is equally likely anywhere in an interval.
 
-The exact value is 1/√12.
+It is a fraction of the interval's length. The exact value is 1/√12.
 """
 CLOCK_S: Final = 0.01
 """Least assumed uncertainty of a reply's time, in s. A good network has this uncertainty."""
@@ -124,13 +126,16 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Record that a motion begins, so that ``heading_told`` can remove its heading error."""
+        """Store the present heading error, because a motion begins.
+
+        ``heading_told`` later removes the error that has been added in this motion.
+        """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the heading error of an unmeasured turn, because the server reports the heading.
+        """Remove the heading error of this motion, because the server now reports the heading.
 
-        The resulting position error remains.
+        Until then, the turn was computed from the commands. The resulting position error remains.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -161,9 +166,10 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the wheel's heading error in the last turn by the gyro's smaller error.
+        """Replace the heading error of the last turn by a smaller one.
 
-        The server has recorded the gyro's angle. Call this before the position changes.
+        The odometry has used the wheel's angle so far, and now uses the gyro's, which the server
+        has recorded. Call this before the position changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

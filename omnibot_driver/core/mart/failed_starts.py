@@ -14,11 +14,11 @@ from omnibot_driver.core.mart.replies import Fail
 from omnibot_driver.core.mart.states import Motion
 
 AGAIN_S: Final = 1.0
-"""Pause in s after a start that failed."""
+"""Pause in s after a start that failed, before the driver tries again."""
 REFERENCE_FAILS: Final = 2
-"""Number of failed starts of RM in a row after which the driver stops trying.
+"""Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
-A single failed start is normal after a long stop.
+A single failed start is normal if the stop before it took long.
 """
 
 
@@ -63,10 +63,10 @@ class FailedStarts(Adjusting):
         self._halt(now, f"{failed}: {why}", arrived=arrived)
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
-        """Return whether the failure text of RM may be about an earlier motion, e.g. the last B.
+        """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        A reported obstacle is an obstacle of RM if the front sonar also detects it, or if RM
-        reports it again.
+        RM may report an obstacle that has ended an earlier backward drive. The obstacle is regarded
+        as RM's own if the front sonar also detects it, or if RM reports an obstacle again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -2,8 +2,8 @@
 
 """The plan of moves to a goal pose: turn towards it, drive straight, turn to its heading.
 
-Moves are inexact: each is planned anew. This module knows poses and commands for moves; it does not
-know when they are sent.
+Moves are inexact, so each move is planned only after the previous one was measured. This module
+knows poses and commands for moves; it does not know when they are sent.
 """
 
 import math
@@ -19,11 +19,11 @@ NEAR_M: Final = 0.04
 NEAR_RAD: Final = math.radians(2.5)
 SLOW_BELOW_DEG, SLOW_BELOW_IN = 10, 12
 NORMAL_UNITS: Final = 30
-"""Motor units of controlled moves that are sent without SLOW."""
+"""Motor units of controlled moves at normal speed, which are sent without the word SLOW."""
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
-"""After ENOUGH_MOVES moves, a distance of ENOUGH_M (m) from the goal is near enough.
+"""After ENOUGH_MOVES moves, the robot need only be within ENOUGH_M (m) of the goal.
 
-Otherwise the robot would have to turn again.
+A smaller distance would require another turn and another straight move.
 """
 STRETCH: Final = 1.3
 """Ratio of driven to requested length of a straight move, until the first measurement.
@@ -39,7 +39,7 @@ MOST_SURPLUS_DEG: Final = 10.0
 WORTH_DEG: Final = 1.0
 """Smallest reduction of the heading error, in degrees, for which the robot makes a turn."""
 WIDER: Final = 0.5
-"""Growth of the allowed heading error by each turn since the last straight move.
+"""How much each turn since the last straight move increases the allowed heading error.
 
 It is a fraction of the initial allowed error. Without it, the robot could turn to and fro, because
 turns overshoot.
@@ -49,7 +49,7 @@ MOST_MOVES: Final = 9
 
 
 LEAST_LIKE: Final = 0.65
-"""Smallest measured fraction of a requested distance or turn that can be a complete move."""
+"""A move is regarded as incomplete if its measured part is below this fraction of the request."""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
@@ -58,23 +58,25 @@ SLOW doubles the times per degree and inch.
 FULL, TWO = 0.6, 1.4
 """Shortest durations of one and of two complete runs of a move, as fractions of the usual one."""
 LEAST_CUT_M, LEAST_CUT_RAD = 0.1, math.radians(15.0)
-"""Smallest request for which the encoder count shows whether the run was complete."""
+"""Smallest request, in m or rad, for which the encoder count shows an incomplete run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Done:
     """A controlled move that has ended, with its measurements.
 
-    ``way_m``, ``turned_rad``: distance and turn by the encoder. If a duplicate of the request has
-    started the move again, they cover the second run only.
+    A duplicate of the request may have started a second run of the same move.
+
+    ``way_m``, ``turned_rad``: distance and turn by the encoder; of the second run only, if there
+    was one.
 
     ``lasted_s``: time in s from the request to the reply.
 
     ``quiet_s``: longest time in s for which the second run may have lasted.
 
-    ``completed``: whether the server has reported the end of the move, not of a stop.
+    ``completed``: whether the move ended by itself with a success, without a stop.
 
-    ``stopped_again``: whether the driver has then stopped a possible second run.
+    ``stopped_again``: whether the driver has sent a stop after that, against a possible second run.
     """
 
     request: Request
@@ -119,7 +121,7 @@ class Done:
 
     @property
     def _is_short(self) -> bool:
-        """Whether the count is too small for a complete move."""
+        """Whether the encoder count is too small for a complete move."""
         seen = abs(self.way_m if self.is_straight else self.turned_rad)
         return seen < LEAST_LIKE * self.asked
 
@@ -138,22 +140,27 @@ class Done:
 
     @property
     def ended_late(self) -> bool:
-        """Whether the reply may be the one to a second run, and the one to the first was lost."""
+        """Whether the reply came so late that it may be the reply to a second run.
+
+        In that case, the reply to the first run was lost.
+        """
         return self.lasted_s >= TWO * self.usual_s
 
     @property
     def ended_early(self) -> bool:
         """Whether the reply came before the end of a complete run, so it answers another request.
 
-        If the driver has then stopped a possible second run, it has cut the first one short.
+        If the driver has then sent a stop against a second run, it has stopped the first run
+        itself.
         """
         return self.lasted_s < FULL * self.usual_s
 
 
 class Surplus:
-    """How far controlled moves go beyond the requested distances and turns, as measured so far.
+    """The measured excess of controlled moves over the requested distances and turns.
 
-    The excess of a turn is in degrees; the excess of a straight move is a ratio.
+    The excess of a turn is in degrees. The excess of a straight move is a ratio (driven /
+    requested).
     """
 
     def __init__(self) -> None:
@@ -208,8 +215,8 @@ class Move:
 
     ``turns``: number of turns since the last straight move.
 
-    ``given_up``: whether no further move is sent. The robot has arrived, a move has failed, or
-    MOST_MOVES moves were sent.
+    ``given_up``: whether the driver sends no further move, because the robot has arrived, a move
+    has failed, or MOST_MOVES moves were sent.
     """
 
     place: Pose

@@ -42,15 +42,16 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 STARTS_UP_S: Final = 1.5
 """Time in s from a server's first reply after an absence until the driver starts a motion.
 
-Earlier, VOLTS and most motions crash a new server; RM leaves the motors on.
+A server that is starting up crashes on VOLTS and on most motions. If the motion is RM (forward
+drive), the motors stay on.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Silence after which the server is regarded as absent.
 
-The silence is ABSENT_S (s), plus the duration of ABSENT_TRIPS exchanges.
+The silence is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
-"""Largest number of HELLOs whose answers the driver expects. Older HELLOs are regarded as lost."""
+"""Largest number of HELLO queries whose answers the driver expects. Older ones count as lost."""
 HEADING_S, HEADING_TRIPS = 1.0, 5
 NO_HEADING: Final = (
     "the server does not report the relative heading (RMRA) of the robot at rest, so the heading of"
@@ -173,7 +174,10 @@ class Ground:
 
     @property
     def blind_since_s(self) -> float | None:
-        """The start time of a controlled move that is in progress or may run again, or None."""
+        """The start time of a controlled move that is in progress or may run again, or None.
+
+        During this time the server reports no measurements.
+        """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s
         return self._started_s if (moves or again) and self.state is not State.LOST else None
@@ -199,9 +203,9 @@ class Ground:
 
     @property
     def _seems_present(self) -> bool:
-        """Whether the server has not been restarted since the driver sent the last start command.
+        """Whether replies show that the server was not restarted since the last start command.
 
-        Replies without a longer pause between them show this.
+        They show this if no pause between them was long enough for a restart.
         """
         most_s = PRESENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
         return self.heard_s <= self._present_s + most_s
@@ -256,10 +260,11 @@ class Ground:
 
     @property
     def _heading_first(self) -> bool:
-        """Whether the heading must be read before the encoder.
+        """Whether the driver must read the heading before it reads the encoder.
 
-        RM's last heading must precede the count that ends the motion. The driver waits for it for
-        HEADING_S plus the duration of HEADING_TRIPS exchanges.
+        After a forward drive (RM), the last heading must come before the encoder count that ends
+        the motion. The driver waits for this heading for at most HEADING_S, plus HEADING_TRIPS
+        times the duration of a query.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

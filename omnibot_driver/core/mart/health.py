@@ -39,17 +39,16 @@ SEEN_FOR_S: Final = 2.0
 LOWEST_V, HIGHEST_V = 5.0, 40.0
 ENCODER_FAILS: Final = 3
 LIKE: Final = {VOLTS: 0.5, SFC: 3, SRC: 3}
-"""Largest difference between two readings that are regarded as equal, in V or inches."""
+"""Largest difference between two readings that are regarded as equal, in V (VOLTS) or inches."""
 OFTEN: Final = {VOLTS: 2, SFC: 3, SRC: 3}
-"""Number of equal readings in a row after which a reading is accepted.
-
-It applies if the reply may belong to another query.
-"""
+"""Number of equal readings in a row that are needed if a reply may belong to another query."""
 SAME_V: Final = 0.015
 HEADING_CHANGES: Final = 3
 STRAYS_S: Final = 3.0
-"""If the robot moves without a command within this time in s after a failed RM, the RM is regarded
-as the cause."""
+"""Time in s after a failed start of RM (forward drive) within which RM may move the robot.
+
+If the robot moves without a command in this time, RM is regarded as the cause.
+"""
 
 
 class Health:
@@ -57,14 +56,15 @@ class Health:
 
     ``stranger``: name of a server that is not a motion controller, else empty.
 
-    ``heading_told``: motions besides RM in which the server's heading (RMRA) changes.
+    ``heading_told``: kinds of motion, besides RM (forward drive), in which the server reports the
+    heading.
 
-    ``heading_changes``: number of these changes in the present motion.
+    ``heading_changes``: number of changes of the reported heading in the present motion.
 
     ``reference_fails``: number of starts of RM in a row that have failed.
 
-    ``outlived``: whether the server has answered a stop only after the stop port was used. The
-    next stop can then fail.
+    ``outlived``: whether the server has answered a stop only after the stop port was used. In that
+    case, the next stop can fail.
     """
 
     def __init__(self, imu: ImuProof) -> None:
@@ -146,36 +146,40 @@ class Health:
             self.status = bits
 
     def encoder_failed(self) -> None:
-        """Record that ENC was answered by ``fail``."""
+        """Record that the query of the encoder count (ENC) was answered by ``fail``."""
         self._encoder_fails += 1
 
     def encoder_answers(self) -> None:
-        """Record that ENC was answered by a count."""
+        """Record that the query of the encoder count (ENC) was answered by a count."""
         self._encoder_fails = 0
 
     def heading_changed(self, motion: Motion) -> None:
-        """Record that the heading (RMRA) has changed in this motion.
+        """Record that the heading reported by the server has changed in this motion.
 
-        A few changes (HEADING_CHANGES) prove that the server reports the heading in motions of
-        this kind.
+        After HEADING_CHANGES changes, the driver assumes that the server reports the heading in all
+        motions of this kind.
         """
         self.heading_changes += 1
         if self.heading_changes >= HEADING_CHANGES:
             self.heading_told.add(motion)
 
     def reference_failed(self, now: float) -> None:
-        """Record that RM has failed without a reason, or because no wheel has turned."""
+        """Record that RM (forward drive) has failed.
+
+        It gave no reason, or reported that no wheel has turned.
+        """
         self.reference_fails += 1
         self._reference_failed_s = now
 
     def reference_answers(self) -> None:
-        """Record that RM was answered by ``ok``."""
+        """Record that RM (forward drive) was answered by ``ok``."""
         self.reference_fails, self._reference_failed_s = 0, -math.inf
 
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If RM has failed shortly before, this shows that the server is defective.
+        If RM (forward drive) has failed shortly before, the server has started the motors and
+        reported a failure. It is defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 
@@ -185,7 +189,7 @@ class Health:
 
     @property
     def bits(self) -> str:
-        """The faults that MCSTAT reports, as text.
+        """The faults that the motor board reports (MCSTAT), as text.
 
         The text is "none" without faults, and "unknown" before the first status.
         """

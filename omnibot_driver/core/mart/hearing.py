@@ -18,9 +18,9 @@ from omnibot_driver.core.mart.states import ROLLING, Motion, State
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
-"""Largest relative change of the motors' units whose reply may be missing in an unmeasured turn.
+"""Largest relative change of the motors' units that may be unanswered while no turn is measured.
 
-After a larger change without a reply, the driver stops the robot, because it may turn unnoticed.
+After a larger unanswered change, the driver stops the robot, because it may turn unnoticed.
 """
 
 
@@ -97,7 +97,10 @@ class Hearing(Measuring):
             self._named_s = self._name_from_s
 
     def _hurry(self, now: float) -> None:
-        """Shorten the wait for a reply, because the server has already answered a later HELLO."""
+        """Shorten the wait for a reply, because the server has already answered a later HELLO.
+
+        The server answers in order, so the missing reply is lost or about to come.
+        """
         greeted_s = self._greeted_of_name(now)
         network = self.conversation
         pending = network.pending
@@ -113,11 +116,14 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Present duration of an exchange in s, estimated from queries and the last IMU check."""
+        """Present time in s from a request to its reply.
+
+        It is estimated from the queries and the last check of the IMU.
+        """
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 
     def _greeted_of_name(self, now: float) -> float:
-        """Return the earliest time at which the answered HELLO may have been sent."""
+        """Return the earliest time at which the driver may have sent the HELLO just answered."""
         longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self._trip_s)
         recent = [each for each in self._greetings if each >= now - longest_s]
         self._greetings = recent[1:]

@@ -2,8 +2,9 @@
 
 """The check that the IMU works (RST IMU, or MCR SLOW 0), and its last results.
 
-A failed RST IMU closes the IMU, so it is repeated. This module knows replies and times; it does not
-know which motion is started. The caller passes the time.
+After a failed RST IMU, the server does not use the IMU until a later RST IMU succeeds. So the
+driver repeats the command. This module knows replies and times; it does not know which motion is
+started. The caller passes the time.
 """
 
 import math
@@ -25,7 +26,7 @@ PROVED_S: Final = 0.2
 PROBE_S: Final = {RESET: 0.1, CHECK: 0.5}
 """Usual duration of each check, in s.
 
-Half of any additional time is added to the age of the result.
+If a check takes longer, half of the additional time is regarded as the age of its result.
 """
 FAILS: Final = {RESET: 3, CHECK: 1}
 """After this number of failed checks in a row, the IMU is regarded as dead."""

@@ -21,9 +21,9 @@ PIECE: Final = 512
 QUIET_S: Final = 1.0
 """Time in s without a piece after which the driver does not expect further pieces of a file."""
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
-"""Times in s to wait for the record of a turn; the robot stands meanwhile.
+"""Times in s to wait for the record of a turn. The robot is at rest while the driver waits.
 
-``RECORD_S``: for the reply, plus the duration of three average queries.
+``RECORD_S``: for the reply to the request, plus the duration of three average queries.
 
 ``RECORD_QUIET_S``: for each piece of the file.
 """
@@ -73,7 +73,7 @@ class Jobs:
 
     ``done``: results that the caller has not taken yet.
 
-    ``logging``: whether LOG was answered with ``ok`` in this connection.
+    ``logging``: whether the server has acknowledged LOG, which starts its log, in this connection.
 
     ``ended``: whether EXIT was sent, which ends the server.
 

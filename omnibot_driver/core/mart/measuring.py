@@ -24,8 +24,8 @@ ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
 
 ``ROLLS_S``: after a stop.
 
-``ROLLS_AFTER_MOVE_S``: after a controlled move. If it fails, the robot may still coast when the
-reply comes.
+``ROLLS_AFTER_MOVE_S``: after a controlled move. The server replies to a failed move at once, while
+the robot still coasts.
 """
 
 
@@ -63,8 +63,8 @@ class Measuring(Starts):
     def _shows_restart(self, before_rad: float | None) -> bool:
         """Return whether the present heading is exactly zero because the server was restarted.
 
-        Until its first RM, a server reports zero. The heading is also zero when RM begins, or when
-        its sign changes. Then the heading before, ``before_rad``, is near zero.
+        A restarted server reports zero until its first forward drive (RM). A heading that only
+        passes through zero was near zero before. ``before_rad``: the heading before, or None.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False

@@ -21,16 +21,17 @@ from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
 UNLIKELY: Final = 1 / 3
-"""Assumed error of the odometry if a second run of a move is possible but unlikely.
+"""Assumed error of the odometry if the server may, but probably did not, run a move twice.
 
-It is a fraction of the move, as a standard deviation: the error would then be 3 of them.
+It is a standard deviation, as a fraction of the move. A second run would then be an error of three
+standard deviations.
 """
 RAN_TWICE: Final = (
     "the network has delivered a controlled move twice; the driver has stopped the second run, and"
     " continues with an estimate of the first one: check the network"
 )
 LEAST_STOP_S: Final = 0.3
-"""Shortest time in s from SL or SS until the server answers again, if a move was stopped."""
+"""Shortest time in s from a stop of a controlled move (SL or SS) until the server answers again."""
 
 
 class Moves(Asking):
@@ -165,10 +166,11 @@ class Moves(Asking):
         )
 
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
-        """Return whether SL and SS may have stopped a second run of the move.
+        """Return whether the stops after a controlled move may have stopped a second run of it.
 
-        The result is False in one case: after a complete move, the server has answered sooner than
-        it can end a motion, and the time was too short for a copy to end by itself.
+        The result is False only after a complete move, if no second run can explain what came after
+        it. The server has answered sooner than it can end a motion, and there was no time for a
+        second run to end by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

@@ -36,25 +36,29 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 STOPS_S: Final = 1.0
 """Time in s within which a stop is usually answered."""
 VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
-"""Time in s from the server's first reply after an absence to the first VOLTS query.
+"""Time in s from the server's first reply after an absence to the first voltage query (VOLTS).
 
 The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
-"""Unanswered requests delay a VOLTS query until this time in s after the previous one, at most."""
-SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
-"""Times in s after which the driver sends HELLO to a silent server.
+"""Longest time in s between two voltage queries (VOLTS) that unanswered requests can cause.
 
-``SILENT_S``: from the last reply, plus the duration of two exchanges.
+VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
+the driver delays VOLTS.
+"""
+SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
+"""Times in s after which the driver sends the query HELLO to a silent server.
+
+``SILENT_S``: from the last reply, plus twice the average duration of a query.
 
 ``SILENT_AFTER_MOVE_S``: from the last reply, while a duplicate of a move may be running.
 
 ``GREET_AGAIN_S``: between two HELLOs.
 """
 COPY_S: Final = 0.25
-"""Time in s after a move within which the server must answer ENC or HELLO.
+"""Time in s after a controlled move within which the server must answer a query (ENC or HELLO).
 
-If it does not, a duplicate of the move may be running.
+If it does not, it may be executing a duplicate of the move.
 """
 
 
@@ -212,15 +216,19 @@ class Pilot(Hearing):
 
     @property
     def _suspects_copy(self) -> bool:
-        """Whether a duplicate of the last move may be running, because no reply excludes it."""
+        """Whether the server may be executing a duplicate of the last controlled move.
+
+        It does not answer during a move, so a reply that came after the move would exclude this.
+        """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free
 
     @property
     def _copy_stop_s(self) -> float:
-        """The time at which to stop a suspected duplicate of a move, or infinity.
+        """The time at which to stop a suspected duplicate of a controlled move, or infinity.
 
-        SL and SS stop the duplicate. After RM or B, they would hang the server.
+        The stop commands are SL and SS. After a forward or backward drive, they would hang the
+        server.
         """
         if self.state is not State.STILL or not self._suspects_copy:
             return math.inf
@@ -231,9 +239,10 @@ class Pilot(Hearing):
         return max(self._rested_s + silent_s, self._copies_stopped_s + REPEAT_S, apart_s)
 
     def _may_ask_volts(self, now: float) -> bool:
-        """Return whether VOLTS may be sent now: it crashes a server that is starting up.
+        """Return whether the query of the battery voltage (VOLTS) may be sent now.
 
-        An unanswered request may be the only sign of a short restart.
+        VOLTS crashes a server that is starting up. So it also waits after an unanswered request,
+        because the server may have been restarted.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

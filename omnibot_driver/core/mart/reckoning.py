@@ -2,8 +2,9 @@
 
 """Dead reckoning: the robot's pose at the last encoder count.
 
-The right wheel measures a turn on the spot, until the server reports its angle in the reply to SM.
-This module knows counts, degrees and metres; it does not know commands. The caller passes the time.
+During a turn on the spot, the right wheel's encoder measures the angle. At its end, the server
+reports the angle in the reply to the stop, and this angle replaces the wheel's. This module knows
+counts, degrees and metres; it does not know commands. The caller passes the time.
 """
 
 import math
@@ -22,7 +23,7 @@ from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
 BEGIN_RADPS: Final = 0.03
-"""Standard deviation in rad/s of the turn rate in RM before the server reports a heading.
+"""Standard deviation of the turn rate, in rad/s, before the first heading of a forward drive (RM).
 
 Unequal motors cause this turn.
 """
@@ -38,7 +39,7 @@ lost."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_RAD = 0.1, math.radians(3.0)
-"""Errors of a controlled move that was not counted, as standard deviations.
+"""Errors of a controlled move whose size is estimated, not counted, as standard deviations.
 
 ``RUN``: relative error of its distance or turn. ``END_RUN_RAD``: additional error of a turn in rad.
 """
@@ -57,7 +58,8 @@ class Reckoning:
 
     ``turn``: angle of the present or last turn on the spot.
 
-    ``left_over_right``: expected ratio of wheel speeds while the heading is unknown.
+    ``left_over_right``: expected wheel speed ratio (left / right) while the heading is unknown,
+    else None.
 
     ``bend``: standard deviation of that ratio.
     """
@@ -161,9 +163,10 @@ class Reckoning:
         self.speeds.forget()
 
     def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add a complete run of the last move, before the run that was counted.
+        """Add the first of two runs of the last move to the pose. Only the second run was counted.
 
-        ``amount``: its expected distance in m, or its turn in rad.
+        A duplicate of the request has started the second run. ``amount``: the expected distance of
+        a complete run in m, or its turn in rad.
         """
         if is_straight:
             self.pose = self.pose.moved(Pose(amount, 0.0, 0.0))
@@ -230,8 +233,8 @@ class Reckoning:
     def maybe(self) -> tuple[float, float]:
         """Distance of the right wheel in m, and turn in rad, that the pose may lack.
 
-        While the counts do not show whether the last motion has begun, these are the values of
-        that motion. Otherwise both are zero.
+        The counts may not show whether the last motion has begun. In that case, the values are
+        those of this motion. Otherwise both are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -263,9 +266,9 @@ class Reckoning:
         return self.turn.add(turn_rad)
 
     def _correct_guess(self, told_rad: float, seconds: float) -> float:
-        """Correct a heading computed from commands, once the server reports the turn.
+        """Correct a heading that was computed from commands, once the server reports the turn.
 
-        Return the correction in rad. The robot has not moved by this angle.
+        Return the correction in rad. It is not a motion of the robot.
         """
         if not self._guessed:
             return 0.0
@@ -331,7 +334,8 @@ class Reckoning:
     def stale(self, now: float) -> tuple[float, float]:
         """Return by how many s the last heading is older than FRESH_S, and the resulting error.
 
-        The error is the heading's standard deviation in rad. Outside RM, both values are 0.
+        The error is the heading's standard deviation in rad. Both values are 0 except in a forward
+        drive (RM).
         """
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:

@@ -2,8 +2,8 @@
 
 """The turn of the robot within a motion, from the relative heading that the server reports.
 
-Some servers update it only in RM. This module knows rad and times; it does not know commands. The
-caller passes the time.
+Some servers update the heading only in a forward drive (RM). This module knows rad and times; it
+does not know commands. The caller passes the time.
 """
 
 import math
@@ -17,17 +17,19 @@ DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
 """Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
 OLD_RAD: Final = 0.01
-"""If the first heading in RM is this near (rad) to the last one before RM, it may be a late reply.
+"""Largest difference in rad at which the first heading in a forward drive (RM) may be an old one.
 
-The server resets the heading only when RM begins.
+RM sets the heading to zero. If the first heading in RM is nearly the last one before RM, it may be
+a late reply.
 """
 MOST_RAD: Final = 1e7
-"""Size in rad from which a heading is rejected, such as 1e15 degrees after a clock was set back.
+"""A heading of this size in rad or more is rejected, such as 1e15 degrees.
 
-The server integrates the turn rate over unsigned milliseconds.
+The server reports it after its clock was set back: it integrates the turn rate over unsigned
+milliseconds, and a negative time becomes huge.
 """
 AHEAD_S: Final = 0.3
-"""Longest time in s from a heading to an encoder count for which the heading is predicted."""
+"""Longest time in s for which the heading is extrapolated, from its last report to a count."""
 ODD_TIMES: Final = 3
 """After this number of implausible headings in a row, the last of them is accepted."""
 SPREADS: Final = 4
@@ -68,7 +70,10 @@ class RelativeHeading:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the heading is exactly zero, as it is before the first RM of a server."""
+        """Whether the heading is exactly zero.
+
+        A server reports zero before its first forward drive (RM).
+        """
         return self._angle_rad == 0.0
 
     def forget(self) -> None:
@@ -78,7 +83,7 @@ class RelativeHeading:
     def begin(self, now: float, *, anew: bool) -> None:
         """Record that a motion was started.
 
-        ``anew``: whether the motion is RM, which resets the heading.
+        ``anew``: whether the motion is a forward drive (RM), which sets the heading to zero.
         """
         if anew:
             self._before_rad, self._angle_rad = self._angle_rad or 0.0, None
@@ -88,7 +93,10 @@ class RelativeHeading:
         self.changed_s = now
 
     def started(self) -> None:
-        """Record that RM has certainly begun, so that each heading from now on belongs to it."""
+        """Record that a forward drive (RM) has certainly begun.
+
+        All headings that are reported from now on belong to this drive.
+        """
         self._before_rad = 0.0
 
     def tell(self, angle_rad: float, when: Moment, stood_s: float) -> bool:

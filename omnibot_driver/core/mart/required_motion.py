@@ -18,10 +18,10 @@ STANDING: Final = BodyTwist(0.0, 0.0, 0.0)
 SLOWEST_MPS, SLOWEST_RADPS = 0.02, 0.03
 """Limits of speed (m/s) and yaw rate (rad/s). A command below both is regarded as a standstill."""
 RAMP_LEFT: Final = 0.2
-"""Largest difference between a ramped yaw rate and its final value at which a turn begins.
+"""Part of the final yaw rate that may still be missing when a turn on the spot begins.
 
-It is a fraction of the final value. It applies to turns on the spot. An acceleration limit causes
-the ramp.
+An acceleration limit raises the commanded rate gradually (a ramp). The server cannot change the
+rate of a turn, so the turn waits for the end of the ramp.
 """
 
 

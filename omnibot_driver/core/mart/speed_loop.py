@@ -57,9 +57,9 @@ NEW_RADPS: Final = 0.03
 COPIED, MISSED, SLOW_TRIP_S = 0.4, 0.5, 0.03
 """Growth of the variance of the wheel speed ratio after an uncertain change of the motors' units.
 
-It is a factor of the squared relative change.
+The variance grows by one of these factors, times the square of the relative change.
 
-``COPIED``: if the change may arrive twice, because exchanges take longer than ``SLOW_TRIP_S`` (s).
+``COPIED``: if the change may arrive twice, because queries take longer than ``SLOW_TRIP_S`` (s).
 
 ``MISSED``: if the change was not answered.
 
@@ -172,9 +172,9 @@ class SpeedLoop(Motors):
 
     @property
     def measured_balance(self) -> float | None:
-        """Measured ratio of left to right motor speed, without a limit; None before a measurement.
+        """Measured ratio of left to right motor speed at equal units of both motors.
 
-        Both motors then have the same units.
+        The ratio is not limited. None before a measurement.
         """
         return self._line_ratio(self.units) if self._balance_is_measured else None
 
@@ -223,9 +223,10 @@ class SpeedLoop(Motors):
             self._clear(now)
 
     def _judge_missed(self, *, right_only: bool) -> None:
-        """Correct the units by those unanswered changes that have not arrived.
+        """Undo those unanswered changes of the units that have not arrived at the server.
 
-        These are the changes without which the units agree best with the measured speeds.
+        The driver finds them by the measured speeds: without these changes, the units fit the
+        speeds best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:

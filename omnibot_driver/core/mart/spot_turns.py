@@ -36,10 +36,10 @@ HELD, LEAST_LESSON = 0.6, 0.6
 EVEN: Final = 0.15
 """Relative change of a turn's rate below which the driver learns from the turn."""
 HINDERED, TOO_FAST = 0.8, 1.12
-"""Rates of two turns that show that something held the robot in the first turn.
+"""Limits by which the driver finds that something has held the robot in a turn.
 
-They are fractions of the commanded rates. The first turn is slower than HINDERED, the next one is
-faster than TOO_FAST.
+This is assumed if the turn is slower than HINDERED and the next turn is faster than TOO_FAST. Both
+are fractions of the commanded rates.
 """
 SAME, CORRECTIONS = 0.2, 2
 """Limits for turns that the driver begins anew to correct their rate.
@@ -62,12 +62,13 @@ SPINS_UP_S, SEEN_RAD, TOLD_RAD = 0.2, 0.1, 0.6
 UNSURE_RAD, UNSURE_PART = 0.15, 0.4
 """Largest accepted difference between the angle in the reply to a stop and the expected turn.
 
-It is UNSURE_RAD (rad), plus UNSURE_PART times the expected turn, plus the turn in two exchanges.
+A larger difference means that the number is an encoder count. The limit is UNSURE_RAD (rad), plus
+UNSURE_PART times the expected turn, plus the turn during two queries.
 """
 JUST_SET_S: Final = 2.0
-"""Time in s after SSP in which the server certainly still knows the speed of R and L."""
+"""Time in s for which the server certainly keeps the speed of turns that SSP has set."""
 SLOW_UNITS: Final = 20
-"""Speed of B SLOW, R SLOW and L SLOW, in motor units."""
+"""Speed of backward drives (B) and of turns on the spot with the word SLOW, in motor units."""
 SETTING_REFUSED: Final = (
     "the server does not accept a speed for turns on the spot, so it makes all of them at its"
     " own speed SLOW, which is faster than most commanded turns; `spin_speed: fixed` has the"
@@ -76,7 +77,7 @@ SETTING_REFUSED: Final = (
 
 
 class SpotTurns:
-    """The turns on the spot, by R and L.
+    """The turns on the spot, which the commands R (right) and L (left) start.
 
     ``units``: motor units of the last turn.
 
@@ -114,10 +115,10 @@ class SpotTurns:
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
         """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
 
-        SSP must be sent before the check of the IMU.
+        The caller must send it before the check of the IMU.
 
-        ``delay_s``: shortest time in s between two SSPs, so that no copy of the first one can
-        arrive after the second one.
+        ``delay_s``: shortest time in s between two of these requests, so that no copy of the first
+        one can arrive after the second one.
         """
         units = self._loop.spin_units(rate_radps)
         if self.is_fixed or units == self._set_units or now < self._set_s + delay_s:
@@ -126,7 +127,7 @@ class SpotTurns:
         return words.SSP.request(5, units)
 
     def answered(self, reply: Ok | Fail) -> bool:
-        """Evaluate the reply to SSP; return whether the server has accepted the setting."""
+        """Evaluate the reply to SSP, the setting of the speed; return whether it was accepted."""
         if isinstance(reply, Ok):
             self._set_units = self.units
         else:
@@ -224,8 +225,8 @@ class SpotTurns:
     ) -> None:
         """Evaluate the angle in the reply to the stop of a turn, or None if there was no angle.
 
-        ``uncounted_s``: time from the last count to the stop. ``disturbed``: the reply to SSP is
-        uncertain, so nothing is learned.
+        ``uncounted_s``: time from the last count to the stop. ``disturbed``: whether the network is
+        disturbed, so that nothing is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad

@@ -100,8 +100,9 @@ class Starts(FailedStarts):
     def _switch_motors_off(self, now: float) -> Packets:
         """Return the next request that switches off the motors, if it may be sent now.
 
-        It waits while a late reply could be taken for its reply. MSM also waits until no copy of
-        MCS can arrive after it.
+        The requests are MCS, which writes "stop" to both motors, and MSM, which ends the effect of
+        MCS. Each waits while a late reply could be taken for its reply. MSM also waits until no
+        copy of MCS can arrive after it.
         """
         request = self._switch_off.next()
         certain_s = self.conversation.certain_from_s(request.word)
@@ -126,7 +127,8 @@ class Starts(FailedStarts):
     def _name_may_come(self, start: Request, now: float) -> bool:
         """Return whether ``start`` is a controlled move, and an earlier HELLO may arrive after it.
 
-        HELLO would wait in the server's queue, perhaps ahead of a copy of the move.
+        The server might answer this HELLO just before it executes a copy of the move. The answer
+        would then wrongly suggest that there is no copy.
         """
         moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
         return moves and now < self._greeted_s + self._delay_s

@@ -73,7 +73,7 @@ ROLLING: Final = (State.DRIVING, State.REVERSING, State.TURNING)
 
 
 class Motion(Enum):
-    """A kind of motion. Its value names the commands with which the server begins such a motion."""
+    """A kind of motion. Its value names the commands that begin a motion of this kind."""
 
     NONE = "none"
     REFERENCE = "RM"
@@ -129,9 +129,9 @@ LAST_HALTS: Final[Mapping[Motion, tuple[Word, ...]]] = {
     Motion.TURN: (SS,),
     Motion.UNKNOWN: (SL, SS),
 }
-"""For each motion, the commands that stop the motors when the command port is silent.
+"""For each motion, the commands that the driver sends if the command port stays silent.
 
-They are the last resort: they may hang the server.
+They stop the motors by the stop port. They are the last resort, because they may hang the server.
 """
 
 STARTS: Final[Mapping[Word, Motion]] = {
@@ -149,8 +149,8 @@ STARTS: Final[Mapping[Word, Motion]] = {
 NEEDS_IMU: Final = frozenset({RM, B, R, L, TF, TB, MCR, MCL, SB})
 """Commands that need a working IMU.
 
-With a dead IMU, the server starts the motors and never answers, or it waits for the IMU. MCR and
-MCL detect a dead IMU, on some servers after a turn of 0.5 s.
+With a dead IMU, the server starts the motors and never answers, or it waits for the IMU. The
+controlled turns MCR and MCL report a dead IMU, on some servers after a turn of 0.5 s.
 """
 
 HARMFUL_LATE: Final = frozenset({SL, SS, R, L, TF, TB, MCR, MCL, MCS, TIME})

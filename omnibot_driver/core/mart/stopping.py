@@ -2,8 +2,8 @@
 
 """The stop of one motion: the commands to send until the server has acknowledged the stop.
 
-A stop may overtake the start. This module knows commands, replies and times; it does not know why
-the robot is stopped.
+The network may deliver a stop before the start that it should end, so a single reply is not always
+a proof. This module knows commands, replies and times; it does not know why the robot is stopped.
 """
 
 import math
@@ -126,9 +126,9 @@ class Stopping:
         return HALTS[self.motion]
 
     def asks_name(self, now: float) -> bool:
-        """Return whether to ask for the server's name too, because the move's reply may be lost.
+        """Return whether to send HELLO too, because the reply to the controlled move may be lost.
 
-        The name shows that the move has ended.
+        The server answers HELLO only after the move, so the answer shows that the move has ended.
         """
         return self.move is not None and now >= self.began_s + ASK_NAME_S
 
@@ -175,7 +175,8 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop, or None.
 
-        If more such replies came than were missing, it is the last one with a plausible value.
+        None if at most as many doubtful replies came as earlier replies were missing. Otherwise the
+        result is the last reply with a plausible value.
         """
         if len(self._doubtful) <= self._owed:
             return None

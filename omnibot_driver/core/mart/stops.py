@@ -273,7 +273,8 @@ class Stops(Ground, ABC):
     def _outlives(self, reply: Reply) -> None:
         """Record that the server answers a stop only after the driver has used the stop port.
 
-        Its stop port could hang the next RM; see docs/boards/mart.md.
+        In this state, the server's stop port could hang the next forward drive (RM); see
+        docs/boards/mart.md.
         """
         ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
         if ends and self.motion is not Motion.SPIN:

@@ -2,10 +2,10 @@
 
 """The commands that switch off a motor that is on although the server knows of no motion.
 
-The public server may leave a motor on after TF or TB. A server that was restarted in a motion may
-have left both on. No stop switches them off. MCS writes both motors; then the server refuses all
-motions until MSM. This module knows commands and replies; it does not know when the robot is at
-rest.
+The public server may leave a motor on after a straight move (TF or TB). A server that was restarted
+in a motion may have left both motors on. No stop command switches them off. MCS writes the speeds
+of both motors, and the server then refuses all motions until MSM. This module knows commands and
+replies; it does not know when the robot is at rest.
 """
 
 from typing import Final
@@ -16,7 +16,7 @@ from omnibot_driver.core.mart.words import MCS, MSM, UNSUPPORTED, Request, Word
 OFF: Final = MCS.request(128, 128)
 """The request that writes "stop" to both motors."""
 RELEASE: Final = MSM.request()
-"""The request that ends MCS. Without MCS in progress, it does nothing."""
+"""The request that ends the direct control of the motors by MCS. Without MCS, it does nothing."""
 
 
 class SwitchOff:
@@ -24,14 +24,19 @@ class SwitchOff:
 
     ``needed``: whether a motor may be on.
 
-    ``underway``: whether MCS may be in progress, so that the server refuses motions.
+    ``underway``: whether MCS (direct control of the motors) may be in progress, so that the server
+    refuses motions.
     """
 
     def __init__(self) -> None:
         self.connect()
 
     def connect(self) -> None:
-        """Begin a new connection. Its server may support MCS, even if an earlier server did not."""
+        """Begin a new connection.
+
+        Its server may support MCS (direct control of the motors), even if an earlier server did
+        not.
+        """
         self.needed = self.underway = False
         self._supported = True
 
@@ -42,7 +47,7 @@ class SwitchOff:
     def begins(self, *, straight: bool) -> None:
         """Record that a motion begins, which overwrites the units of both motors.
 
-        ``straight``: whether the motion is TF or TB, after which a motor may stay on.
+        ``straight``: whether it is a straight controlled move, after which a motor may stay on.
         """
         self.needed = straight and self._supported
 
@@ -51,7 +56,10 @@ class SwitchOff:
         self.underway = self._supported
 
     def next(self) -> Request:
-        """Return the next request: OFF if a motor may be on, else RELEASE."""
+        """Return the next request: OFF if a motor may be on, else RELEASE.
+
+        OFF is the command MCS, which writes "stop" to both motors. RELEASE (MSM) ends its effect.
+        """
         return OFF if self.needed else RELEASE
 
     def sent(self) -> None:

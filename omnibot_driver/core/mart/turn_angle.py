@@ -19,7 +19,7 @@ NO_CORRECTION: Final = 0.0
 class TurnAngle:
     """The angle of the present turn on the spot, or of the last one.
 
-    A returned correction changes the pose's heading, in rad.
+    Some methods return a correction, which the caller adds to the pose's heading, in rad.
 
     ``spun_rad``: the wheel's turn; after ``record`` the recorded turn.
     """
@@ -34,7 +34,7 @@ class TurnAngle:
         self._may_be_recorded = False
 
     def forget(self) -> None:
-        """Reject later records of the last turn, because a new odometry frame has begun."""
+        """Reject records of the last turn from now on, because the odometry frame was reset."""
         self._may_be_recorded = False
 
     def add(self, turn_rad: float) -> float:

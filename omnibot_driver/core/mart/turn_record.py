@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The angle of a controlled turn, as the server has recorded it (LAST TURN).
+"""The angle of a controlled turn, as the server has recorded it in a file (LAST TURN).
 
-The public server can send only about 1,000 files. This module knows the form of the file; it does
-not know when the file is downloaded.
+The public server never closes a sent file. It can send only about 1,000, so few are downloaded.
+This module knows the form of the file; it does not know when the file is downloaded.
 """
 
 import re
@@ -14,10 +14,10 @@ from omnibot_driver.core.mart.words import Request
 SAME_DEG: Final = 0.5
 """Largest accepted difference between the requested angle in degrees and the one in the file."""
 LEAST_RAD, ENOUGH_RAD = 1.0, 12.0
-"""Sums of the recorded angles, in rad.
+"""Limits of the sum of all angles that were read from records, in rad.
 
 From LEAST_RAD on, the driver uses the ratio of the motors' speeds that the records show. From
-ENOUGH_RAD on, it downloads no record.
+ENOUGH_RAD on, it downloads no more records.
 """
 MOST: Final = 30
 """Largest number of records that one run of the driver downloads."""
@@ -62,15 +62,21 @@ class TurnRecords:
         return self._told_rad / self._wheel_rad - 1.0 if self._told_rad >= LEAST_RAD else None
 
     def asked(self) -> None:
-        """Record that a download begins. It counts as a failure until ``used`` is called."""
+        """Record that a download begins.
+
+        It is regarded as a failure until ``used`` reports that the odometry has used the record.
+        """
         self._downloads += 1
         self._failures += 1
 
     def degrees(self, name: str, pieces: list[bytes], request: Request) -> float | None:
-        """Return the recorded angle as ``recorded_deg`` does, from the file called ``name``.
+        """Return the angle of a turn in degrees, with the server's sign, from its file.
 
-        Return None if ``name`` is the name of the previous file: the server could then not write
-        a new file.
+        ``name``, ``pieces``: name and content of the file. ``request``: the turn's command.
+
+        Return None if the file records another turn or has no angle. Return None also if the
+        previous file had the same name: the server could not write a new file, and has sent the old
+        one again.
         """
         again, self._name = name == self._name, name
         return None if again else recorded_deg(pieces, request)
@@ -86,7 +92,10 @@ class TurnRecords:
         self._wheel_rad += abs(wheel_rad)
 
     def cancelled(self) -> None:
-        """Record that the download has shown nothing, because a command or a job has ended it."""
+        """Record that a command or a job has ended the download before the file was complete.
+
+        This shows nothing about the server, so the download is not regarded as a failure.
+        """
         self._failures -= 1
 
 

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The distance rolled by the right wheel, from an encoder count that begins anew in each motion.
+"""The distance rolled by the right wheel, from its encoder count.
 
-The third implausible count in a row is accepted. This module knows counts and times; it does not
-know the robot's motion. The caller passes the time.
+The count begins at zero in each motion. The third implausible count in a row is accepted. This
+module knows counts and times; it does not know the robot's motion. The caller passes the time.
 """
 
 import math

@@ -132,7 +132,8 @@ NO_IMU: Final = "could not init"
 RESET = _word("RST IMU", Kind.CHECK, _OK, 0.3, {NO_IMU, CONFLICT, UNSUPPORTED}, least_s=0.09)
 """The check of the IMU without a motion.
 
-A failure closes the IMU on the server, so the driver repeats the check.
+After a failure, the server no longer uses the IMU until the command succeeds. So the driver repeats
+it.
 """
 CHECK = _word("MCR SLOW", Kind.CHECK, _OK, 0.8, MOVING, least_s=0.32)
 """The check of the IMU for servers without RST IMU: a turn by 0 degrees.

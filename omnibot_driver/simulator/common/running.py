@@ -22,8 +22,10 @@ UNREAD_LIMIT = 4095
 """Number of unread bytes that a Linux terminal holds; further bytes are lost."""
 
 LONGEST_CATCH_UP_S = 1.0
-"""If the thread is late by at most this time, in s, it runs the missed ticks. If it is later, it
-skips them."""
+"""Longest delay in s that the thread makes up for by running the missed ticks.
+
+After a longer delay, it skips them.
+"""
 
 _JOIN_S = 5.0
 

@@ -34,8 +34,10 @@ class FrontTeensy(Teensy[FrontConfig]):
 
     ``diagnosis``, ``error_flags``: status bits in the ``fwl`` line, without the frame counter.
 
-    ``frozen``: the sensor repeats its last angle. ``absent``: the Teensy reports the angle 0 and
-    unfinished magneto core loops.
+    ``frozen``: whether the sensor repeats its last angle.
+
+    ``absent``: whether no sensor answers. The Teensy then reports the angle 0 and the status bits
+    of a sensor that has not finished its first measurement.
     """
 
     version = 100

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""One wheel as the board sees it. It takes encoder edges, and gives ticks, speed and motor duty.
+"""One wheel as the board sees it. Input: encoder edges; output: ticks, speed and motor duty.
 
 This module knows the firmware's quirks of counting and measuring. It does not know the protocol or
 the other wheel.

@@ -92,9 +92,12 @@ QUIRKS: dict[Firmware, Quirks] = {"documented": DOCUMENTED, "firmware": FIRMWARE
 class MotorSettings:
     """A first-order motor with dry friction.
 
-    rpm_per_percent: for each percent of duty beyond the dead zone.
+    rpm_per_percent: speed in RPM for each percent of duty beyond the dead zone.
+
     friction_rpm_per_s: additional deceleration without power.
+
     second_time_constant_s, dead_time_s: lag and delay of the power stage, before the motor.
+
     backlash_turns: play between motor and encoder, in turns of the wheel.
     """
 

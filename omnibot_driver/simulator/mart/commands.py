@@ -22,9 +22,9 @@ It returns the reply, or None if the reply comes later or never.
 """
 
 NEED_ALL = ("VOLTS", "RM ", "MCF", "MCB", "TF", "PTF", "TB", "R", "L", "MCR", "MCL")
-"""Commands that need objects which the server does not have at once.
+"""Commands that crash a server that is still starting up.
 
-The server creates these objects after it has opened its ports.
+They need objects that the server creates only after it has opened its ports.
 """
 MISSNG, MISSING = "fail command missng parameter", "fail command missing parameter"
 BAD_FORMAT = "fail improper command format"
@@ -35,7 +35,9 @@ class Row(NamedTuple):
     """A command and its handler.
 
     word: the complete command, or its beginning if ``begins``.
-    moves: whether a motion, a recording or MCS makes the server refuse the command.
+
+    moves: whether the server refuses the command while a motion, a recording or direct control of
+    the motors (MCS) is in progress.
     """
 
     word: str
@@ -83,7 +85,11 @@ def _spin(server: "MartServer", text: str) -> str | None:
 
 
 def _joined(server: "MartServer") -> bool:
-    """Return whether the server refuses L, because a motion, a recording or MCS is in progress."""
+    """Return whether the server refuses the spin L.
+
+    It refuses L during a motion, a recording or direct control of the motors (MCS). With the quirk
+    ``left_spin_in_reference_move``, it accepts L during the forward drive RM.
+    """
     if not server.quirks.left_spin_in_reference_move:
         return server.conflict
     others = [each for each in server.motions if each.kind is not Kind.REFERENCE]
@@ -91,7 +97,7 @@ def _joined(server: "MartServer") -> bool:
 
 
 def _timed(server: "MartServer", text: str) -> str | None:
-    """Start TF or TB: an optional speed word, then a distance in inches.
+    """Start a straight controlled move (TF, TB): an optional speed word, then a distance in inches.
 
     Without the quirk ``speed_word_first``, the speed word may also follow the distance.
     """
@@ -208,7 +214,7 @@ def _measured(server: "MartServer", text: str) -> str | None:
 
 
 def _tuned(server: "MartServer", text: str) -> str | None:
-    """Start PTF. The request has a distance in inches and three gains.
+    """Start a straight move with gains (PTF). The request has a distance in inches and three gains.
 
     The gains have no effect in the simulation.
     """
@@ -229,7 +235,7 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """Set the clearance in front, in inches, below which the next TF stops (TFSFC)."""
+    """Set the front clearance in inches below which the next move forward (TF) stops (TFSFC)."""
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 

@@ -11,8 +11,10 @@ SAMPLE_S = 0.01
 START_SAMPLES, STOP_SAMPLES, STILL_SAMPLES = 60, 75, 15
 SLOW_STOP_SAMPLES = 188
 FAST_REGISTER = 45
-"""RM is regarded as fast if a motor register is below this value (0 is full speed forward). A fast
-RM stops gently."""
+"""Motor register below which a forward drive (RM) is regarded as fast; 0 is full speed.
+
+A fast drive stops gently.
+"""
 SETUP_S = 0.05
 BIAS_SAMPLE_S = 0.0107
 LOST_AT_START_S, LOST_S = 0.5, 1.5
@@ -53,11 +55,17 @@ class Motion:
     """The state of the last motion of a kind, kept after its end.
 
     running: whether the motion is in progress; the server then refuses other motions.
+
     watching: whether the module ``alarms`` supervises the motion.
-    posts: number of start and stop notices that no waiter has taken yet.
+
+    posts: number of notices of a start or stop that no waiting thread of the server has taken yet.
+
     right, left: motor registers, as the server knows them.
+
     sampled_s: time of the last sample of the IMU, or -1.
+
     moved_s, turned_s: first and last time at which the wheel turned.
+
     released: whether the stop port ended the motion.
     """
 

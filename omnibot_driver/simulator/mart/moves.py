@@ -81,7 +81,7 @@ def _set_up(server: "MartServer", kind: Kind, acceleration: int) -> None:
 
 
 def take_bias(server: "MartServer", kind: Kind | None, left: int, missed: int) -> None:
-    """Take a sample of the gyro bias, before a motion or for SB.
+    """Take a sample of the gyro bias, before a motion or for the bias measurement SB.
 
     ``left``: number of samples still to take. ``missed``: number of failed samples in a row.
 
@@ -153,7 +153,8 @@ def start_spin(server: "MartServer", word: str, *, left: bool) -> None:
 def start_controlled_spin(server: "MartServer", angle_deg: int, word: str, *, left: bool) -> None:
     """Start a spin by an angle (MCR, MCL).
 
-    0 degrees or less only test the IMU; ``probe_turns`` also runs the motors.
+    An angle of 0 degrees or less only tests the IMU. With the quirk ``probe_turns``, the motors
+    then run too.
     """
     motion = server.motions[Kind.CONTROLLED_SPIN]
     motion.word = "SLOW" if angle_deg < motions.SMALL_SPIN_DEG else word
@@ -233,7 +234,7 @@ def stop(server: "MartServer", kind: Kind) -> None:
 
 
 def stopped(server: "MartServer", kind: Kind) -> None:
-    """Answer SM or SRM. The robot has come to rest, or has failed to come to rest."""
+    """Answer a stop (SM or SRM). The robot has come to rest, or has failed to come to rest."""
     motion = server.motions[kind]
     motion.running = motion.released = False
     if kind is Kind.LINEAR:
@@ -249,7 +250,7 @@ def stopped(server: "MartServer", kind: Kind) -> None:
 
 
 def change_linear(server: "MartServer", right: int, left: int) -> bool:
-    """Change the speeds of F or B (CS). Return whether the server accepts the change."""
+    """Change the speeds of the drive F or B (CS). Return whether the server accepts the change."""
     motion = server.motions[Kind.LINEAR]
     if motion.stopping:
         return False
@@ -258,7 +259,7 @@ def change_linear(server: "MartServer", right: int, left: int) -> bool:
 
 
 def change_reference(server: "MartServer", right: int, left: int) -> bool:
-    """Change the speeds of RM (RMCS). Return whether the server accepts the change."""
+    """Change the speeds of a forward drive (RMCS). Return whether the server accepts the change."""
     motion = server.motions[Kind.REFERENCE]
     if motion.stopping or motion.starting:
         return False

@@ -179,9 +179,9 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give the first waiter the notice that a motion of this kind has started or ended.
+        """Give a notice to the first waiting port: a motion of this kind has started or ended.
 
-        Without a waiter, keep the notice.
+        If no port waits, keep the notice.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -47,7 +47,7 @@ def fine(server: "MartServer", text: str) -> str | None:
 
 
 def bare_fail(server: "MartServer", text: str) -> str | None:
-    """Answer ``fail`` to MNLV, because the server has no calibration files."""
+    """Answer ``fail`` to MNLV, which needs calibration files that the server does not have."""
     return "fail"
 
 
@@ -72,7 +72,7 @@ def heading(server: "MartServer", text: str) -> str | None:
 
 
 def last_measured(server: "MartServer", text: str) -> str | None:
-    """Answer 0 to MCD and MD, because the distances that they report are not simulated."""
+    """Answer 0 to MCD and MD. The distances that they report are not simulated."""
     return "ok 0"
 
 
@@ -102,7 +102,7 @@ def _tell_status(server: "MartServer") -> None:
 
 
 def sonar(*, backward: bool) -> Handler:
-    """Return the handler of SFC or SRC.
+    """Return the handler of a sonar query (SFC: front, SRC: rear).
 
     The handler reads the sonar once, or three times if an obstacle is near.
     """
@@ -131,7 +131,10 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 
 
 def take_bias(server: "MartServer", text: str) -> str | None:
-    """Measure the gyro bias (SB). A closed IMU is opened first; if that fails, SB fails."""
+    """Measure the gyro bias (SB). If the server has stopped using the IMU, it first opens the IMU.
+
+    If that fails, SB fails.
+    """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):
         server.later(RESET_FAILS_S, _fail)
@@ -258,7 +261,7 @@ def set_motors(server: "MartServer", text: str) -> str | None:
 
 
 def stop_motors(server: "MartServer", text: str) -> str | None:
-    """Handle the command MSM: stop the motors if the command MCS started them."""
+    """Handle the command MSM: stop the motors if MCS (direct control) has started them."""
     if server.manual:
         server.manual = False
         server.drive(128, 128)

@@ -100,17 +100,30 @@ class MartSettings:
     """Settings of the controller, its robot and its surroundings.
 
     speed_mps_per_unit: wheel speed for one register unit at ``nominal_volts``.
+
     dead_zone_units: a motor turns only above this number of units; the excess gives speed.
+
     motor_inequality: how much faster the left motor is, as a fraction of the speed.
+
     encoder_sign: -1 if the encoder counts down while the robot drives forward.
-    gyro_bias_dps: unknown to the server before SB.
+
+    gyro_bias_dps: bias of the gyro. The server knows it only after the command SB.
+
     gyro_noise_dps: standard deviation of a gyro sample while a wheel turns.
-    imu_dies_s, imu_returns_s: times since construction.
+
+    imu_dies_s, imu_returns_s: times since construction at which the IMU fails and works again.
+
     motor_board_silent: whether the serial line to the motor board is cut.
-    motor_status: bits of MCSTAT, except the voltage's; a trip or short circuit stops the motor.
+
+    motor_status: status bits of the motor board, except those of the voltage; a trip or short
+    circuit stops the motor.
+
     front_m, rear_m: distances from the start to walls across the x axis.
+
     dock_m: distance from the start to the dock, forward.
-    reference_start_fails: whether RM is answered ``fail`` although the robot moves.
+
+    reference_start_fails: whether the server answers ``fail`` to RM although the robot moves.
+
     clock_s: initial wall clock in Unix time.
     """
 

@@ -21,14 +21,14 @@ NEAR_READINGS_S = 0.15
 """Duration in s of the three sonar readings that confirm a near obstacle."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Error in s of a negative duration: the server counts milliseconds without a sign."""
+"""Time in s that the server adds to a negative duration, because it counts ms without a sign."""
 FILES = 100
 
 Then = Callable[..., None]
 
 
 class Waiter(NamedTuple):
-    """The thread of a port while it waits for the notice that a motion has started or stopped."""
+    """A port's thread that waits for the notice that a motion has started or stopped."""
 
     port: int
     kind: Kind
@@ -122,7 +122,7 @@ class ServerState:
     def conflict(self) -> bool:
         """Whether the server refuses motions.
 
-        The server refuses motions while a motion, a recording or MCS is in progress.
+        It does so during a motion, a recording or direct control of the motors (MCS).
         """
         return self.manual or self.recording or any(each.running for each in self.motions)
 
@@ -162,7 +162,7 @@ class ServerState:
         return self.alarm is Kind.REFERENCE or not self.quirks.heading_in_reference_moves_only
 
     def sample_reference(self, *, first: bool) -> None:
-        """Record the time of a sample of RM.
+        """Record the time at which the server samples the IMU in a forward drive (RM).
 
         With the quirk ``heading_starts_off``, the first sample changes the heading. If the clock
         was set back, this change is huge.

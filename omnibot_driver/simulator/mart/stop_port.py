@@ -21,7 +21,7 @@ CONTROLLED = (Kind.CONTROLLED_LINEAR, Kind.MEASURED_LINEAR, Kind.CONTROLLED_SPIN
 
 
 def obey(server: "MartServer", text: str) -> None:
-    """Execute one stop command: SL, SS or SDR."""
+    """Execute a command of the stop port: SL or SS (stops), or SDR (limits a move)."""
     quirks = server.quirks
     if text == "SL":
         _stop_first(server, DRIVES)

@@ -30,9 +30,9 @@ def integer(text: str) -> int:
 
 
 def fields(text: str) -> list[str]:
-    """Return one part of the text for each blank: all that follows this blank.
+    """Return, for each blank in the text, the text that follows this blank.
 
-    ``integer`` reads the number at the beginning of a part.
+    ``integer`` reads the number at the beginning of each result.
     """
     return [text[place + 1 :] for place, letter in enumerate(text) if letter == " "]
 

@@ -28,7 +28,8 @@ class BoardSettings:
     """Properties of a simulated board, and deviations of its robot from the ideal.
 
     * ``frame``: meaning of the 25 Hz frame. "earth": difference of positions in the board's earth
-      frame. "body": sum of the ticks' displacements. "wheel_counts": manual, Deprecated.
+      frame. "body": sum of the ticks' displacements. "wheel_counts": encoder counts, as in the
+      manual's section Deprecated.
     * ``delta_period_s``: a multiple of 10 ms. The manual also has 10 Hz.
     * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: LSB per rad/s.
     * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.

@@ -2,7 +2,8 @@
 
 """A model of a MART server, its network and its driver, for a search of all reachable states.
 
-The model has no clock. A late copy of a command arrives at any later step, or is lost.
+A *world* is the state of all three together. A *step* leads from one world to the next. The model
+has no clock: a late copy of a command arrives at any later step, or is lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -77,7 +78,11 @@ Step = tuple[str, World]
 
 
 def allowed(world: World, word: str, rules: Rules) -> bool:
-    """Return whether the tables and the rules about time let the driver send ``word`` now."""
+    """Return whether the modelled driver may send ``word`` now.
+
+    ``rules``: the table of the commands allowed in each state and motion. In addition, the driver
+    must have waited for late copies and checked the IMU, as the real driver does.
+    """
     driver = world.driver
     row = BY_TEXT[word]
     if not rules(driver.state, word, driver.motion):
@@ -195,7 +200,10 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether the driver had to use the stop port before it had ever stopped the server."""
+    """Return whether the driver has used the stop port without ever having stopped the server.
+
+    In that case, it must first find out which motion is in progress.
+    """
     spent = driver.unanswered > UNANSWERED and driver.motion is Motion.UNKNOWN
     return spent and not driver.greeted
 
@@ -255,7 +263,10 @@ def _said(word: str, world: World) -> Iterator[Step]:
 
 
 def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
-    """Yield the steps that may follow a reply: it is lost, late or received."""
+    """Yield the steps that may follow the server's reply: it is lost, late or received.
+
+    ``what``: name of the step. ``world``: the world before the reply.
+    """
     if reply is None:
         yield what, world
         return

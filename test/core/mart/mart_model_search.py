@@ -2,7 +2,10 @@
 
 """A search through all reachable worlds of ``mart_model`` for one that must not occur.
 
+A world is the state of server, driver and network together.
+
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_model_search.py 3``: up to 3 late copies.
+
 Results: docs/boards/mart.md.
 """
 

@@ -30,7 +30,7 @@ class Server(NamedTuple):
 
     ``released``: the stop port has stopped a motion that the server regards as still in progress.
 
-    ``manual``: MCS is in progress, so motions are refused.
+    ``manual``: the motors are under direct control (MCS), so motions are refused.
     """
 
     motion: Motion = Motion.NONE

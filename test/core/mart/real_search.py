@@ -1,8 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A bounded search that runs the real driver against the simulated firmware.
+"""A bounded search that runs the real driver against the simulated firmware, in many trials.
 
-A *wish* is what a user may want, such as "forward".
+A *trial* is one run of driver and server. In most trials, a user commands a sequence of *wishes*,
+such as "forward" or "stop", and the network disturbs a single datagram. The *fate* of this datagram
+is one of four faults: it is lost, it is late, it arrives twice, or the IMU dies as it is sent. In
+the other trials, a driver starts while the server may be executing a command.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/real_search.py`` runs all sets of trials.
 """
@@ -38,9 +41,9 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
     "e-stop": lambda bench: (bench.estop(True), bench.run(0.4), bench.estop(False)),
 }
 MOST_DATAGRAMS: Final = 7
-"""Largest number of a wish's datagrams that are disturbed in each direction, one in each trial.
+"""Largest number of disturbed datagrams in each direction, divided by the number of wishes.
 
-Regular queries are not counted.
+Each of these datagrams is disturbed in a trial of its own. Regular queries are not counted.
 """
 PROOF_S: Final = 0.25
 """Longest time in s from the failure of the IMU to the start of a motion.
@@ -49,11 +52,11 @@ In this time, the check before the motion may have been made while the IMU still
 motion is a fault of the driver.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
-"""Commands that start the motors without checking the IMU."""
+"""Commands with which the server starts the motors without checking the IMU."""
 MET: Final = (b"", b"RM 30", b"B SLOW", b"L SLOW", b"TF 300", b"MCR 350")
-"""Commands that the server may be executing when a driver starts."""
+"""Commands that the server may be executing when the driver starts, one in each trial."""
 AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
-"""Times in s for which the network is interrupted at first, one in each trial."""
+"""Times in s for which the network is interrupted from the driver's start on, one in each trial."""
 BACK_S: Final = (0.2, 0.7, 30.0)
 """Times in s for which the network works after the first interruption.
 
@@ -63,17 +66,22 @@ ENDS_S, SETTLED_S = 16.0, 1.5
 
 
 class Trial(NamedTuple):
-    """One run of the search: wishes with one disturbed datagram, or a driver that starts.
+    """One run of the search.
+
+    Either a user commands ``wishes`` and one datagram is disturbed, or (without wishes) a driver
+    starts while the server executes ``met`` and the network is interrupted.
 
     ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
 
     ``number``: the disturbed datagram's number in that direction, from 0, without regular queries.
 
-    ``met``: what the server is executing when the driver starts.
+    ``fate``: what happens to this datagram.
 
-    ``away_s``: the length of a first interruption of the network.
+    ``met``: command that the server is executing when the driver starts; empty for none.
 
-    ``back_s``: the time until a second interruption, of 1 s.
+    ``away_s``: duration of a first interruption of the network, from the start on.
+
+    ``back_s``: time from its end to a second interruption, of 1 s.
 
     ``ways``: the directions that are interrupted.
     """
@@ -89,7 +97,7 @@ class Trial(NamedTuple):
 
 
 class Carrier:
-    """A network that treats each datagram as the trial prescribes."""
+    """A network that delivers all datagrams, apart from the faults that the trial prescribes."""
 
     def __init__(self, bench: MartBench, trial: Trial) -> None:
         self.bench, self.robot, self.trial = bench, bench.robot, trial
@@ -157,23 +165,24 @@ def _ahead(bench: MartBench) -> tuple[float, float, float]:
 
 
 def pairs() -> Iterator[Trial]:
-    """Yield the trials of all pairs of wishes, from ``each_fate``."""
+    """Yield trials of all sequences of two wishes, each trial with a fault of one datagram."""
     for pair in product(WISHES, WISHES):
         yield from each_fate(pair)
 
 
 def eights() -> Iterator[Trial]:
-    """Yield the trials of sequences of eight wishes, from ``each_fate``."""
+    """Yield trials of sequences of eight wishes, each trial with a fault of one datagram."""
     names = tuple(WISHES)
     for step in range(len(names)):
         yield from each_fate(tuple(names[n * step % len(names)] for n in range(8)))
 
 
 def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
-    """Yield trials of these wishes. In each trial, one datagram has one of the faults in FATES.
+    """Yield trials in which a user commands these wishes, and one datagram has a fault.
 
-    The trials cover all faults of all datagrams, but of at most MOST_DATAGRAMS for each wish and
-    direction. A run without faults counts the datagrams.
+    There is one trial for each of the four faults of each datagram, in both directions. Of all
+    datagrams in one direction, only the first MOST_DATAGRAMS times the number of wishes are
+    disturbed. A run without faults counts the datagrams.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))
@@ -184,7 +193,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
 def beginnings() -> Iterator[Trial]:
     """Yield the trials in which a driver starts while the server may be executing a command.
 
-    One trial for each command in ``MET`` with each interruption of the network.
+    There is one trial for each command in ``MET`` with each interruption of the network.
     """
     for met, away_s, back_s in product(MET, AWAY_S, BACK_S):
         for ways in ((0, 1), (0,), (1,)):
@@ -197,7 +206,10 @@ def _ready() -> MartBench:
 
 
 def ran(trial: Trial) -> Carrier:
-    """Run the trial to its end, and return its network, which has the end state."""
+    """Run the trial to its end, and return its network.
+
+    The caller can read the final state of robot, server and driver from the network.
+    """
     # The driver compares its words by identity, so the copy has the same words.
     same = {id(word): word for word in vars(words).values() if isinstance(word, words.Word)}
     bench = copy.deepcopy(_ready(), same) if trial.wishes else MartBench("firmware", seed=3)
@@ -258,7 +270,11 @@ def search(trials: list[Trial]) -> list[tuple[Trial, str]]:
 
 
 def main() -> None:
-    """Run all sets of trials, or those named: ``pairs``, ``eights``, ``beginnings``."""
+    """Run all sets of trials, or only those that the command line names.
+
+    The names are ``pairs`` (of wishes), ``eights`` (sequences of eight) and ``beginnings`` (starts
+    of a driver).
+    """
     for name in sys.argv[1:] or SETS:
         began_s = time.monotonic()
         trials = list(SETS[name]())

@@ -114,9 +114,9 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The ok to another command may still be on its way. It could be taken for that to RST IMU.
+    """The ok to another command may still be on its way, and could be taken for that to RST IMU.
 
-    So the driver delays RST IMU until the late ok must come before the reply to RST IMU.
+    So the driver sends RST IMU, the check of the IMU, only when its reply must come after that ok.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -133,7 +133,8 @@ def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it()
 def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
     """The reply to a sonar query has not come in time, but may still come.
 
-    The driver delays another sonar query. It sends ENC at once, but regards the reply as doubtful.
+    The driver delays another sonar query. It sends the encoder query (ENC) at once, but regards the
+    reply as doubtful.
     """
     talk = conversation()
     talk.ask(words.SFC.request(), 1.0)
@@ -308,7 +309,7 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """RM sets the heading to zero. The first heading in RM still has the old value.
+    """A forward drive (RM) sets the heading to zero, but its first heading still has the old value.
 
     This heading is a late reply, so it is not used.
     """
@@ -324,9 +325,9 @@ def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> Non
 
 @pytest.mark.parametrize("reason", ["could not init", "command not supported"])
 def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
-    """An ``ok`` to the check of the IMU takes some time, but a failure may come at once.
+    """A check of the IMU answers ``ok`` only after some time. A failure may come at once.
 
-    The driver accepts an early failure, because the IMU is missing or the command is unknown.
+    For example, the IMU may be missing. So the driver accepts an early failure.
     """
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)

@@ -57,9 +57,10 @@ def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
 
 
 def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> None:
-    """All replies to RMRA in the first 0.9 s of a drive are lost. Then a heading arrives.
+    """All replies to the heading query in the first 0.9 s of a drive are lost. Then one arrives.
 
-    It is the first one, so it does not show that the heading is constant. The drive continues.
+    This heading is the first one, so it does not show that the heading is constant. The drive
+    continues.
     """
     bench, started_s = on(NetworkFaults(), "firmware"), math.inf
 
@@ -78,7 +79,7 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
 def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) -> None:
     """On a network with late replies, two headings are often equal by chance.
 
-    The driver does not report that the IMU is dead.
+    Only three equal headings show a dead IMU, so the driver does not report one.
     """
     for seed in (5, 12, 14):
         bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
@@ -89,7 +90,7 @@ def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) 
 
 
 def test_an_answer_to_hello_ends_the_wait_for_a_lost_count() -> None:
-    """In a drive, the reply to ENC is lost. Then the server answers a later HELLO.
+    """In a drive, the reply to the encoder query (ENC) is lost. Then a later HELLO is answered.
 
     The server answers in order, so the reply to ENC cannot come any more. The driver repeats ENC
     within 0.25 s of the loss.

@@ -48,7 +48,7 @@ def test_a_quiet_gyro_on_a_straight_way_is_not_a_dead_imu(firmware: Firmware) ->
 def test_each_motion_is_begun_and_stopped_by_its_own_words() -> None:
     """For each motion the driver sends one check of the IMU, one start and one stop.
 
-    A turn also needs SSP, for its speed.
+    Before a turn on the spot, it also sends SSP, which sets the speed of the turn.
     """
     bench = MartBench().ready()
     for vx, yaw_rate in ((0.3, 0.0), (-0.17, 0.0), (0.0, 0.5), (0.3, 0.0)):
@@ -90,9 +90,9 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 
 @pytest.mark.parametrize("firmware", ["firmware", "source"])
 def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> None:
-    """RM is lost after a curve. The server keeps the curve's heading.
+    """After a curve, the start of a forward drive is lost. The server keeps the curve's heading.
 
-    The driver sends RM again. The old heading does not turn the odometry.
+    The driver sends the start again. The old heading does not turn the odometry.
     """
     bench = MartBench(firmware, gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)
@@ -117,9 +117,9 @@ def test_a_start_that_is_lost_after_a_turn_is_said_again(firmware: Firmware) -> 
 def test_a_heading_that_begins_where_the_last_one_ended_is_of_the_new_motion(
     rate: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By chance, the first heading in RM equals the last heading of the motion before.
+    """By chance, the first heading in a forward drive equals the last one of the motion before.
 
-    The encoder then shows that RM arrived.
+    The encoder shows that the drive has begun, so the heading is used.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.4, 3.0)

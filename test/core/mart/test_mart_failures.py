@@ -55,7 +55,7 @@ def test_one_failed_reset_of_the_imu_is_not_a_dead_imu() -> None:
 
 
 def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
-    """After a stop that took 0.56 s to 0.6 s, the server rejects the next RM.
+    """After a stop that took 0.56 s to 0.6 s, the server rejects the next forward drive (RM).
 
     The driver sends RM again.
     """
@@ -70,7 +70,7 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The server answers the first RM with a failure, so the driver sends RM again soon.
+    """The server answers the start of a forward drive with a failure. The driver repeats it soon.
 
     Two seconds after the command, the speed is right.
     """
@@ -86,9 +86,10 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The server rejects one RM and obeys the next. Then the robot moves without a command.
+    """The server rejects one forward drive (RM) and obeys the next. The driver stops it.
 
-    Further motion stays allowed.
+    Then the robot moves without a command. The driver does not regard the server as defective, so
+    motion stays allowed.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.REFERENCE].samples = 58
@@ -121,9 +122,9 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
 
 
 def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None:
-    """The server rejects RM because of an obstacle that ended an earlier B.
+    """The server rejects a forward drive (RM) and gives the reason of an earlier backward drive.
 
-    The sonar shows no obstacle, so the driver repeats RM.
+    An obstacle ended that drive. The front sonar shows no obstacle, so the driver repeats RM.
     """
     bench = MartBench("source").ready()
     bench.server.motions[Kind.LINEAR].error = "insufficent clearence"
@@ -146,9 +147,10 @@ def test_an_rm_that_fails_by_the_obstacle_of_the_last_b_is_tried_again() -> None
 def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The IMU dies in a motion. The robot stops, and motion waits for a restart.
+    """The IMU dies in a motion. The driver stops the robot, and reports that the server is lost.
 
-    With the public source, the heading changes only in RM.
+    It refuses motion until the server is restarted. A server as in the public source reports
+    headings only in forward drives, so only these are tested there.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -225,7 +227,7 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """The server rejects RM although the robot moves, and SRM finds no motion.
+    """The server rejects a forward drive (RM) although the robot moves. The stop finds no motion.
 
     The driver switches the motors off, and then refuses motion.
     """
@@ -239,7 +241,7 @@ def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> N
 
 
 def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> None:
-    """The server rejects an RM. Five seconds later, the robot moves without a command.
+    """The server rejects a forward drive (RM). Five seconds later, the robot moves by itself.
 
     RM would have moved the robot at once, so the server is not defective. Motion stays allowed.
     """
@@ -257,7 +259,7 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 
 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
-    """The server rejects an RM. The network loses replies, and then delivers a late copy of an RM.
+    """The server rejects a forward drive (RM). Later, a copy of RM arrives while replies are lost.
 
     The driver stops the robot, but does not refuse motion for good.
     """
@@ -281,7 +283,7 @@ def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_th
 
 
 def test_a_stop_by_another_program_is_told_as_that_and_the_robot_drives_on() -> None:
-    """Another program stops the robot, so the server knows of no motion and rejects RMCS.
+    """Another program stops the robot. The server rejects the next change of speed (RMCS).
 
     The driver reports that another program may be the cause, and the robot drives on.
     """

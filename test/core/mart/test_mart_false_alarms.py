@@ -133,9 +133,10 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """The stop of a turn at a wrong rate yields no angle, as it takes long or its reply is late.
+    """A turn has a wrong rate, so the driver begins it anew. The stop before that yields no angle.
 
-    The driver learns the rate nevertheless. So it does not begin the same turn again.
+    The stop takes long, or its reply is late. The driver learns from the wheel nevertheless, so the
+    new turn has other motor units.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

@@ -111,7 +111,7 @@ def test_a_turn_whose_heading_was_not_read_is_not_added_to_the_drive_after_it() 
 
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> None:
-    """The first reply to ENC after each move is lost, but the server answers HELLO.
+    """The first reply to the encoder query (ENC) after each move is lost, but HELLO is answered.
 
     The driver then repeats ENC, and the robot reaches the goal.
     """

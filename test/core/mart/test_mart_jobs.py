@@ -41,7 +41,7 @@ def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
 
 
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
-    """The docking job sends TF DOCK and succeeds at the dock.
+    """A docking job sends a move that ends at the dock (TF DOCK). It succeeds at the dock.
 
     An e-stop cancels a second docking job.
     """
@@ -75,9 +75,9 @@ def test_docking_drives_no_further_than_it_may(longest_m: float) -> None:
 
 
 def test_a_robot_that_must_not_move_does_not_dock() -> None:
-    """The motor board reports a trip.
+    """The motor board reports that a motor has tripped, and a docking job is requested.
 
-    The driver does not send TF, and the job's result names the trip.
+    The driver does not start the move, and the job's result names the trip.
     """
     bench = MartBench(motor_status=4).ready()
     done = bench.job(Job.DOCK, "DOCK", 20)
@@ -201,9 +201,9 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A stop interrupts the download of the log, after EXIT has ended the server.
+    """A stop interrupts the download of the log, for which EXIT has ended the server.
 
-    The user must copy the file from the controller.
+    The job's result asks the user to copy the file from the controller.
     """
     bench = MartBench().ready()
     assert bench.job(Job.LOG).success
@@ -249,9 +249,9 @@ def test_only_a_log_that_was_started_ends_the_server() -> None:
 
 
 def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
-    """After a restart the server has lost its log. The driver refuses the download.
+    """A server is restarted and has lost its log. The driver refuses the download of the log.
 
-    EXIT would end the server without a file.
+    The download needs EXIT, which would end the server without a file.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -263,9 +263,9 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 
 
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
-    """After a lost reply, the repeated stop finds no motion, as after a restart.
+    """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
 
-    The heading shows that the log still exists.
+    The heading is not zero, so the server was not restarted. The log can still be downloaded.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -326,14 +326,17 @@ def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
 
 
 def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
-    """A clock that may be set back gets the present UTC: month, day, year and time."""
+    """The server's clock may be set back, because no drive has used it yet.
+
+    The clock is set at once, to the present date and time in UTC.
+    """
     assert clock_fields(1_700_000_000.0, may_set_back=True) == (11, 14, 2023, 22, 13, 20)
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """The clock is set back, so the next RM reports a heading of about 1e15 degrees.
+    """The server's clock is set back. So the next forward drive (RM) reports about 1e15 degrees.
 
-    The driver repeats RM once.
+    The driver repeats the start once.
     """
     bench = MartBench("source").ready()
     assert bench.board.is_fresh

@@ -57,10 +57,10 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 
 
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
-    """At the end of a turn, SM overtakes ENC. So the encoder count comes after the angle.
+    """At the end of a turn, the stop overtakes an encoder query. So the count follows the angle.
 
-    The count is far from the expected angle. The driver does not use it as the angle, nor learn
-    the motors' speed from it.
+    The count is far from the expected angle. The driver does not use it as the angle, nor learn the
+    motors' speed from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -100,9 +100,10 @@ def test_a_likely_number_is_preferred_as_the_angle_of_a_turn() -> None:
 
 
 def test_a_copy_of_a_refusal_does_not_refuse_the_next_check() -> None:
-    """A documented server supports neither SSP nor RST IMU. Each of its refusals arrives twice.
+    """A documented server supports neither SSP (speed of turns) nor RST IMU (check of the IMU).
 
-    The driver does not take a copy for the reply to the next check of the IMU. The robot drives.
+    Each of its refusals arrives twice. The driver does not take a copy for the reply to the next
+    check of the IMU. The robot drives.
     """
     bench = on(NetworkFaults(), "documented")
     twice(bench.robot.network[0].from_board, lambda data: b"not supported" in data, 0.1)
@@ -142,8 +143,8 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
     """All replies are late by 0.28 s, so the driver stops a possible copy of each move.
 
-    Without a copy, the replies come sooner than after a real stop, and the robot reaches the goal.
-    With a copy, the driver reports it, and adds the first run to the odometry.
+    If there was no copy, the replies come sooner than after a real stop, and the robot reaches the
+    goal. If there was one, the driver reports it, and adds the first run to the odometry.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]
@@ -163,9 +164,10 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
-    """A copy of the IMU check's ``ok`` is taken for the reply to B. The first stop of B is lost.
+    """A copy of the IMU check's ``ok`` is taken for the reply to the start of a backward drive.
 
-    The true reply to B comes after the stop. The driver does not take it for the stop's reply.
+    The first stop of this drive is lost. The true reply to the start comes after the stop. The
+    driver does not take it for the stop's reply.
     """
     bench = on(NetworkFaults(), "firmware")
     network = bench.robot.network[0]
@@ -207,7 +209,7 @@ def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
 
 @pytest.mark.parametrize("reply", [b"", b"ok " + 55 * b"7" + b".00"], ids=["lost", "unreadable"])
 def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: bytes) -> None:
-    """No reply to RMRA is useful, neither in a drive nor at rest.
+    """No reply to the heading query (RMRA) is useful, neither in a drive nor at rest.
 
     The driver reports it. The encoder is still read, and the next drive begins.
     """

@@ -57,9 +57,9 @@ def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_la
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
-    """The ok of RST IMU comes twice, and L is lost.
+    """The ok to the check of the IMU comes twice, and the start of a turn (L) is lost.
 
-    The encoder count is unchanged, so the second ok does not confirm L.
+    The encoder count is unchanged, so the second ok does not confirm the turn.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     bench.command(0.3, 0.0, 2.0)
@@ -150,9 +150,10 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies show that the motion had begun, or None if unknown.
+    """Return whether the replies show that a motion had begun, or None if they do not show it.
 
-    Start at 8 s, stops at 10 s and 10.3 s.
+    The motion is started at 8 s. The driver sends stops at 10 s and 10.3 s. ``replies``: time in s
+    and bytes of each reply.
     """
     stop = Stopping(Motion.REVERSE, 10.0, delay_s=0.3, started_s=8.0, owed=1)
     stop.due(10.0)
@@ -197,9 +198,9 @@ def test_a_copy_of_one_reply_is_not_that_to_the_next_query() -> None:
 
 
 def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> None:
-    """The server answers both MCSTAT and ENC with 0, again and again.
+    """The server answers two different queries (MCSTAT and ENC) with 0, again and again.
 
-    No answer is taken for a copy.
+    No answer is taken for a copy of the other query's answer.
     """
     talk = Conversation(0.3)
     for n in range(3):
@@ -208,9 +209,9 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """RMCS returns the same angle that RMRA has just returned.
+    """The reply to a change of speed (RMCS) has the angle that RMRA has just reported.
 
-    The reply is not taken for a copy.
+    The reply is not taken for a copy of the earlier one.
     """
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)
@@ -333,10 +334,10 @@ def test_a_robot_that_starts_may_be_as_fast_as_it_is_commanded() -> None:
 def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     reverse: bool, most: int
 ) -> None:
-    """The network may duplicate a speed change, which then acts twice.
+    """The network may duplicate a speed change, which then acts twice. Only the heading shows this.
 
-    Only the heading shows this, and in B it may be unknown. So a single change is at most 15 units
-    in RM, and 5 in B.
+    In a backward drive, the heading may be unknown. So a single change is at most 15 units forward,
+    and 5 backward.
     """
     loop = SpeedLoop(MartSettings())
     loop.trip_s = 0.05

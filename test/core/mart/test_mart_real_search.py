@@ -41,9 +41,9 @@ def test_a_driver_that_begins_without_a_network_hangs_no_server(seed: int) -> No
 
 
 def test_the_network_comes_back_between_the_stops_and_the_stop_port() -> None:
-    """A driver starts during RM, and its first command that arrives is SL.
+    """A driver starts during a forward drive, and its first command that arrives is SL (stop port).
 
-    The driver sends no SRM after it, which would hang the server.
+    The driver then does not send SRM, the usual stop, which would hang the server.
     """
     assert trouble(Trial(met=b"RM 30", away_s=3.6, ways=(0,))) == ""
     assert trouble(Trial(met=b"RM 30", away_s=6.8, back_s=0.7)) == ""
@@ -53,7 +53,7 @@ Patch = Callable[[Any, str, Any], None]
 
 
 def sweeps_again(patch: Patch) -> None:
-    """Patch the driver to send SRM and SM after it has used the stop port.
+    """Patch the driver to send the stops SRM and SM after it has used the stop port.
 
     The patched driver does not first find out which motion is in progress.
     """
@@ -71,7 +71,7 @@ def says_sl_before_sm(patch: Patch) -> None:
 
 
 def turns_within_rm(patch: Patch) -> None:
-    """Patch the driver to send L during RM, without a stop by SRM."""
+    """Patch the driver to start a turn on the spot (L) during a forward drive, without a stop."""
     agrees, act = Pilot._agrees, Pilot._act
 
     def spins(pilot: Pilot, now: float) -> bool:

@@ -142,7 +142,8 @@ def rescued(firmware: Firmware, *, alive: bool) -> MartBench:
 def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Firmware) -> None:
     """A server is restarted during a move. The robot still moves, and the IMU is dead.
 
-    The driver stops the robot with MCS, which needs no IMU. It starts no turn.
+    The driver stops the robot with MCS, which writes to the motors and needs no IMU. It starts no
+    turn.
     """
     bench = rescued(firmware, alive=False)
     assert bench.robot.stands
@@ -153,7 +154,8 @@ def test_a_restarted_server_with_a_dead_imu_switches_the_motors_off(firmware: Fi
 def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree() -> None:
     """A documented server is restarted during a move, and the robot still moves.
 
-    The server does not support MCS, so the driver stops the robot by a controlled turn.
+    The server does not support direct control of the motors (MCS), so the driver stops the robot by
+    a controlled turn.
     """
     bench = rescued("documented", alive=True)
     assert bench.robot.stands
@@ -164,9 +166,9 @@ def test_a_restarted_server_without_mcs_ends_the_motion_by_a_turn_of_one_degree(
 def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     firmware: Firmware,
 ) -> None:
-    """A restart erases the speed of SSP, and L alone would not turn the robot.
+    """A restart erases the speed of turns. A turn without a new setting would not move the robot.
 
-    The driver sends SSP again.
+    The driver sends the setting (SSP) again before it starts the next turn.
     """
     bench = MartBench(firmware).ready()
     for _ in range(3):

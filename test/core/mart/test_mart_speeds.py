@@ -194,9 +194,9 @@ def test_a_turn_that_a_sender_ramps_begins_without_a_complaint() -> None:
 
 
 def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
-    """The commanded speed is less than one unit.
+    """The commanded speed is less than one motor unit.
 
-    A speed of 0 units would end RM, so the driver sends 1.
+    A change to 0 units would end the forward drive, so the driver sends 1.
     """
     fast = 0.05
     bench = MartBench(

@@ -37,7 +37,7 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
-    """An e-stop comes during the check of the IMU, or before RM is answered.
+    """An e-stop comes during the check of the IMU, or before the start is answered.
 
     The robot rests and stays at rest.
     """
@@ -253,7 +253,7 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """A command on the stop port directly after SM or SRM could hang a port.
+    """A command on the stop port directly after a usual stop (SM or SRM) could hang a port.
 
     So the driver waits for more than the network delay.
     """

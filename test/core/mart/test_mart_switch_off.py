@@ -3,7 +3,8 @@
 """Tests that no motor stays on after a straight move, whose end the public server can miss.
 
 In the sample in which the move ends, the server corrects the heading once more. That writes a unit
-to a motor that it has just switched off.
+to a motor that it has just switched off. The driver sends MCS, which writes "stop" to both motors,
+and then MSM, which ends the direct control.
 """
 
 from collections.abc import Callable
@@ -67,7 +68,10 @@ def test_a_motor_that_the_server_has_left_on_is_switched_off() -> None:
 
 @pytest.mark.parametrize("word", [b"MCS", b"MSM"])
 def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
-    """The network loses the first MCS or MSM. The driver repeats the command without a reply."""
+    """The network loses the first MCS or MSM, the commands that switch the motors off.
+
+    The driver repeats the command that was not answered.
+    """
     bench = creeping()
     since = len(bench.written)
     lost = drops(bench.robot.network[0].to_board, nth(bench, word, 1))
@@ -79,9 +83,10 @@ def test_a_switch_off_that_is_lost_is_sent_again(word: bytes) -> None:
 
 
 def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None:
-    """The reply to MCS is lost. The driver repeats MCS, and the server refuses it as a conflict.
+    """The reply to MCS (direct control of the motors) is lost. The server refuses the repeated MCS.
 
-    The refusal shows that the first MCS has arrived. So the driver sends MSM.
+    The refusal shows that the first MCS has arrived. So the driver sends MSM, which ends the direct
+    control.
     """
     bench = creeping()
     since, notices = len(bench.written), len(bench.notices)
@@ -97,7 +102,11 @@ def test_a_switch_off_whose_reply_is_lost_is_refused_and_then_released() -> None
 
 
 def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
-    """A copy of MCS arrives 0.29 s late. A drive that is commanded meanwhile begins after MSM."""
+    """A copy of MCS, which switches the motors off, arrives 0.29 s late.
+
+    The server then refuses motions until MSM. A drive that is commanded in this time begins after
+    MSM.
+    """
     bench = creeping()
     since = len(bench.written)
     bench.run_until(lambda: bench.server.manual, 0.3)
@@ -114,9 +123,10 @@ def test_a_late_copy_of_the_switch_off_hinders_no_motion() -> None:
 
 
 def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
-    """The reply to MCS is lost, so the driver repeats MCS. A copy of the second MCS is late.
+    """The reply to MCS (direct control of the motors) is lost, so the driver repeats MCS.
 
-    After MSM, this copy would begin MCS anew. So the driver delays MSM until no copy can arrive.
+    A copy of the second MCS is late. After MSM, which ends the direct control, this copy would
+    begin it anew. So the driver delays MSM until no copy can arrive.
     """
     bench = creeping()
     since = len(bench.written)
@@ -133,7 +143,7 @@ def test_a_copy_of_a_refused_switch_off_is_released_too() -> None:
 
 
 def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
-    """A controlled turn follows a straight move at once. The driver sends no MCS.
+    """A controlled turn follows a straight move at once. The driver does not switch the motors off.
 
     The turn writes both motors, and leaves them off.
     """
@@ -148,9 +158,9 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
 
 
 def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
-    """The e-stop is latched after a straight move, before MCS is sent.
+    """The e-stop is latched after a straight move, before the driver has switched the motors off.
 
-    The driver still sends MCS and MSM, and continues to send stops.
+    The driver still sends MCS and MSM, which do this, and continues to send stops.
     """
     bench = creeping()
     since = len(bench.written)
@@ -165,7 +175,10 @@ def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
 
 
 def test_a_motor_is_switched_off_with_a_dead_imu() -> None:
-    """The IMU fails after a straight move. The driver still sends MCS and MSM: they need no IMU."""
+    """The IMU fails after a straight move. The driver still switches the motors off (MCS, MSM).
+
+    These commands need no IMU.
+    """
     bench = creeping()
     bench.robot.board.server.imu.alive = False
     since = len(bench.written)
@@ -176,7 +189,10 @@ def test_a_motor_is_switched_off_with_a_dead_imu() -> None:
 
 
 def test_a_docking_move_is_followed_by_a_switch_off() -> None:
-    """A docking move is straight and may also leave a motor on. The driver sends MCS and MSM."""
+    """A docking move is straight and may also leave a motor on.
+
+    The driver switches the motors off (MCS, MSM).
+    """
     bench = MartBench("source", dock_m=0.4).ready()
     bench.job(Job.DOCK, "DOCK", 12)
     bench.run(2.0)
@@ -184,7 +200,10 @@ def test_a_docking_move_is_followed_by_a_switch_off() -> None:
 
 
 def test_a_server_without_these_commands_is_asked_once() -> None:
-    """A documented server does not support MCS. The driver sends MCS only once."""
+    """A documented server does not support MCS, the direct control of the motors.
+
+    The driver sends it only once.
+    """
     bench = MartBench("documented").ready()
     for way_m in (0.5, 1.0):
         reach(bench, Pose(way_m, 0.0, 0.0))
@@ -193,7 +212,10 @@ def test_a_server_without_these_commands_is_asked_once() -> None:
 
 
 def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None:
-    """The stop commands for the guard include MSM while MCS may be in progress."""
+    """The driver dies while the motors are under direct control (MCS).
+
+    The stop commands of its guard include MSM, which ends the direct control.
+    """
     bench = creeping()
     bench.run_until(lambda: bench.server.manual, 0.3)
     assert (0, b"MSM") in bench.board.stop()
@@ -205,9 +227,10 @@ def test_the_guard_releases_a_server_whose_driver_dies_in_a_switch_off() -> None
 def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
     away_s: float,
 ) -> None:
-    """An earlier driver has left MCS in progress. The new driver sends MSM, and the robot drives.
+    """An earlier driver has left the motors under direct control (MCS). The new driver sends MSM.
 
-    This also works if the network is interrupted at first, so that the driver uses the stop port.
+    Then the robot drives. This also works if the network is interrupted at first, so that the
+    driver uses the stop port.
     """
     bench = MartBench("source")
     bench.robot._good = False
@@ -232,7 +255,7 @@ def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
 def test_a_driver_that_begins_switches_the_motors_off() -> None:
     """An earlier driver was killed directly after a straight move, so a motor may be on.
 
-    The new driver sends MCS and MSM.
+    The new driver switches the motors off (MCS, MSM).
     """
     bench = MartBench("source")
     bench.server.drive(128, 127)
@@ -243,10 +266,11 @@ def test_a_driver_that_begins_switches_the_motors_off() -> None:
 
 
 def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> None:
-    """After a stop of RM by the stop port, SRM would hang the server. The driver sends MSM instead.
+    """The stop port has ended a forward drive. SRM would hang the server, so the driver sends MSM.
 
-    The ``ok`` to MSM arrives twice, and the next RST IMU is lost. The driver does not take the
-    second ``ok`` for the reply to RST IMU, and reports that RM is still in progress.
+    The ``ok`` to MSM arrives twice, and the next check of the IMU (RST IMU) is lost. The driver
+    does not take the second ``ok`` for the reply to the check. It reports that the drive is still
+    in progress.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
     bench.robot._good = False

@@ -34,9 +34,9 @@ def test_each_channel_has_its_own_faults() -> None:
 
 
 def test_a_request_is_answered_when_its_move_is_done() -> None:
-    """The reply to ``move`` comes at the end of the move.
+    """The reply to the toy board's command ``move`` comes at the end of the move.
 
-    Before that, another ``move`` fails, and ``odo`` is answered at once.
+    Before that, another ``move`` fails, and the query ``odo`` is answered at once.
     """
     wired = WiredBoard(ToyServer())
     wired.receive(b"move 0.02", 5.0)
@@ -69,9 +69,10 @@ def test_datagrams_reach_the_board_once_late_or_never_in_board_time() -> None:
 
 
 def test_a_late_datagram_arrives_by_the_clock_of_the_others() -> None:
-    """A caller sends at 1000 s of its own clock, with a delay of up to 1 s.
+    """A datagram is sent at 1000 s of the caller's clock, and delayed by up to 1 s.
 
-    The datagram arrives with a time of that clock.
+    The board's clock is different. The board receives the datagram with an arrival time by the
+    caller's clock.
     """
     at: list[float] = []
 

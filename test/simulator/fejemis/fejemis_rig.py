@@ -68,7 +68,7 @@ class Rig:
     def drive(self, text: str, seconds: float) -> None:
         """Send an ``rc`` line to both Teensys, and run for ``seconds``.
 
-        Meanwhile the host relays the front angle.
+        In this time, the host relays the front wheel's angle to the drive Teensy.
         """
         self.relays = True
         self.say(FRONT, "sub fwl 15", text)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the public server's controlled moves: TF, TB, MCR and MCL."""
+"""Tests of the public server's controlled moves over a given distance or angle.
+
+TF and TB drive straight (distance in inches), MCR and MCL turn (angle in degrees).
+"""
 
 from dataclasses import replace
 
@@ -12,7 +15,7 @@ from omnibot_driver.simulator.mart import FIRMWARE
 
 @pytest.mark.parametrize(("text", "sign"), [("TF 12", 1), ("TB 12", -1)])
 def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) -> None:
-    """The reply to TF 12 is "ok 12", although the robot has driven 15.8 inches.
+    """The reply to TF 12 (drive 12 inches) is "ok 12", although the robot has driven 15.8 inches.
 
     The server computes the distance from the time.
     """
@@ -24,16 +27,19 @@ def test_ok_echoes_the_target_12_for_15_8_inches_driven(text: str, sign: int) ->
 
 @pytest.mark.parametrize("volts", [20.0, 26.0])
 def test_it_echoes_it_at_any_voltage(volts: float) -> None:
-    """At any battery voltage the reply to TF 24 is "ok 24", whatever the true distance is."""
+    """At any battery voltage the reply to TF 24 (drive 24 inches) is "ok 24".
+
+    The true distance depends on the voltage.
+    """
     rig = Rig(volts=volts)
     assert rig.ask("TF 24") == "ok 24"
     assert abs(rig.x_in - 30.3) > 2
 
 
 def test_tf_24_slow_runs_at_normal_speed() -> None:
-    """In TF 24 SLOW the speed comes after the distance.
+    """In TF 24 SLOW (drive 24 inches), the speed word comes after the distance.
 
-    The server ignores it and drives normally.
+    The server ignores it and drives at normal speed.
     """
     fast, normal, slow = Rig(), Rig(), Rig()
     assert fast.ask("TF 24 SLOW") == normal.ask("TF NORMAL 24") == "ok 24"
@@ -43,7 +49,10 @@ def test_tf_24_slow_runs_at_normal_speed() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TF x", "TF SLOW x", "TB 0", "TB NORMAL y", "TF FAST 12"])
 def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
-    """The distance of TF or TB is 0 or a word. The robot drives until it is stopped."""
+    """The distance of a straight move (TF or TB) is 0 or a word.
+
+    The robot drives until it is stopped.
+    """
     rig = Rig()
     assert rig.ask(text, 60.0) is None
     assert rig.moving
@@ -52,9 +61,9 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """During an unlimited move, SDR sets the distance from the start at which the move ends.
+    """During a move without a distance, SDR sets the distance from its start at which it ends.
 
-    Other moves ignore SDR.
+    Moves with a distance ignore SDR.
     """
     rig = Rig()
     rig.say("TF 0")
@@ -75,9 +84,9 @@ def test_a_negative_distance_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["TF 0", "TB 0", "MCF 0", "MCB 0", "MCF far"])
 def test_a_distance_of_zero_is_refused_or_unlimited(text: str) -> None:
-    """A distance of zero, or a word, is unlimited on the public server.
+    """The distance of a move is zero or a word. On the public server, the move has no limit.
 
-    With this quirk off, the server refuses it.
+    With this quirk off, the server refuses the move.
     """
     rig = Rig(replace(FIRMWARE, zero_distance_is_unlimited=False))
     assert rig.ask(text) == "fail bad distance value"
@@ -108,7 +117,7 @@ def test_a_distance_that_is_missing_is_told(text: str, answer: str) -> None:
 def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
     front_in: float, driven_in: float
 ) -> None:
-    """TF begins near an obstacle, and fails after about 0.6 s.
+    """A straight move (TF) begins near an obstacle, and fails after about 0.6 s.
 
     The robot moves 0.3 inches before the server reads the front sonar.
     """
@@ -119,9 +128,9 @@ def test_near_an_obstacle_tf_fails_after_0_6_s_and_0_3_inches(
 
 
 def test_near_an_obstacle_tb_fails_likewise() -> None:
-    """TB begins near an obstacle behind the robot.
+    """A move backward (TB) begins near an obstacle behind the robot.
 
-    The server reads the rear sonar, and TB fails.
+    The server reads the rear sonar, and the move fails.
     """
     rig = Rig(rear_m=12 * INCH_M)
     assert rig.ask("TB 24") == "fail Insufficient rear clearance."
@@ -129,14 +138,17 @@ def test_near_an_obstacle_tb_fails_likewise() -> None:
 
 @pytest.mark.parametrize("text", ["TF SLOW NCC 30", "TF DOCK 30"])
 def test_ncc_and_dock_see_no_obstacle(text: str) -> None:
-    """The words NCC and DOCK in a TF switch the obstacle check off, so the robot hits the wall."""
+    """The words NCC and DOCK in a straight move (TF) switch the obstacle check off.
+
+    The robot hits the wall.
+    """
     rig = Rig(front_m=20 * INCH_M)
     assert rig.ask(text, 60.0) == "ok 30"
     assert rig.server.hit_wall
 
 
 def test_tf_dock_stops_at_the_dock() -> None:
-    """TF DOCK ends at the dock.
+    """A docking move (TF DOCK) ends at the dock.
 
     The distance in its reply is computed from the time, not measured.
     """
@@ -150,7 +162,10 @@ def test_tf_dock_stops_at_the_dock() -> None:
 
 
 def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
-    """TFSFC sets the clearance of the next TF only. For the TF after that it is 19 inches again."""
+    """TFSFC sets the obstacle clearance of the next straight move (TF) only.
+
+    For the move after that it is 19 inches again.
+    """
     rig = Rig(front_m=60 * INCH_M)
     assert rig.ask("TFSFC 40") == "ok"
     assert rig.ask("TF 60") == "fail Insufficient front clearance."
@@ -160,7 +175,10 @@ def test_tfsfc_sets_the_clearance_of_the_next_tf_alone() -> None:
 
 
 def test_tf_holds_its_course_with_unequal_motors() -> None:
-    """The motors are unequal. TF corrects its course by the gyro, but F does not."""
+    """The motors are unequal. The controlled move TF corrects its course by the gyro.
+
+    The uncontrolled drive F does not.
+    """
     rig = Rig(motor_inequality=0.05)
     assert rig.ask("TF 80", 60.0) == "ok 80"
     assert abs(rig.yaw_deg) < 4
@@ -170,9 +188,9 @@ def test_tf_holds_its_course_with_unequal_motors() -> None:
 
 
 def test_a_wheel_that_stops_turns_tf_away_until_it_gives_up() -> None:
-    """One wheel stops during TF, and the robot turns away.
+    """One wheel stops during a straight move (TF), and the robot turns away.
 
-    TF ends with "fail excessive gyro correct".
+    The move ends with "fail excessive gyro correct".
     """
     rig = Rig()
     rig.say("TF 80")
@@ -190,7 +208,10 @@ def test_mcr_turns_right_and_mcl_left(text: str, sign: int) -> None:
 
 
 def test_mcr_normal_90_parses_as_0() -> None:
-    """The server reads MCR NORMAL 90 as an angle of 0. It answers ok without turning the robot."""
+    """The server reads the request MCR NORMAL 90 as a turn by 0 degrees.
+
+    It answers ok without turning the robot.
+    """
     rig = Rig()
     assert rig.ask("MCR NORMAL 90") == "ok"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -214,7 +235,10 @@ def test_undocumented_moves_answer_ok(text: str) -> None:
 
 
 def test_the_port_is_silent_during_a_controlled_move() -> None:
-    """TF SLOW 80 takes 20 s. Requests that come in this time are answered afterwards."""
+    """The straight move TF SLOW 80 takes 20 s.
+
+    Requests that come in this time are answered afterwards.
+    """
     rig = Rig()
     rig.say("TF SLOW 80", "ENC", "RMRA")
     assert rig.run(15.0) == []

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the public server's uncontrolled motions: F, B, RM, R and L."""
+"""Tests of the public server's uncontrolled motions: F, B, RM, R and L.
+
+F and RM drive forward, B backward; R and L turn on the spot. SM stops F, B, R and L; SRM stops RM.
+"""
 
 import pytest
 from mart_rig import INCH_M, Rig
@@ -9,7 +12,10 @@ from omnibot_driver.simulator.mart import FIRMWARE, Kind
 
 
 def test_rm_answers_in_71_ms() -> None:
-    """The reply to RM comes after 71 ms, when the encoder shows that the wheel turns."""
+    """The reply to RM, a forward drive, comes after 71 ms.
+
+    By that time the encoder shows that the wheel turns.
+    """
     rig = Rig()
     assert rig.ask("RM 30") == "ok"
     assert rig.took_s == pytest.approx(0.071, abs=0.01)
@@ -17,7 +23,7 @@ def test_rm_answers_in_71_ms() -> None:
 
 
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
-    """F measures the bias of the gyro first, so its reply takes longer than that of R."""
+    """The drive F first measures the bias of the gyro. Its reply takes longer than the spin R's."""
     rig = Rig()
     assert rig.ask("F") == "ok"
     assert rig.took_s == pytest.approx(0.22, abs=0.015)
@@ -27,7 +33,7 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 
 
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
-    """Some servers answer RM with a failure although the robot moves.
+    """Some servers answer the start of a drive (RM) with a failure although the robot moves.
 
     They cannot stop this motion. Only a write to the motors stops the robot.
     """
@@ -49,9 +55,9 @@ def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
 
 @pytest.mark.parametrize("change", ["1 1", "-1 -1", "5 -5", "0 1", "40 40"])
 def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(change: str) -> None:
-    """RM -20 drives backward.
+    """RM, a forward drive, is started with speed -20, and the robot drives backward.
 
-    RMCS 0 0 changes nothing, but another RMCS stops a motor or drives it forward.
+    The speed change RMCS 0 0 has no effect. Any other RMCS stops a motor or drives it forward.
     """
     rig = Rig()
     rig.drive("RM -20")
@@ -70,9 +76,9 @@ def test_rm_minus_20_drives_backward_but_any_rmcs_that_is_not_zero_stops_it(chan
 
 
 def test_rm_200_drives_backward_at_56() -> None:
-    """RM 200 drives backward at 56 units.
+    """RM, a forward drive, is started with speed 200. The robot drives backward at 56 units.
 
-    Even the smallest RMCS then drives at full speed forward.
+    Even the smallest change of speed (RMCS) then drives it at full speed forward.
     """
     rig = Rig()
     rig.drive("RM 200")
@@ -94,7 +100,7 @@ def test_rm_1_to_127_drives_forward(speed: int) -> None:
 def test_a_stuck_motor_can_hang_rm() -> None:
     """After a fast drive, one motor is stuck.
 
-    The next RM hangs the server while the other motor turns.
+    The next forward drive (RM) hangs the server while the other motor turns.
     """
     rig = Rig()
     rig.drive("RM 110")
@@ -110,7 +116,10 @@ def test_a_stuck_motor_can_hang_rm() -> None:
 
 
 def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
-    """A motor is stuck. RM fails without a reason, but after F, RM fails with "start timedout"."""
+    """A motor is stuck. The forward drive RM fails without a reason.
+
+    After the drive F has failed too, RM fails with F's reason, "start timedout".
+    """
     rig = Rig(stuck="right")
     assert rig.ask("RM 30") == "fail "
     assert rig.took_s == pytest.approx(0.6, abs=0.03)
@@ -121,7 +130,7 @@ def test_a_stuck_motor_makes_the_first_rm_fail_without_a_reason() -> None:
 
 
 def test_rm_0_is_a_motor_that_does_not_turn() -> None:
-    """RM fails if its speed is zero, or too low to turn the motors."""
+    """A forward drive (RM) fails if its speed is zero, or too low to turn the motors."""
     assert Rig().ask("RM 0") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 3") == "fail "
     assert Rig(dead_zone_units=4.0).ask("RM 5") == "ok"
@@ -152,9 +161,9 @@ def test_a_stuck_left_motor_is_not_noticed() -> None:
 
 @pytest.mark.parametrize(("start", "change"), [("RM 30", "RMCS"), ("F", "CS"), ("B", "CS")])
 def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, change: str) -> None:
-    """CS and RMCS change the speeds of the right and the left motor, in this order.
+    """CS and RMCS, the changes of speed, contain the change of the right and of the left motor.
 
-    Positive is more forward, also in B.
+    Positive is more forward, also in the backward drive B.
     """
     rig = Rig()
     rig.drive(start)
@@ -170,7 +179,7 @@ def test_cs_and_rmcs_are_right_first_and_positive_is_more_forward(start: str, ch
 
 
 def test_cs_5_minus_5_turns_left() -> None:
-    """CS 5 -5 makes the right wheel faster, so the robot turns left."""
+    """The speed change CS 5 -5 makes the right wheel faster, so the robot turns left."""
     rig = Rig()
     rig.drive("F")
     assert rig.ask("CS 5 -5") == "ok"
@@ -190,7 +199,7 @@ def test_cs_5_minus_5_turns_left() -> None:
     ],
 )
 def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int, int]) -> None:
-    """CS and RMCS cannot reverse a motor. A motor that would be reversed is stopped instead.
+    """A speed change (CS or RMCS) cannot reverse a motor. It stops the motor instead.
 
     If a motor would exceed full speed, the other motor becomes slower instead.
     """
@@ -201,7 +210,7 @@ def test_cs_and_rmcs_clamp_at_stop(start: str, change: str, registers: tuple[int
 
 
 def test_rmcs_0_0_just_reads_the_angle() -> None:
-    """RMCS 0 0 changes no speed, and returns the angle, as RMRA does."""
+    """The speed change RMCS 0 0 changes no speed. It returns the angle, as the query RMRA does."""
     rig = Rig()
     rig.drive("RM 30")
     rig.ask("RMCS 4 -4")
@@ -213,7 +222,7 @@ def test_rmcs_0_0_just_reads_the_angle() -> None:
 
 @pytest.mark.parametrize("turn", ["RMCS 4 -4", "RMCS -4 4"])
 def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
-    """RMRA returns the angle since the start of RM, positive to the left."""
+    """The query RMRA returns the angle since the start of RM, positive to the left."""
     rig = Rig(gyro_bias_dps=0.0)
     rig.drive("L")
     rig.ask("SM")
@@ -228,7 +237,7 @@ def test_rmra_is_the_angle_since_rm_and_positive_is_left(turn: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30", "R"])
 def test_rmra_works_at_any_time(start: str) -> None:
-    """RMRA is answered before the first motion, and during any motion."""
+    """The query of the angle (RMRA) is answered before the first motion, and during any motion."""
     rig = Rig()
     assert rig.number("RMRA") == 0.0
     rig.drive(start)
@@ -242,7 +251,7 @@ def test_rmra_works_at_any_time(start: str) -> None:
 
 
 def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
-    """ENC returns the count of the right wheel, with its sign, within 5 ms."""
+    """The query ENC returns the count of the right wheel, with its sign, within 5 ms."""
     rig = Rig(metres_per_count=0.001)
     rig.drive("R")
     spun = rig.number("ENC")
@@ -269,7 +278,7 @@ def test_enc_is_zeroed_at_each_motion_start(start: str) -> None:
 
 @pytest.mark.parametrize(("start", "side"), [("F", "front_m"), ("B", "rear_m")])
 def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str) -> None:
-    """An obstacle ends F or B without a message. Only the reply to the next SM reports it."""
+    """An obstacle ends the drives F and B without a message. Only the reply to SM reports it."""
     rig = Rig(**{side: 45 * INCH_M})
     rig.drive(start, 10.0)
     assert not rig.moving
@@ -281,7 +290,10 @@ def test_in_f_and_b_an_obstacle_stops_it_without_a_message(start: str, side: str
 
 
 def test_an_obstacle_ends_rm_and_srm_tells() -> None:
-    """An obstacle ends RM. RMCS and SRM then fail with "insufficient clearance"."""
+    """An obstacle ends a forward drive (RM).
+
+    The next speed change (RMCS) and the stop (SRM) fail with "insufficient clearance".
+    """
     rig = Rig(front_m=45 * INCH_M)
     rig.drive("RM 30", 10.0)
     assert not rig.moving
@@ -291,7 +303,7 @@ def test_an_obstacle_ends_rm_and_srm_tells() -> None:
 
 
 def test_backward_rm_and_spins_see_no_obstacle() -> None:
-    """The robot drives backward with RM.
+    """The robot drives backward with RM, usually the command of a forward drive.
 
     The server does not read the rear sonar, and the robot hits the wall.
     """
@@ -302,7 +314,10 @@ def test_backward_rm_and_spins_see_no_obstacle() -> None:
 
 @pytest.mark.parametrize(("front_in", "stops"), [(19.5, False), (18.5, True)])
 def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
-    """RM ends if an obstacle in front is nearer than 19 inches. The sonar measures whole inches."""
+    """A forward drive (RM) ends if an obstacle in front is nearer than 19 inches.
+
+    The sonar measures whole inches.
+    """
     rig = Rig(front_m=front_in * INCH_M)
     rig.drive("RM 1", 0.3)
     assert rig.server.chassis.powered is not stops
@@ -310,7 +325,7 @@ def test_the_front_threshold_is_19_inches(front_in: float, stops: bool) -> None:
 
 @pytest.mark.parametrize(("rear_in", "stops"), [(18.0, False), (15.5, True)])
 def test_the_rear_threshold_is_15_inches(rear_in: float, stops: bool) -> None:
-    """B ends if an obstacle behind is nearer than 15 inches.
+    """A backward drive (B) ends if an obstacle behind is nearer than 15 inches.
 
     The robot moves 2 inches before the first sonar reading.
     """
@@ -338,9 +353,9 @@ def test_voltage_and_unequal_motors_change_the_speed_of_a_unit(
 
 
 def test_mcs_sets_registers_once_and_everything_is_refused_until_msm() -> None:
-    """MCS sets the motor registers, the right one first.
+    """MCS, the direct control of the motors, sets the motor registers, the right one first.
 
-    Then the server refuses all else until MSM.
+    The server then refuses all else until MSM.
     """
     rig = Rig()
     assert rig.ask("MCS 100 120") == "ok"

@@ -63,7 +63,7 @@ def test_files_are_latin_1_and_0xb0_is_the_sign_of_a_degree() -> None:
 
 
 def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
-    """The first LOG deletes earlier files, so a download of them fails.
+    """The first start of the log (LOG) deletes earlier files, so a download of them fails.
 
     A second LOG deletes nothing.
     """
@@ -78,7 +78,7 @@ def test_log_deletes_earlier_files_then_last_move_answers_a_bare_fail() -> None:
 
 
 def test_exit_downloads_the_log_if_log_was_given() -> None:
-    """After LOG, EXIT sends the log file and ends the server."""
+    """A log was started (LOG). EXIT sends the log file and ends the server."""
     rig = Rig()
     rig.ask("LOG")
     rig.ask("HELLO")
@@ -94,14 +94,14 @@ def test_exit_downloads_the_log_if_log_was_given() -> None:
 
 
 def test_exit_without_log_answers_nothing_and_ends_the_server() -> None:
-    """Without a LOG before it, EXIT ends the server without an answer."""
+    """No log was started. EXIT ends the server without an answer."""
     rig = Rig()
     assert rig.ask("EXIT") is None
     assert rig.server.crashed == "EXIT"
 
 
 def test_exit_stops_no_motor() -> None:
-    """After EXIT the server has ended, but a motion in progress continues."""
+    """EXIT ends the server during a motion. The motion continues."""
     rig = Rig()
     rig.drive("RM 30")
     rig.say("EXIT")

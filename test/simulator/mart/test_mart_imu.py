@@ -39,7 +39,10 @@ def test_a_move_that_the_host_has_given_up_starts_when_the_imu_comes_back(text: 
 def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
     text: str, stops: tuple[str, ...]
 ) -> None:
-    """The IMU is dead. RM, R and L start the motors and are never answered, and no stop works."""
+    """The IMU is dead. RM (forward drive), R and L (spins) start the motors.
+
+    The server never answers them, and no stop command works.
+    """
     rig = Rig(imu_dies_s=0.0)
     rig.say(text)
     rig.run(0.5)
@@ -67,7 +70,8 @@ def test_the_start_timeout_is_dead_without_an_imu(text: str) -> None:
 def test_the_obstacle_check_is_dead_without_an_imu() -> None:
     """The IMU is dead.
 
-    The server does not check for obstacles during RM, and the robot hits the wall.
+    The server does not check for obstacles during a forward drive (RM), and the robot hits the
+    wall.
     """
     rig = Rig(imu_dies_s=0.0, front_m=50 * INCH_M)
     rig.ask("RM 30")
@@ -75,7 +79,10 @@ def test_the_obstacle_check_is_dead_without_an_imu() -> None:
 
 
 def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> None:
-    """RM and SRM come while the IMU is dead. The server answers both when the IMU works again."""
+    """A forward drive (RM) and its stop (SRM) are commanded while the IMU is dead.
+
+    The server answers both when the IMU works again.
+    """
     rig = Rig(imu_dies_s=0.0, imu_returns_s=30.0)
     rig.say("RM 30", "SRM")
     assert rig.run(29.0) == []
@@ -84,9 +91,9 @@ def test_rm_that_was_started_without_an_imu_is_answered_when_it_comes_back() -> 
 
 
 def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() -> None:
-    """The IMU dies during RM. The angle of RMRA stays constant, and obstacles are ignored.
+    """The IMU dies during a forward drive (RM). The reported heading stays constant.
 
-    SRM then stops the motors, but is not answered.
+    Obstacles are ignored. The stop (SRM) stops the motors, but is not answered.
     """
     rig = Rig(imu_dies_s=1.0, front_m=60 * INCH_M)
     rig.drive("RM 30")
@@ -105,7 +112,7 @@ def test_an_imu_lost_during_rm_freezes_rmra_and_it_drives_through_obstacles() ->
 
 
 def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
-    """While the IMU works, the reply to RMRA changes throughout a drive.
+    """While the IMU works, the reported heading (RMRA) changes throughout a drive.
 
     A constant reply shows that the IMU is dead.
     """
@@ -120,7 +127,10 @@ def test_while_it_lives_rmra_changes_all_the_time_of_a_drive() -> None:
 def test_mcr_slow_0_proves_in_half_a_second_whether_it_lives(
     imu_dies_s: float, answer: str
 ) -> None:
-    """MCR SLOW 0 shows in 0.5 s whether the IMU works, without moving the robot."""
+    """A turn by 0 degrees (MCR SLOW 0) shows in 0.5 s whether the IMU works.
+
+    The robot does not move.
+    """
     rig = Rig(imu_dies_s=imu_dies_s)
     assert rig.ask("MCR SLOW 0") == answer
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -144,9 +154,9 @@ def test_rst_imu_proves_it_in_0_13_s() -> None:
 
 
 def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -> None:
-    """The server no longer uses a dead IMU. Then the IMU works again.
+    """The server has stopped using a dead IMU. Then the IMU works again.
 
-    The server uses it only after a successful RST IMU or SB.
+    The server uses it again only after a successful reset (RST IMU) or calibration (SB).
     """
     for cure in ("RST IMU", "SB"):
         rig = Rig()
@@ -160,7 +170,7 @@ def test_an_imu_that_was_given_up_stays_dead_until_it_is_reset_or_calibrated() -
 
 
 def test_mcr_fails_in_half_a_second_if_it_is_dead() -> None:
-    """The IMU is dead. MCR fails after half a second, and the motors stop."""
+    """The IMU is dead. A controlled turn (MCR) fails after half a second, and the motors stop."""
     rig = Rig(imu_dies_s=0.0)
     assert rig.ask("MCR 90") == LOST
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -180,7 +190,7 @@ def test_a_loss_within_a_controlled_move_fails_after_1_5_s(text: str) -> None:
 
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> None:
-    """The IMU dies during F or R.
+    """The IMU dies during a drive (F) or a spin (R).
 
     SM stops the robot, but is answered only when the IMU works again.
     """
@@ -193,7 +203,10 @@ def test_an_imu_lost_in_f_or_r_stops_by_sm_but_without_an_answer(start: str) -> 
 
 
 def test_the_bias_drifts_until_sb_finds_it() -> None:
-    """The gyro's bias makes the angle drift. SB measures the bias in 0.53 s, and the drift ends."""
+    """The gyro's bias makes the angle drift.
+
+    The calibration (SB) measures the bias in 0.53 s, and the drift ends.
+    """
     rig = Rig(gyro_bias_dps=0.5)
     rig.run(100.0)
     assert rig.number("RMRA") == pytest.approx(50.0, abs=1.0)

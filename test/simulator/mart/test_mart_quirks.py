@@ -3,7 +3,8 @@
 """Tests that each quirk of the simulated MART server can be observed, and can be switched off.
 
 A quirk is a deviation from the manual. A function named after a quirk returns whether a server
-shows it.
+shows it. F, B and RM are drives, R and L spins, TF and MCR controlled moves. SM and SRM are stops;
+SL and SS are stops on the stop port.
 """
 
 from collections.abc import Callable
@@ -24,7 +25,10 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether, after SL alone, the server refuses motions, and SM hangs the command port."""
+    """Return whether a motion stays in progress for the server after a stop on the stop port (SL).
+
+    The server then refuses motions, and the usual stop (SM) hangs the command port.
+    """
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SL")
@@ -38,7 +42,7 @@ def stop_port_keeps_motion(quirks: Quirks) -> bool:
 
 
 def spin_stop_ends_drives(quirks: Quirks) -> bool:
-    """Return whether SS stops the drive that F has started."""
+    """Return whether SS, the stop of spins, also stops a drive (F)."""
     rig = Rig(quirks)
     rig.drive("F")
     rig.stop("SS")
@@ -47,7 +51,7 @@ def spin_stop_ends_drives(quirks: Quirks) -> bool:
 
 
 def early_stop_is_ignored(quirks: Quirks) -> bool:
-    """Return whether an SL 0.1 s after F, before the ok of F, does not stop the robot."""
+    """Return whether SL does not stop a drive (F) that the server has not acknowledged yet."""
     rig = Rig(quirks)
     rig.say("F")
     rig.run(0.1)
@@ -56,7 +60,10 @@ def early_stop_is_ignored(quirks: Quirks) -> bool:
 
 
 def left_spin_in_reference_move(quirks: Quirks) -> bool:
-    """Return whether the command L during RM starts a spin, and the server no longer answers."""
+    """Return whether the spin L is accepted during a forward drive (RM).
+
+    The robot then spins, and the server no longer answers.
+    """
     rig = Rig(quirks)
     rig.drive("RM 30")
     if rig.ask("L") == CONFLICT:
@@ -66,7 +73,10 @@ def left_spin_in_reference_move(quirks: Quirks) -> bool:
 
 
 def moves_wait_for_imu(quirks: Quirks) -> bool:
-    """Return whether, without an IMU, F is not answered, and starts when the IMU is back."""
+    """Return whether a drive (F) waits for a missing IMU.
+
+    It is not answered, and starts when the IMU is back.
+    """
     rig = Rig(quirks, imu_dies_s=0.0, imu_returns_s=60.0)
     rig.say("F")
     answer = rig.wait(59.0)
@@ -75,22 +85,22 @@ def moves_wait_for_imu(quirks: Quirks) -> bool:
 
 
 def drives_trust_imu(quirks: Quirks) -> bool:
-    """Return whether, without an IMU, RM moves the robot and is not answered."""
+    """Return whether a forward drive (RM) without an IMU moves the robot, but is not answered."""
     rig = Rig(quirks, imu_dies_s=0.0)
     silent = rig.ask("RM 30") is None
     return silent and rig.moving
 
 
 def reference_speed_wraps(quirks: Quirks) -> bool:
-    """Return whether RM with a negative speed, -20, drives backward."""
+    """Return whether a forward drive (RM) with a negative speed, -20, drives backward."""
     rig = Rig(quirks)
     return rig.ask("RM -20") == "ok" and rig.server.chassis.right_mps < 0
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether the first RM after a stop of 0.57 s fails at once.
+    """Return whether a forward drive (RM) fails at once after a stop that took 0.57 s.
 
-    If it fails, the second RM must succeed.
+    If it fails, a second RM must succeed.
     """
     rig = Rig(quirks)
     rig.drive("RM 66")
@@ -105,7 +115,7 @@ def reference_start_counts_on(quirks: Quirks) -> bool:
 
 
 def speed_word_first(quirks: Quirks) -> bool:
-    """Return whether TF 24 SLOW is as fast as TF 24."""
+    """Return whether the server ignores SLOW after the distance, in TF 24 SLOW."""
     rig, normal = Rig(quirks), Rig(quirks)
     rig.ask("TF 24 SLOW")
     normal.ask("TF 24")
@@ -127,13 +137,13 @@ def echoes_distance(quirks: Quirks) -> bool:
 
 
 def crashes_on_missing_numbers(quirks: Quirks) -> bool:
-    """Return whether TIME with five numbers crashes the server."""
+    """Return whether the command TIME crashes the server if one of its numbers is missing."""
     rig = Rig(quirks)
     return rig.ask("TIME 7 4 2024 12 30") is None and bool(rig.server.crashed)
 
 
 def crashes_early(quirks: Quirks) -> bool:
-    """Return whether VOLTS crashes a server that has just started."""
+    """Return whether the voltage query (VOLTS) crashes a server that has just started."""
     rig = Rig(quirks)
     rig.server.restart(boot_s=0.0)
     early = rig.ask("VOLTS")
@@ -151,12 +161,12 @@ def empty_datagram_ends(quirks: Quirks) -> bool:
 
 
 def exit_is_silent(quirks: Quirks) -> bool:
-    """Return whether EXIT is not answered if there was no LOG before it."""
+    """Return whether EXIT, which ends the server, is not answered without a log."""
     return Rig(quirks).ask("EXIT") is None
 
 
 def log_deletes_files(quirks: Quirks) -> bool:
-    """Return whether LOG deletes the last file, although the server still knows its name."""
+    """Return whether a new log (LOG) deletes the last file, although the server still names it."""
     rig = Rig(quirks)
     rig.ask("MCR SLOW 20")
     rig.ask("LOG")
@@ -165,7 +175,7 @@ def log_deletes_files(quirks: Quirks) -> bool:
 
 
 def unknown_reset_repeats(quirks: Quirks) -> bool:
-    """Return whether RST x repeats the previous reply, which is the voltage here."""
+    """Return whether RST with an unknown word repeats the previous reply, here a voltage."""
     rig = Rig(quirks)
     rig.ask("VOLTS")
     return rig.ask("RST x") == "ok 24.00"
@@ -188,14 +198,14 @@ def undocumented_commands(quirks: Quirks) -> bool:
 
 
 def heading_in_reference_moves_only(quirks: Quirks) -> bool:
-    """Return whether the heading that RMRA returns does not change in a spin."""
+    """Return whether the reported heading (RMRA) does not change in a spin."""
     rig = Rig(quirks)
     rig.drive("R")
     return rig.number("RMRA") == 0.0
 
 
 def probe_turns(quirks: Quirks) -> bool:
-    """Return whether MCR SLOW 0 with a dead IMU turns the robot."""
+    """Return whether the check of a dead IMU (MCR SLOW 0) turns the robot."""
     rig = Rig(quirks, imu_dies_s=0.0)
     assert rig.ask("MCR SLOW 0") == "fail MPU6050 connection lost"
     assert rig.took_s == pytest.approx(0.5, abs=0.05)
@@ -203,7 +213,10 @@ def probe_turns(quirks: Quirks) -> bool:
 
 
 def heading_starts_off(quirks: Quirks) -> bool:
-    """Return whether a second RM, long after the first, begins with a heading that is not zero."""
+    """Return whether a second forward drive, long after the first, begins with a wrong heading.
+
+    A right heading is zero at the beginning.
+    """
     rig = Rig(quirks)
     for _ in range(2):
         rig.drive("RM 30", 0.0)
@@ -262,7 +275,10 @@ def test_what_only_the_source_says_is_played_only_if_it_is_asked_for(name: str) 
 
 
 def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
-    """In the published source, SS has no effect on F. SM ends F as usual."""
+    """In the published source, SS (stop of spins) has no effect on a drive (F).
+
+    SM ends the drive as usual.
+    """
     rig = Rig(SOURCE)
     rig.drive("F")
     rig.stop("SS")
@@ -273,7 +289,7 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """A command has too few numbers, and this crash is switched off.
+    """A command has too few numbers. The quirk with which this crashes the server is switched off.
 
     The server refuses the command.
     """
@@ -317,7 +333,10 @@ def test_the_ports_are_numbered_as_they_stand() -> None:
 
 
 def test_by_the_source_a_probe_of_a_living_imu_turns_the_robot_a_little() -> None:
-    """In the published source, MCR SLOW 0 turns the robot to the right by 1 to 2.5 degrees."""
+    """In the published source, the check of the IMU (MCR SLOW 0) turns the robot a little.
+
+    It turns to the right by 1 to 2.5 degrees.
+    """
     rig = Rig(SOURCE)
     for probes in (1, 2, 3):
         assert rig.ask("MCR SLOW 0") == "ok"

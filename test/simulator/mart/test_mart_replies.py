@@ -81,7 +81,7 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["RMCS 5", "RMCS x"])
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
-    """RMCS comes with one number instead of two. The server refuses it.
+    """A change of speed (RMCS) comes with one number instead of two. The server refuses it.
 
     For other commands, the server does not check the number of numbers.
     """
@@ -124,9 +124,9 @@ def test_a_command_with_fewer_numbers_crashes_the_server(text: str, start: str |
 
 
 def test_cs_with_one_number_does_no_harm_while_still() -> None:
-    """The robot is at rest, so the server refuses CS without reading its numbers.
+    """A change of speed (CS) lacks a number, and the robot is at rest.
 
-    The missing number does not crash the server.
+    The server refuses CS without reading its numbers, so it does not crash.
     """
     assert Rig().ask("CS 5") == "fail"
 
@@ -144,7 +144,7 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server restarts while the robot moves. SRM fails, because no motion is in progress.
+    """The server restarts while the robot moves. The stop SRM fails: no motion is in progress.
 
     Only a power cycle of the controller stops the motors.
     """
@@ -174,9 +174,9 @@ def test_sonars_tell_whole_inches_and_above_254_give_minus_1(inches: float, seen
 
 
 def test_a_sonar_measures_three_times_what_is_near() -> None:
-    """The sonar in front measures three times if an obstacle is near, so its reply takes longer.
+    """An obstacle in front is near. The front sonar measures three times, so its reply is later.
 
-    The rear sonar measures once.
+    The obstacle behind is farther than its limit of 15 inches, so the rear sonar measures once.
     """
     rig = Rig(front_m=19.5 * INCH_M, rear_m=16.5 * INCH_M)
     assert rig.ask("SFC") == "ok 19"
@@ -206,7 +206,7 @@ def test_sonars_turn_with_the_robot() -> None:
 def test_mcstat_tells_by_bits_what_is_wrong_with_the_motor_board(
     changes: dict[str, float], bits: int
 ) -> None:
-    """The bits of MCSTAT show faults of the motor board.
+    """The status of the motor board (MCSTAT) has a bit for each fault.
 
     4 and 8: a motor has tripped. 16 and 32: short circuit. 64: more than 30 V. 128: less than 16 V.
     """
@@ -223,9 +223,9 @@ def test_a_motor_that_tripped_does_not_turn() -> None:
 
 
 def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> None:
-    """The motor board does not answer the server. ENC fails after 0.2 s, and MCSTAT is 255.
+    """The motor board does not answer the server. No motor obeys.
 
-    No motor obeys.
+    The encoder query (ENC) fails after 0.2 s, and the status (MCSTAT) is 255.
     """
     rig = Rig(motor_board_silent=True)
     assert rig.ask("ENC") == "fail"
@@ -237,7 +237,10 @@ def test_a_silent_motor_board_fails_enc_after_0_2_s_and_mcstat_tells_255() -> No
 
 
 def test_an_unknown_reset_repeats_the_previous_reply() -> None:
-    """RST with an unknown word makes the server repeat its previous reply. RST MC succeeds."""
+    """A reset (RST) with an unknown word makes the server repeat its previous reply.
+
+    RST MC, the reset of the motor board, succeeds.
+    """
     rig = Rig()
     assert rig.ask("RST x") is None
     assert rig.ask("RST MC") == "ok"
@@ -274,7 +277,7 @@ def test_undocumented_commands_are_known(text: str, answer: str) -> None:
 
 
 def test_a_record_refuses_motions_until_it_is_stopped() -> None:
-    """From REC START to REC STOP, the server refuses motions."""
+    """While a recording is in progress (REC START to REC STOP), the server refuses motions."""
     rig = Rig()
     assert rig.ask("REC START") == "ok"
     assert rig.ask("F") == "fail conflicting action in progress"
@@ -283,7 +286,10 @@ def test_a_record_refuses_motions_until_it_is_stopped() -> None:
 
 
 def test_parameters_that_are_set_change_the_next_f_and_r_custom() -> None:
-    """SLMP sets the speed of F until the next SM. SSP sets the speed of R CUSTOM."""
+    """SLMP sets the speed of the drive F until the next stop (SM).
+
+    SSP sets the speed of the spin R CUSTOM.
+    """
     rig = Rig()
     rig.ask("SLMP 5 50")
     rig.drive("F")

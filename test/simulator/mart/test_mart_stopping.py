@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of stops on the public server: which motion each one ends, and which one hangs it."""
+"""Tests of stops on the public server: which motion each one ends, and which one hangs it.
+
+F, B and RM are drives, R and L are spins. SM and SRM are stops on the command port. SL and SS are
+stops on the stop port, which is never answered.
+"""
 
 import pytest
 from mart_rig import Rig
@@ -12,7 +16,7 @@ CONFLICT = "fail conflicting action in progress"
 
 @pytest.mark.parametrize("start", ["F", "F SLOW", "F FAST", "B", "B SLOW", "B FAST", "B NORMAL"])
 def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
-    """SM ends F and B in about 0.4 s. The robot is at rest when the reply comes."""
+    """SM ends the drives F and B in about 0.4 s. The robot is at rest when the reply comes."""
     rig = Rig()
     rig.drive(start)
     assert rig.moving
@@ -25,7 +29,7 @@ def test_sm_ends_f_and_b_on_the_command_port_in_0_4_s(start: str) -> None:
 
 @pytest.mark.parametrize("speed", [45, 50, 60])
 def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
-    """During RM, SM fails. Only SRM ends RM."""
+    """During the forward drive RM, the stop SM fails. Only the stop SRM ends RM."""
     rig = Rig()
     rig.drive(f"RM {speed}")
     assert rig.ask("SM") == "fail no motion"
@@ -38,7 +42,7 @@ def test_srm_ends_rm_in_0_43_to_0_6_s(speed: int) -> None:
 
 @pytest.mark.parametrize(("start", "degrees"), [("R", -1), ("L", 1), ("R SLOW", -1), ("L SLOW", 1)])
 def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> None:
-    """SM ends a spin. Its reply has the angle of the spin, negative to the right."""
+    """The stop SM ends a spin. Its reply has the angle of the spin, negative to the right."""
     rig = Rig()
     rig.drive(start)
     answer = rig.ask("SM")
@@ -49,7 +53,7 @@ def test_sm_ends_a_spin_and_tells_signed_degrees(start: str, degrees: int) -> No
 
 
 def test_ss_then_sm_ends_a_spin_too() -> None:
-    """SS, sent to the stop port, stops the robot during a spin. SM on the command port follows.
+    """During a spin, SS on the stop port stops the robot. The stop SM on the command port follows.
 
     The reply to SM has the angle of the spin, and the server accepts the next motion.
     """
@@ -64,7 +68,7 @@ def test_ss_then_sm_ends_a_spin_too() -> None:
 
 @pytest.mark.parametrize("start", ["TF 100", "TB 100", "TF SLOW 100", "TF 0"])
 def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
-    """SL ends a controlled move. The reply to the move has the computed distance.
+    """SL on the stop port ends a controlled move. The reply to the move has the computed distance.
 
     The command port is free again.
     """
@@ -83,7 +87,10 @@ def test_sl_ends_a_controlled_move_which_then_answers(start: str) -> None:
 
 @pytest.mark.parametrize("start", ["MCR 170", "MCL 170", "MCR SLOW 170"])
 def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
-    """SS ends a controlled spin. The reply to the spin is ok, although the turn is incomplete."""
+    """SS on the stop port ends a controlled spin.
+
+    The reply to the spin is ok, although the turn is incomplete. The command port is free again.
+    """
     rig = Rig()
     rig.say(start)
     rig.run(0.8)
@@ -99,9 +106,9 @@ def test_ss_ends_a_controlled_spin_which_then_answers(start: str) -> None:
 def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
     stop: str, start: str, end: str
 ) -> None:
-    """SL or SS on the stop port stops a motion. Then SM or SRM comes on the command port.
+    """A stop on the stop port (SL or SS) ends a motion. Then a stop comes on the command port.
 
-    The command port hangs for ever. The motors are off.
+    This stop (SM or SRM) makes the command port hang for ever. The motors are off.
     """
     rig = Rig()
     rig.drive(start)
@@ -121,7 +128,7 @@ def test_a_stop_on_the_stop_port_then_sm_or_srm_hangs_the_command_port(
 @pytest.mark.parametrize("stop", ["SL", "SS"])
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 30", "SRM")])
 def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str) -> None:
-    """SL or SS on the stop port and SM or SRM on the command port come at the same time.
+    """A stop on the stop port (SL or SS) and one on the command port (SM or SRM) come together.
 
     The command port hangs for ever. The motors are off.
     """
@@ -134,7 +141,10 @@ def test_it_hangs_as_well_when_both_come_at_once(stop: str, start: str, end: str
 
 
 def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
-    """SL comes directly after SM, and hangs the stop port. SM is still answered."""
+    """SL on the stop port comes directly after SM on the command port. SM is still answered.
+
+    The stop port hangs.
+    """
     rig = Rig()
     rig.drive("F")
     rig.say("SM")
@@ -151,7 +161,7 @@ def test_sl_behind_sm_hangs_the_stop_port_instead() -> None:
 
 @pytest.mark.parametrize("start", ["F", "B", "RM 30"])
 def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
-    """SL alone has stopped a motion.
+    """A motion was stopped only on the stop port (SL).
 
     Until a restart, the server refuses motions, but answers queries.
     """
@@ -174,7 +184,10 @@ def test_sl_alone_leaves_a_conflict_until_exit(start: str) -> None:
 @pytest.mark.parametrize("start", ["F", "B SLOW", "RM 30"])
 @pytest.mark.parametrize("after_s", [0.001, 0.03, 0.06])
 def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: float) -> None:
-    """SL and SS come before the ok of a start. They have no effect, and the robot drives on."""
+    """A stop on the stop port (SL or SS) comes before the reply to a start.
+
+    It has no effect, and the robot drives on.
+    """
     rig = Rig()
     rig.say(start)
     rig.run(after_s)
@@ -187,7 +200,7 @@ def test_sl_before_ok_is_ignored_and_the_robot_drives_on(start: str, after_s: fl
 
 
 def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() -> None:
-    """SL comes while a controlled move still measures the gyro's bias.
+    """SL on the stop port comes while a controlled move still measures the gyro's bias.
 
     If it comes after 0.03 s, it is ignored. If it comes after 0.1 s, it ends the move late.
     """
@@ -206,7 +219,7 @@ def test_sl_in_the_first_moments_of_a_controlled_move_does_not_end_it_at_once() 
 
 
 def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinning() -> None:
-    """L comes during RM.
+    """The spin L is commanded during the forward drive RM.
 
     The robot spins, and the command port hangs, so no later request is answered.
     """
@@ -222,7 +235,10 @@ def test_l_during_rm_is_accepted_and_hangs_the_command_port_with_the_robot_spinn
 
 @pytest.mark.parametrize("text", ["R", "F", "B", "TF 12", "MCR 20", "RM 20", "SB", "RST IMU"])
 def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
-    """During RM the server refuses all other motions except L. RM continues."""
+    """During the forward drive RM, the server refuses all other motions except the spin L.
+
+    RM continues.
+    """
     rig = Rig()
     rig.drive("RM 30")
     assert rig.ask(text) == CONFLICT
@@ -233,7 +249,7 @@ def test_r_and_f_during_rm_are_refused_correctly(text: str) -> None:
 @pytest.mark.parametrize("text", ["R", "L", "F", "RM 20", "TF 12", "MCR 20", "SB"])
 @pytest.mark.parametrize("start", ["F", "R"])
 def test_everything_is_refused_during_f_and_r(start: str, text: str) -> None:
-    """During F and R the server refuses every motion, even L, and also SB."""
+    """During a drive (F) or a spin (R), the server refuses every motion and a calibration (SB)."""
     rig = Rig()
     rig.drive(start)
     assert rig.ask(text) == CONFLICT
@@ -271,9 +287,9 @@ def test_the_stop_port_is_never_answered() -> None:
 
 @pytest.mark.parametrize(("start", "end"), [("F", "SM"), ("RM 120", "SRM")])
 def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> None:
-    """A stop of F takes more than 0.75 s. The server reports it as failed.
+    """A stop of the drive F takes more than 0.75 s. The server reports it as failed.
 
-    A stop of RM is reported as ok, even if it takes up to 1.88 s.
+    A stop of the forward drive RM is reported as ok, even if it takes up to 1.88 s.
     """
     rig = Rig()
     rig.ask("SLMP 1 60")
@@ -288,7 +304,7 @@ def test_a_stop_that_takes_longer_than_0_75_s_is_told(start: str, end: str) -> N
 
 @pytest.mark.parametrize("start", ["TF 0", "TF 24"])
 def test_sdr_without_a_number_crashes_the_server(start: str) -> None:
-    """SDR without a number comes during a controlled move.
+    """The command SDR, which limits a move, lacks its number and comes during a controlled move.
 
     The server crashes, and the robot moves on.
     """

@@ -188,7 +188,10 @@ def test_an_unknown_control_mode_is_ignored() -> None:
 
 
 def test_a_board_that_knows_no_emergency_stop_drives_on() -> None:
-    """A board without an emergency stop gets such a frame. The board ignores it and drives on."""
+    """A board without an emergency stop gets an emergency stop frame.
+
+    The board ignores the frame and drives on.
+    """
     board = SimulatedBoard(BoardSettings(running=True, obeys_estop=False))
     board.receive(velocity(35, 0, 0) + ESTOP)
     assert [command.kind for command in board.commands] == ["velocity"]

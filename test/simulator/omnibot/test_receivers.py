@@ -40,9 +40,9 @@ def understood(
     control_frames: bool = True,
     pause_s: float = 0.05,
 ) -> list[Command]:
-    """Return the commands that a new receiver finds in hexadecimal writes.
+    """Return the commands that a new receiver finds in the bytes written to it.
 
-    Between two writes there is a pause of ``pause_s``.
+    ``writes``: bytes in hexadecimal. Between two writes there is a pause of ``pause_s``.
     """
     receiver = CommandReceiver(kind, awake=awake)
     commands: list[Command] = []
