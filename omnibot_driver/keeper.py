@@ -52,7 +52,8 @@ class Keeper:
         self._descriptors = descriptors
         self.last_words = stop, emergency_stop
         self._ahead = 0
-        """Number of bytes of stop commands that the guard may not have read yet."""
+        """Number of bytes of stop commands that the guard may not have read yet. The other unread
+        bytes are heartbeats; too many of them show that the guard hangs."""
         self._process: subprocess.Popen[bytes] | None = None
         self._dying: list[subprocess.Popen[bytes]] = []
         """Killed processes that have not ended yet."""
@@ -125,7 +126,7 @@ class Keeper:
         return "the guard process hung"
 
     def _give_up(self, process: subprocess.Popen[bytes]) -> None:
-        """Kill the guard without waiting for its end; later heartbeats check whether it has ended.
+        """Kill the guard without waiting for its end, which later calls of ``beat`` detect.
 
         The caller holds the lock of the session, so waiting would delay the e-stop.
         """

@@ -26,17 +26,18 @@ from omnibot_driver.shared_session import SharedSession
 from omnibot_driver.transports import Transport
 
 JOIN_TIMEOUT_S: Final = 3.0
-"""Longest wait for a thread to end, in s. The reader thread may itself wait for the guard to end,
-which takes less time."""
+"""Longest wait for a thread to end, in s. It must be longer than the time for which the reader
+thread may itself wait for the guard process to end."""
 STANDS_WITHIN_S: Final = 0.5
 """Longest wait at shutdown, in s, for a proof that the robot is at rest; longer for a slow
 board."""
 UNGUARDED_S: Final = 1.5
-"""Longest wait at shutdown, in s, if no guard process can repeat Stop. It then replaces the usual
-wait, ``STANDS_WITHIN_S``."""
+"""Longest wait at shutdown, in s, for a proof that the robot is at rest, if no guard process can
+repeat Stop afterwards. It replaces the shorter ``STANDS_WITHIN_S``."""
 SILENCE_S: Final = 0.25
-"""Longest wait, in s, for a second proof of rest; longer for a slow board. Meanwhile nothing is
-sent, so the proof shows that the last Stop arrived undamaged."""
+"""Longest wait at shutdown, in s, for a second proof that the robot is at rest; longer for a slow
+board. The driver sends nothing during this wait. So the second proof shows that the last Stop was
+not damaged on the line: a damaged one might move the robot."""
 
 T = TypeVar("T")
 
@@ -111,9 +112,9 @@ class Link:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass the command ``wish`` to the session by a call of ``action``.
+        """Pass a motion command on: call ``action`` with the session, ``wish`` and the time.
 
-        ``SharedSession.command`` has the details.
+        ``wish``: the motion that the sender wants. ``SharedSession.command`` has the details.
         """
         self._shared.command(action, wish, sent_ns, moves_base=moves_base)
 
@@ -188,7 +189,7 @@ class Link:
     def _stop_for_good(self) -> None:
         """Stop the robot and wait until it is at rest. The caller holds the lock.
 
-        The wait releases the lock, so that the pacer repeats Stop.
+        The lock is released during the wait, so that the pacer thread can repeat Stop.
         """
         self._session.shutdown.begin(now := time.monotonic())
         self._shared.settle()

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from typing import Final
 
 MOST_WAITING: Final = 1000
-"""Number of queued calls at which the queue is full. ``deliver`` then waits until another thread
-has made these calls."""
+"""Number of queued calls at which the queue is full. A thread that calls ``deliver`` while the
+queue is full waits until another thread has made these calls."""
 
 Delivery = Callable[[], object]
 

@@ -105,7 +105,10 @@ class Publishing:
         self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[Packet], None]]:
-        """Return functions that publish raw bytes, by the ``Link`` argument that receives them."""
+        """Return functions that publish each read and each write of the port.
+
+        They are arguments for ``Link``, by the name of the argument.
+        """
         return {
             "on_read": self._raw_publisher("~/raw_rx"),
             "on_write": self._raw_publisher("~/raw_tx"),
@@ -172,11 +175,17 @@ class Publishing:
                 self._handlers[kind](event, stamp_ns - steady_ns)
 
     def _end(self) -> None:
-        """Record that ROS is shutting down. A query at each event would take too much time."""
+        """Record that ROS is shutting down, so that later events are not published.
+
+        ROS calls this method. To ask ROS at each event would take too much time.
+        """
         self._over = True
 
     def _change_time(self, jump: TimeJump) -> None:
-        """Record whether time is simulated. A query at each event would take a microsecond."""
+        """Record whether the node's time is simulated, after ROS has changed this.
+
+        ROS calls this method. To ask ROS at each event would take a microsecond more.
+        """
         self._time_is_simulated = jump.clock_change == ClockChange.ROS_TIME_ACTIVATED
 
     def _raw_publisher(self, topic: str) -> Callable[[Packet], None]:

@@ -160,9 +160,9 @@ class Reader:
             self._outbox.deliver()
 
     def _process(self, now: float) -> None:
-        """Let the session act on received bytes, whose measurements were already delivered.
+        """Let the session react to received bytes, for example by a command to the board.
 
-        The caller holds the lock.
+        The measurements in these bytes are already delivered. The caller holds the lock.
         """
         stopped = self._shared.heed_stall()
         if self._session.inbound.process(now) or stopped:

@@ -94,7 +94,7 @@ class Replay:
         *,
         moves_base: bool = True,
     ) -> None:
-        """Pass the command ``wish`` to the session. Nothing is sent to a robot."""
+        """Pass a motion command on, like ``Link.command``. Nothing is sent to a robot."""
         self.call(lambda session, now: action(session, wish, now))
 
     def close(self, _on_exit: OnExit) -> bool:

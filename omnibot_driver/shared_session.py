@@ -2,8 +2,8 @@
 
 """One session and its open port, which several threads share under one lock.
 
-``settle`` must follow each input to the session: it writes due packets, and queues events in order.
-This module starts no thread and opens no port.
+After each input to the session, ``settle`` must be called. It writes the packets that are due, and
+queues events in their order. This module starts no thread and opens no port.
 """
 
 import math
@@ -94,8 +94,10 @@ class SharedSession:
     ) -> None:
         """Call ``action`` with the session and ``wish``, the motion that a sender wants.
 
-        * ``sent_ns``: possible times of sending, time of day in ns.
-        * ``moves_base``: whether a refusal affects the motion interlock.
+        * ``sent_ns``: possible times of sending, as time of day in ns. There are two while the
+          sender's clock is not known well.
+        * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
+          the motion interlock must know that the sender is still active.
 
         Raises CommandRefused for a command that was sent while this process was stalled. The
         function ``refused`` receives the reason of each refusal, unless too many events wait for
@@ -155,7 +157,7 @@ class SharedSession:
                     self.outbox.put(partial(self._on_write, packet))
 
     def tell_guard(self) -> None:
-        """Send the guard the board's stop commands if they have changed."""
+        """Send the guard process the board's stop commands if they have changed."""
         if (keeper := self.keeper) is None:
             return
         if (words := self.session.board.last_words()) != keeper.last_words:
@@ -184,9 +186,9 @@ class SharedSession:
         return length_s > 0.0
 
     def _beat(self, now: float) -> None:
-        """Record that the pacer thread runs, and send the guard a heartbeat if one is due.
+        """Record that the pacer thread runs, and send the guard process a heartbeat if due.
 
-        The pacer is the driver's watchdog.
+        If this method is not called for 0.4 s, the driver regards itself as stalled.
         """
         boot_s = boot_time_s()  # read once: a stall may come between two readings
         self._heed_stall(boot_s)

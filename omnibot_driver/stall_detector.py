@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of stalls: times in which this process, or its watchdog, did not run.
+"""Detection of stalls: times in which this process, or its watchdog's thread, did not run.
 
-Commands that were sent during a stall must not be obeyed. Every ``now`` is a time of
-``boot_time_s``. This module knows times; it does not know threads or commands.
+A command that was sent during a stall is outdated afterwards, so it must not be obeyed. Every
+``now`` is a time of ``boot_time_s``. This module knows times; it does not know threads or commands.
 """
 
 import math
@@ -11,14 +11,15 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Time without a call of ``passed``, in s, from which the process is regarded as stalled. It must
-be shorter than the guard's limit."""
+"""Time in s since the last call of ``StallDetector.passed`` from which the process is regarded as
+stalled. After a slightly longer time, the guard process stops the robot; the driver must notice
+each of these stalls."""
 SETTLE_S: Final = 0.25
-"""Time in s after the end of a stall in which commands are still refused, because a sender's clock
-is known only roughly."""
+"""Time in s after the end of a stall in which commands are still refused. The sender's clock is
+known only roughly, so they may have been sent during the stall."""
 LATEST_S: Final = 10.0
-"""Longest assumed time in transit, in s, retransmissions included. A command that seems to be older
-comes from a sender whose clock is wrong."""
+"""Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
+A command that seems to be older comes from a sender whose clock is wrong."""
 
 
 def boot_time_s() -> float:
@@ -34,8 +35,9 @@ def boot_time_ns() -> int:
 class StallDetector:
     """A detector of stalls: whether this process is stalled now, and when the last stall ended.
 
-    The watchdog's thread calls ``passed`` ten times a second. Other threads call ``begun`` before
-    they act. A step of the time of day does not matter.
+    The watchdog's thread calls ``passed`` ten times a second, to show that it runs. Every other
+    thread calls ``begun`` before it uses the session. If ``begun`` reports a stall, that thread
+    must stop the robot first. The detector also works if the computer's clock is set while it runs.
     """
 
     def __init__(self) -> None:
@@ -44,12 +46,13 @@ class StallDetector:
         self._over_at = -math.inf
         self._from_ns = self._until_ns = 0
         self._day_ns = 0
-        """Time of day at which the steady clock showed 0, in ns."""
+        """Time of day, in ns, at which the steady clock showed 0. It changes if the computer's
+        clock is set."""
 
     def begun(self, now: float) -> float:
-        """Return the length of the present stall so far, in s; 0 without a stall.
+        """Return the length in s of a stall that was not reported before; otherwise 0.
 
-        Each stall is reported only once.
+        After a stall, only the first thread that calls this method gets the length.
         """
         length_s = now - self._passed_at
         if self._begun or length_s < STANDSTILL_S:
@@ -58,7 +61,10 @@ class StallDetector:
         return length_s
 
     def passed(self, now: float, wall_ns: int) -> None:
-        """Record that the watchdog's thread runs. ``wall_ns`` is the time of day, in ns."""
+        """Record that the watchdog's thread runs now, which ends a stall.
+
+        ``wall_ns``: the present time of day, in ns.
+        """
         if self._begun:
             self._begun = False
             if now >= self._over_at + LATEST_S:  # else commands from that stall may still arrive

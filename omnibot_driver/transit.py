@@ -19,14 +19,15 @@ from omnibot_driver.core.errors import CommandRefused
 
 HEALS_AFTER_S: Final = 5.0
 LONGEST_SILENCE_S: Final = 2.0
-"""Longest pause, in s, between two late messages of one series. After a longer pause, a late
-message begins a new series."""
+"""Longest pause, in s, within a series of late messages. If all messages of a sender are late for 5
+s (``HEALS_AFTER_S``), its clock was probably set back. After a longer pause, a late message begins
+a new series."""
 LARGEST_DRIFT: Final = 5e-4
 """Largest assumed drift between two clocks, in s per s. NTP corrects a clock at most at this
 rate."""
 CLOCK_RETREATS: Final = 10.0
-"""Factor by which earliness counts more than lateness when a message is assigned to a sender: 1 s
-too early fits as badly as 10 s too late."""
+"""Factor by which a message that seems too early fits a sender worse than one that is late: 1 s too
+early fits as badly as 10 s too late. A message is assigned to the sender that it fits best."""
 MOST_SENDERS: Final = 8
 KNOWN_AFTER: Final = 10
 """Number of messages after which the offset of a sender is regarded as known. Before that, perhaps
@@ -136,11 +137,14 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Return whether this sender may have sent ``number``. A sender's numbers only grow."""
+        """Return whether message ``number`` may be from this sender, whose numbers increase."""
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:
-        """Return how badly the message fits this sender, as a lateness in s; 0 is a perfect fit."""
+        """Return how badly the message fits this sender, as a delay in s; 0 fits exactly.
+
+        A message that is too early counts as late by ten times (``CLOCK_RETREATS``) that time.
+        """
         late_s = min(
             offset.late_s(difference_s, at_s)
             for offset, difference_s in zip(self._offsets, differences_s, strict=True)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Helpers for tests of the guard: a line, and functions that act in place of the driver."""
+"""Helpers for tests of the guard, the process that stops the robot if the driver cannot.
+
+They are a line in place of a board, and functions that act in place of the driver.
+"""
 
 import contextlib
 import os

@@ -75,7 +75,10 @@ class PseudoTerminal:
             keyboard.join()
 
     def wait_for(self, text: str) -> None:
-        """Wait until the program draws ``text`` after the text of the previous call."""
+        """Wait until the program draws ``text``.
+
+        Only output that follows the text of the previous call is searched.
+        """
         with self._changed:
             found = self._changed.wait_for(lambda: text.encode() in self._drawn, PATIENCE_S)
             assert found, f"{text!r} is not in {self._drawn[-2000:]!r}"

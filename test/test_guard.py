@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the guard as a separate process, on a real pseudo-terminal."""
+"""Tests of the guard, the separate process that stops the robot if the driver cannot.
+
+The board is replaced by a real pseudo-terminal.
+"""
 
 import ast
 import os
@@ -31,12 +34,15 @@ from omnibot_driver.keeper import Keeper
 
 @pytest.fixture(autouse=True)
 def _no_guard_is_killed_while_it_speaks(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the driver wait longer for its guard, whose start and stops a busy computer may delay."""
+    """Let the driver wait longer for its guard.
+
+    A busy computer may delay the guard's start and its repetition of the stop bytes.
+    """
     monkeypatch.setattr("omnibot_driver.keeper.SPEAKS_WITHIN_S", PATIENCE_S)
 
 
 def test_a_driver_that_says_good_bye_needs_no_guard(line: Line) -> None:
-    """The driver has stopped the robot itself and ends. The guard writes nothing."""
+    """The driver has stopped the robot itself and ends. The guard process writes nothing."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     alive(keeper, 0.2)
     keeper.end(stopped=True)
@@ -56,7 +62,7 @@ def test_a_broken_pipe_brings_the_last_words_again_and_again(line: Line) -> None
 
 
 def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line: Line) -> None:
-    """The driver's heartbeats stop, so the guard writes stop bytes.
+    """The driver's heartbeats stop, so the guard process writes stop bytes to the board.
 
     When heartbeats arrive again, the guard stops writing and waits.
     """
@@ -73,9 +79,9 @@ def test_missing_heartbeats_bring_the_last_words_until_the_driver_is_heard(line:
 
 
 def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Line) -> None:
-    """The driver changes the stop bytes. Its guard writes the new ones, and so does the next guard.
+    """The driver changes the board's stop bytes, because they depend on the state of the board.
 
-    A board's state may decide how it is stopped.
+    The driver's guard process writes the new bytes, and so does the next guard process.
     """
     keeper = Keeper([line.near, None], packed(LAST_WORDS), packed(LATCHED_WORDS))
     words = packed(b"other words"), packed(b"other latched words")
@@ -96,7 +102,7 @@ def test_words_that_change_are_known_at_once_to_this_guard_and_the_next(line: Li
 
 
 def test_in_a_full_port_room_is_made_for_the_last_words(line: Line) -> None:
-    """Old commands fill the port's buffer. The guard discards them to make room for the stop bytes.
+    """Old commands fill the port's buffer. The guard process discards them, so the stop bytes fit.
 
     The test reads nothing before the guard's end.
     """
@@ -118,9 +124,9 @@ def test_a_dead_port_does_not_hold_the_guard(line: Line) -> None:
 
 
 def test_signals_meant_for_the_driver_do_not_end_the_guard(line: Line) -> None:
-    """The guard ignores signals that usually end a process.
+    """The guard process ignores signals that usually end a process.
 
-    The guard has its own session, so ctrl-C in the driver's terminal does not reach the guard.
+    It has its own session, so ctrl-C in the driver's terminal does not reach it.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
@@ -154,7 +160,7 @@ def test_who_kills_by_the_drivers_name_does_not_hit_the_guard(
 
 
 def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
-    """The guard has none of the driver's sockets and files, and imports few modules."""
+    """The guard process has none of the driver's sockets and files, and imports few modules."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
     started(pid)
@@ -179,7 +185,7 @@ def test_the_guard_is_small_and_holds_nothing_but_the_port(line: Line) -> None:
 
 
 def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line: Line) -> None:
-    """A board has two lines, and one is gone. The guard stops the other line.
+    """A board has two lines, and one is gone. The guard process stops the robot on the other line.
 
     Each line gets only its own stop bytes.
     """
@@ -216,7 +222,7 @@ def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> No
 
 
 def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
-    """The driver replaces the stop bytes just before it ends. The guard writes the new ones."""
+    """The driver replaces the stop bytes just before it ends. Its guard writes the new ones."""
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     keeper.beat(time.monotonic())
     for word in (b"first", b"second", b"newest"):
@@ -226,7 +232,7 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """The guard separates heartbeats and stop bytes from one pipe, wherever a read ends.
+    """The guard process separates heartbeats and stop bytes from one pipe, wherever a read ends.
 
     A lone ``e`` is a heartbeat with a latched e-stop. Stop bytes may contain an ``e``, too.
     """

@@ -2,7 +2,8 @@
 
 """Tests of guards that end, hang, or cannot be started.
 
-The driver replaces them without waiting.
+A guard is a process that stops the robot if the driver cannot. The driver replaces a failed guard
+without waiting for its end.
 """
 
 import contextlib
@@ -17,14 +18,14 @@ from omnibot_driver.core.packets import packed
 from omnibot_driver.keeper import BEAT_S, HANGS_AFTER, MOST_DYING, Keeper
 
 EARLY_S = -1000.0
-"""Time of a simulated heartbeat, in s, which is always in the past.
+"""Time of a simulated heartbeat, in s, which is before every time of the real clock.
 
-The clock begins near 0 at boot, so its time is never negative.
+The real clock begins near 0 at boot, so its time is never negative.
 """
 
 
 def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Line) -> None:
-    """A suspended guard does not read the new stop bytes. The driver replaces this guard.
+    """A suspended guard process does not read the new stop bytes. The driver replaces this guard.
 
     Otherwise the guard would later write outdated stop bytes.
     """
@@ -41,9 +42,9 @@ def test_words_for_a_guard_that_reads_nothing_are_given_to_another_one(line: Lin
 
 
 def test_many_words_are_no_sign_that_a_guard_hangs(line: Line) -> None:
-    """The driver changes the stop bytes often while a guard is starting and reads nothing.
+    """A guard process is starting and reads nothing yet. The driver changes the stop bytes often.
 
-    The driver does not conclude that the guard hangs.
+    The driver does not conclude from the many unread bytes that the guard hangs.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     children = line.children()
@@ -72,7 +73,7 @@ def test_a_guard_that_dies_is_told_once_and_replaced(line: Line) -> None:
 def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard cannot be started. The driver reports this, continues, and tries again later."""
+    """A guard process cannot be started. The driver reports this and tries again later."""
     with monkeypatch.context() as without:
         without.setattr("sys.executable", "/no/python")
         keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
@@ -85,9 +86,9 @@ def test_a_guard_that_cannot_be_started_is_told_and_tried_again(
 
 
 def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
-    """A guard hangs and does not read its heartbeats.
+    """A guard process hangs and does not read its heartbeats.
 
-    The driver replaces it before the pipe is full.
+    The driver replaces the guard before the pipe with the heartbeats is full.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (first,) = line.children()
@@ -105,7 +106,7 @@ def test_a_guard_that_hangs_is_told_and_replaced(line: Line) -> None:
 def test_a_guard_that_does_not_die_never_holds_up_a_beat(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A guard hangs and cannot be killed. The driver starts another guard at once.
+    """A guard process hangs and cannot be killed. The driver starts another guard at once.
 
     The driver does not wait for the end of the first guard.
     """
@@ -154,7 +155,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 
 
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
-    """The guard is suspended when the driver ends, so it cannot read the end message.
+    """The guard process is suspended when the driver ends, so it cannot read the end message.
 
     The driver does not wait for it.
     """
@@ -168,9 +169,9 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
 def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard cannot be killed when the driver ends. The driver does not wait for it.
+    """The guard process cannot be killed when the driver ends. The driver does not wait for it.
 
-    Here, the guard is a suspended process.
+    A suspended process takes the place of such a guard.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a link and its threads, on a real pseudo-terminal and without ROS."""
+"""Tests of a link: one session on one port, and the threads that serve them.
+
+The port is a real pseudo-terminal. ROS is not used.
+"""
 
 from itertools import pairwise
 from pathlib import Path
@@ -61,9 +64,10 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard gets ten heartbeats per second, although the pacer runs more often.
+    """The guard process gets ten heartbeats per second, although the pacer thread runs more often.
 
-    The rate is fixed because the number of unread heartbeats shows that a guard hangs.
+    The driver counts unread heartbeats to notice a guard that hangs. At a higher rate, it would
+    conclude this too early.
     """
     beats: list[float] = []
     monkeypatch.setattr(Keeper, "beat", lambda _keeper, now, *, latched: beats.append(now) or "")
@@ -176,9 +180,9 @@ def test_a_refused_command_raises_where_it_was_given(board: PtyBoard) -> None:
 
 
 def test_a_port_that_no_guard_can_share_is_told_once(board: PtyBoard) -> None:
-    """The port, here ``loop://``, cannot be shared with a guard. The driver reports this once.
+    """A guard process cannot share the port, here ``loop://``. The driver reports this once.
 
-    Without a guard, only the driver itself can stop the robot.
+    Without a guard process, only the driver itself can stop the robot.
     """
     listener = Listener()
     link = link_to("loop://", listener, session())

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a link whose port accepts no data for a while. Afterwards the link writes Stop first."""
+"""Tests of a link whose port accepts no data for a while.
+
+When the port accepts data again, Stop is written to it before anything else.
+"""
 
 import os
 import threading
@@ -56,9 +59,9 @@ def at_rest(terminal: Terminal) -> tuple[Link, Session]:
 
 
 def test_a_full_port_leaves_the_last_stop_to_the_guard(terminal: Terminal) -> None:
-    """The port is full while the link closes. Closing does not hang.
+    """The port is full while the link closes. The link does not wait for the port.
 
-    The guard stops the robot when there is room in the port.
+    When the port has room again, the guard process writes Stop.
     """
     link, _ours = at_rest(terminal)
     terminal.fill()
@@ -91,7 +94,10 @@ def test_an_estop_that_a_full_port_does_not_take_is_known_to_be_late(terminal: T
 
 
 def test_a_defect_while_the_port_is_full_leaves_the_stop_to_the_guard(terminal: Terminal) -> None:
-    """A defect ends the driver while its port is full. The guard sends Stop when there is room."""
+    """A defect ends the driver while its port is full. The guard process sends Stop later.
+
+    It does so as soon as there is room in the port.
+    """
     link, ours = at_rest(terminal)
     terminal.fill()
     closed, session_closed = ours.closed, threading.Event()

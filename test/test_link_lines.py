@@ -139,7 +139,7 @@ def test_a_line_that_is_there_hears_stop_again_and_again_while_another_is_missin
 
 
 def test_a_line_that_comes_late_completes_the_board(lines: Lines) -> None:
-    """The second line appears later than the first. Then the robot can be driven."""
+    """The second line appears later than the first. When both are open, the robot can be driven."""
     lines.link.start()
     lines.drive.read_until(STOPS)
     lines.connect()
@@ -185,7 +185,10 @@ def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
 
 
 def test_the_guard_knows_what_stops_the_board_as_it_is_now(tmp_path: Path) -> None:
-    """The guard's stop bytes change with the state that the board reports."""
+    """The board's state decides which bytes stop it. The link sends these to the guard process.
+
+    When the state changes, the link sends the new bytes.
+    """
     with closing(Lines(tmp_path, MoodyBoard())) as lines:
         lines.connect()
         lines.link.start()

@@ -22,7 +22,8 @@ pytestmark = pytest.mark.usefixtures("nothing_left_behind")
 def obeyed(command: Callable[[], None]) -> bool:
     """Return whether the command is accepted.
 
-    After a stall no command is accepted before the pacer has run.
+    After a stall, every command is refused until the pacer has run, so a test may have to repeat
+    it.
     """
     try:
         command()
@@ -76,7 +77,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
     """The computer is suspended during a drive. When it resumes, the driver stops the robot.
 
-    The heartbeats' clock does not count the suspension.
+    The driver notices the suspension by a clock that counts it.
     """
     suspended_s = 0.0
     monkeypatch.setattr(

@@ -103,7 +103,7 @@ def test_a_goal_that_is_not_a_place_on_the_floor_is_refused_with_a_reason(
 def test_the_clock_offset_has_no_jitter_but_follows_a_step() -> None:
     """The offset between two clocks is estimated from readings of both.
 
-    A late reading does not change it. If one clock is stepped, the offset follows.
+    A late reading does not change the offset. If one of the clocks is set, the offset follows.
     """
     offset = messages.clock_offset(0, 1_000, 500_001_002, 1_004)
     assert 500_000_000 - 2 <= offset <= 500_000_002

@@ -97,7 +97,7 @@ raise SystemExit("the last words")
 
 
 def test_what_is_printed_at_the_end_is_seen_where_it_is_read() -> None:
-    """Text that is printed at the program's end comes after all text from before."""
+    """Text that is printed at the program's end comes after all earlier text."""
     program = """
 import os
 from omnibot_driver.output import UnblockedOutput

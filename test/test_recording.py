@@ -38,7 +38,7 @@ def cdr(data: bytes) -> bytes:
 def bag(
     path: Path, *topics: str, plugin: StoragePlugin = StoragePlugin.MCAP, kind: str = RAW
 ) -> Path:
-    """Write a bag in which each topic contains the chunks, and return its path."""
+    """Write a bag in which each topic contains the packets of ``CHUNKS``, and return its path."""
     with Writer(path, version=9, storage_plugin=plugin) as writer:
         for topic in topics:
             connection = writer.add_connection(topic, kind, typestore=TYPES)

@@ -39,7 +39,7 @@ REFUSED: dict[str, Action] = {
 
 
 class Sender:
-    """Sends commands to the session of a bench, at the time of the bench."""
+    """A sender of commands to the session of a ``Bench``, at the simulated time of the bench."""
 
     def __init__(self, bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
         clock = SimpleNamespace(monotonic=lambda: bench.now)
@@ -65,7 +65,8 @@ def test_a_sender_of_refused_commands_does_not_pause(
 ) -> None:
     """The motion monitor has stopped the robot. The sender then sends invalid or late commands.
 
-    These do not count as silence of the sender, which alone allows motion again.
+    The robot may move again only after the sender has been silent. Refused commands show that the
+    sender is not silent, so its next valid command is refused, too.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)
@@ -81,7 +82,7 @@ def test_a_sender_does_not_pause_while_its_commands_are_refused_after_a_stall(
 ) -> None:
     """The motion monitor has stopped the robot. Then a stall makes the driver refuse commands.
 
-    A sender of refused commands does not count as silent.
+    Their sender does not count as silent, so its next command is refused, too.
     """
     bench = on_the_wrong_switch("earth")
     stopped_after_s(bench, SLOWLY)

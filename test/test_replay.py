@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of replays: a recorded line gives the same result every time, at any speed.
+"""Tests of replays: every replay of a recorded line gives the same result, at any speed.
 
-The session had the same result during the recording.
+The result is also that of the session which ran during the recording.
 """
 
 import itertools
@@ -142,15 +142,16 @@ def test_every_replay_is_the_same() -> None:
 
 
 def test_the_pace_makes_no_difference() -> None:
-    """Replays of one recording at different speeds have the same events."""
+    """Replays of one recording at different playback speeds have the same events."""
     tape = Tape(BAD_LINE[:100])
     assert play(replace(tape, speed=5.0)).events == play(tape).events
 
 
 def test_time_passes_as_it_did() -> None:
-    """The recording has a silence of 2 s. The state is then ``connecting``, whatever the speed.
+    """The recording has a silence of 2 s. The replay is faster, but also has the silence of 2 s.
 
-    At the end of the recording, the state is ``disconnected``.
+    Its state is ``connecting`` during the silence, and ``disconnected`` at the end of the
+    recording.
     """
     heard = play(Tape(simulated(600, silent=range(200, 400))))
     assert heard.states == [

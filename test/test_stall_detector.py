@@ -2,7 +2,8 @@
 
 """Tests of the stall detector.
 
-It finds stalls of the watchdog's thread, and commands that waited in a stall.
+It finds stalls of the watchdog's thread, and commands that waited in a stall. A command is
+*refused* if ``outlived_by`` returns False for it.
 """
 
 import pytest
@@ -12,7 +13,7 @@ from omnibot_driver.keeper import BEAT_S
 from omnibot_driver.stall_detector import SETTLE_S, STANDSTILL_S, StallDetector
 
 DAY_NS = 1_700_000_000_000_000_000
-"""Wall-clock time at which the steady clock shows 0, in ns."""
+"""Time of day at which the steady clock shows 0, in ns."""
 
 
 def wall_ns(now: float) -> int:
@@ -39,7 +40,7 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 
 
 def test_a_standstill_is_told_once_with_its_length() -> None:
-    """The first thread that runs after a stall reports the stall, and no other thread does.
+    """After a stall, only the first call of ``begun`` returns the length of the stall.
 
     The next stall is reported again.
     """
@@ -53,7 +54,7 @@ def test_a_standstill_is_told_once_with_its_length() -> None:
 
 
 def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
-    """After a stall, no command is fresh before the watchdog's own thread has run."""
+    """After a stall, every command is refused until the watchdog's own thread has run."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert not standstill.outlived_by(wall_ns(100.0 + STANDSTILL_S), 100.0 + STANDSTILL_S)
@@ -69,9 +70,9 @@ def stalls_again(standstill: StallDetector, begin: float, end: float) -> None:
 
 
 def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
-    """The driver stalls three times. Commands from before the last stall's end are not fresh.
+    """The driver stalls three times. Commands from before the end of the last stall are refused.
 
-    A retransmission may deliver a command after several stalls.
+    The middleware may deliver a command only after several stalls.
     """
     standstill = resumed(3.0)
     stalls_again(standstill, 103.4, 103.9)
@@ -85,7 +86,10 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """A stall long ago is forgotten: commands sent in that stall have arrived, or never will."""
+    """A command seems to come from a stall of 98 s ago. It is not refused.
+
+    A command cannot be in transit for that time, so the sender's clock must be wrong.
+    """
     standstill = resumed(3.0)
     stalls_again(standstill, 200.0, 201.0)
     standstill.passed(201.3, wall_ns(201.3))
@@ -94,16 +98,16 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """A command sent shortly before a stall is not fresh. It waited in a queue during the stall."""
+    """A command is sent shortly before a stall, and waits during the stall. It is refused."""
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)
 
 
 def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_from_before() -> None:
-    """A command seems to be sent 1 ms after the end of a stall. It is not fresh.
+    """A command seems to be sent 1 ms after the end of a stall. It is refused.
 
-    The driver knows the sender's clock only to within a transit time.
+    The driver knows the sender's clock only roughly, so the command may come from the stall.
     """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
@@ -111,9 +115,9 @@ def test_a_command_that_seems_to_be_sent_at_the_end_of_the_standstill_may_be_fro
 
 
 def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
-    """A command is sent during a stall and arrives seconds later. It is not fresh.
+    """A command is sent during a stall and arrives seconds later. It is refused.
 
-    Ten seconds after the stall, all commands are fresh again.
+    Ten seconds after the stall, all commands are accepted again.
     """
     standstill = resumed(5.0)
     standstill.passed(108.0, wall_ns(108.0))
@@ -127,9 +131,9 @@ def test_a_command_sent_during_the_standstill_is_never_fresh() -> None:
 def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_old(
     step_s: float,
 ) -> None:
-    """NTP steps the clock after a stall.
+    """The computer's clock is set forward or back after a stall.
 
-    Commands from the stall stay old, and new ones stay fresh.
+    Commands from the stall are still refused, and new ones are accepted.
     """
     standstill = resumed(3.0)
     standstill.passed(103.5, wall_ns(103.5))
@@ -146,9 +150,9 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
 
 @pytest.mark.parametrize("skew_s", [-1e6, 1e6])
 def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(skew_s: float) -> None:
-    """The sender's clock is wrong by days. Its commands are not fresh right after a stall.
+    """The sender's clock is wrong by days. Its commands are refused right after a stall.
 
-    A second later, its commands are fresh again.
+    A second later, its commands are accepted again.
     """
     standstill = resumed(5.0)
     assert not standstill.outlived_by(wall_ns(104.9 + skew_s), 105.0 + SETTLE_S / 2)
@@ -157,8 +161,8 @@ def test_with_a_wrong_clock_at_the_sender_only_what_comes_at_once_is_suspect(ske
 
 
 def test_whenever_the_guard_steps_in_the_driver_notices() -> None:
-    """A stall that makes the guard act is long enough for the driver to notice it.
+    """A stall that makes the guard process act is long enough for the driver to notice it.
 
-    Otherwise guard and driver would send contradictory commands.
+    Otherwise, the guard process and the driver would send contradictory commands.
     """
     assert 3 * BEAT_S < STANDSTILL_S < LIMIT_S

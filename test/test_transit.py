@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the estimated delay of commands, with clocks that are wrong, drift or step."""
+"""Tests of the estimated delay of commands, with clocks that are wrong, drift, or are set."""
 
 from dataclasses import dataclass, field
 
@@ -36,7 +36,7 @@ class Sender:
 
 @dataclass
 class Receiver:
-    """The driver.
+    """The part of the driver that receives commands.
 
     Its clock is ahead of the true time by ``ahead_s``, and its steady clock is right.
     """
@@ -125,7 +125,7 @@ def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_fir
 
 @given(st.sampled_from([1, -1]), st.floats(1.0, 1e6), st.booleans())
 def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, shared: bool) -> None:
-    """No command is refused when NTP steps the driver's clock, alone or with the sender's clock."""
+    """The driver's clock is set, alone or with the sender's clock. No command is refused."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for number in range(1000):
         now_s += 0.1
@@ -141,7 +141,7 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
 def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
     step_s: float, jitter_s: float
 ) -> None:
-    """The sender's clock steps back, so its commands seem late. They are soon accepted again."""
+    """The sender's clock is set back, so its commands seem late. They are soon accepted again."""
     receiver, sender, now_s = Receiver(), Sender(), 100.0
     for _ in range(100):
         now_s += 0.1
@@ -159,7 +159,7 @@ def test_a_sender_whose_clock_is_set_back_is_heard_again_soon(
 
 @given(st.floats(1.0, 1e6))
 def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
-    """The sender's clock steps forward.
+    """The sender's clock is set forward.
 
     Its commands are still accepted, and late ones still refused.
     """
@@ -175,7 +175,7 @@ def test_a_sender_whose_clock_is_set_forward_is_heard_on(step_s: float) -> None:
 def test_late_commands_now_and_then_do_not_pass_for_a_clock_that_was_set_back() -> None:
     """Single commands arrive late after a silence, like key presses on a bad network.
 
-    They are refused. The sender's clock is not taken as set back.
+    They are refused. The driver does not conclude that the sender's clock was set back.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.01)
@@ -250,10 +250,10 @@ def test_a_refusal_says_how_old_the_command_is_and_where_to_look() -> None:
 
 
 def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_seems() -> None:
-    """A sender's first message is 0.5 s late, so the sender's clock seems to be behind.
+    """A sender's first message is 0.5 s late, so its clock seems to the driver to be behind.
 
-    For the next message, the driver estimates two send times. The one by the sender's clock is
-    right.
+    For the next message, the driver therefore returns two possible times of sending: the estimated
+    one, and the one by the sender's clock. Here the latter is right.
     """
     receiver, sender = Receiver(), Sender()
     receiver.hear(sender, 100.0, 0.5)
@@ -263,9 +263,9 @@ def test_what_came_sooner_than_all_before_it_may_have_been_sent_sooner_than_it_s
 
 
 def test_of_a_sender_that_is_known_its_clock_alone_tells_nothing() -> None:
-    """After ten messages of a sender, the driver estimates only one send time for each message.
+    """After ten messages of a sender, the driver returns only one time of sending for each message.
 
-    The offset of the sender's clock has no effect.
+    It is right although the sender's clock is an hour behind.
     """
     receiver, sender = Receiver(), Sender(-HOUR_S)
     for number in range(KNOWN_AFTER):

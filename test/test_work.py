@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bounds for the number of Python calls per tick of the nominal stream. Times are not measured.
+"""Bounds for the number of Python calls for one tick (10 ms) of a running board's data.
 
-If a bound is raised, docs/internals/performance.md gives the reason.
+Times are not measured. If a bound is raised, docs/internals/performance.md gives the reason.
 """
 
 import gc
@@ -34,7 +34,8 @@ TICK_S = 0.01
 SETTLED = 400
 TICKS = 400
 IMU, DELTA, POSE = 14, 14 + 9, 14 + 9 + 15
-"""Lengths in bytes of the three kinds of ticks: IMU alone, IMU and delta, all three frames."""
+"""Bytes that the board sends in a tick of 10 ms. There are three kinds of ticks: only an IMU frame;
+IMU and delta; IMU, delta and pose."""
 
 
 def calls(work: Callable[[], object]) -> int:

@@ -3,7 +3,8 @@
 """The boards that the driver supports.
 
 Each board has a profile: a module that makes the objects for this board. A profile is imported only
-if the parameter ``board`` selects it. Outside the core, only the profile knows its board.
+if the parameter ``board`` selects it. Outside the core and the profiles, the driver's code must
+work with any board.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,7 +33,7 @@ reading and the reading's stamp, in ns of ROS time."""
 
 
 class Profile(Protocol):
-    """The functions and values of a board's profile, which is a module and not a class."""
+    """The functions and values that the profile of a board must have. A profile is a module."""
 
     SIMULATOR: str
     """Name of the package with the simulated board. It is imported only when it is used."""

@@ -18,7 +18,7 @@ SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
 """Largest rate of commands in a terminal mode, in Hz. In this mode, the board forwards each command
-to its compass over a slow line: at most 34 commands per second."""
+to its compass over a slow line, which can carry at most 34 commands per second."""
 
 WHEELS: Final = (
     Parameter(

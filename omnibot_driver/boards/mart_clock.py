@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The arguments of the controller's command TIME, which sets its clock, and when it may be sent.
+"""When the command TIME, which sets the controller's clock, may be sent, and with which arguments.
 
 TIME sets the clock to a full minute. If the clock is set back between two motions, the controller
 computes a wrong heading. This module knows times only.
@@ -10,8 +10,8 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of each minute in which the driver sends the command TIME with the next full minute. The
-controller's clock is then at most 4 s fast."""
+"""Seconds of each minute in which the driver sends TIME with the next full minute. The controller's
+clock is then at most 4 s fast."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:

@@ -141,7 +141,8 @@ OMNIBOT: Final = (
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the axis signs give a goal pose no consistent meaning.
 
-    If exactly one of x and y is reversed, yaw must be reversed too.
+    The sign of yaw must be the product of the signs of x and y. Otherwise the board's axes would be
+    a mirror image of the robot's axes.
     """
     x, y, yaw = values["axis_signs"]
     if values["control_method"] == "position" and x * y != yaw:

@@ -31,7 +31,7 @@ def status_row(
 ) -> str:
     """Return a row of the table under ``HEADING``: state, rates, lap, pose and velocities.
 
-    ``rates_hz``: rates of the IMU, None without an IMU, and of the odometry. ``leg``: number of
+    ``rates_hz``: rate of the IMU (None without an IMU) and rate of the odometry. ``leg``: number of
     completed sides of the square. ``velocities``: the commanded twist, then the measured one.
     """
     imu_hz, odom_hz = rates_hz

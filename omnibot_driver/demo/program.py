@@ -19,7 +19,7 @@ class DemoFailed(Exception):
 
 
 class Program:
-    """A module of this package as a child process, which ends at the latest with its parent.
+    """A module of this package as a child process. The kernel ends it if this program ends first.
 
     Ctrl-C does not reach the child process. ``end`` ends it.
     """

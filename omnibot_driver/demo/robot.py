@@ -35,7 +35,7 @@ its driver has run for a while."""
 class Robot:
     """The demo's robot, which this ROS node observes and steers through the driver's topics.
 
-    After every second odometry message, the object publishes a velocity on ``cmd_vel``.
+    For every two odometry messages, the object publishes one velocity on ``cmd_vel``.
     ``driving``: whether this velocity drives the square. Otherwise it is zero.
     ``leg``: how many sides of the square are complete.
     """
@@ -89,7 +89,7 @@ class Robot:
         return missing if self._state == "nominal" else [*missing, f"nominal state ({self._state})"]
 
     def watched(self) -> bool:
-        """Return whether another program also receives the odometry."""
+        """Return whether another program, such as the monitor, also receives the odometry."""
         return self._node.count_subscribers("odom") > 1
 
     def stands(self) -> bool:

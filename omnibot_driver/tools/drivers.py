@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from typing import Any, Final
 
 SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bool"}
-"""The topics that every driver publishes in its own namespace, with their types."""
+"""Topics that every driver publishes in its own namespace, with their types. A node that publishes
+all of them is regarded as a driver."""
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:

@@ -46,7 +46,11 @@ class Transport(Protocol):
 
     @property
     def ends_with_us(self) -> bool:
-        """Whether what is written stays in this process, as with a simulated board in memory."""
+        """Whether what is written stays in this process, as with a simulated board in memory.
+
+        A simulated board ends with this process, so the driver does not start a guard process for
+        it.
+        """
 
     @property
     def overruns(self) -> int | None:
@@ -61,7 +65,7 @@ class Transport(Protocol):
     def write(self, packets: Packets) -> None:
         """Write all packets; discard packets for a missing line.
 
-        Raises LinkError if a line is lost, and discards its unsent bytes.
+        Raises LinkError if a line is lost. The unsent bytes of this line are discarded.
         """
 
     def write_if_room(self, packets: Packets) -> int:

@@ -40,7 +40,8 @@ class SerialPort:
 
     ``parameter``: the parameter that names the port, for messages.
 
-    DTR and RTS must stay raised at ``close``: some boards restart whenever one is raised.
+    ``close`` must leave DTR and RTS raised. Otherwise the next opening would raise them again, and
+    some boards restart when this happens.
     """
 
     ends_with_us = False

@@ -169,7 +169,11 @@ class Several:
             yield self._lines[channel], joined(own)
 
     def _open_missing(self) -> None:
-        """Open the missing lines whose retry is due. A line that is still open is closed first."""
+        """Open the missing lines whose retry is due.
+
+        The port of a missing line may still be open, for example if the line is blocked. It is
+        closed before.
+        """
         now = time.monotonic()
         for channel, line in enumerate(self._lines):
             if not line.trouble or now < line.retry_at:

@@ -2,7 +2,8 @@
 
 """Datagrams to one host: ``udp://host:port``, each further channel one port higher.
 
-An absent host is a silent board, not an error, because the host may answer later.
+A host that does not answer is treated as a silent board, because it may answer later. It does not
+cause an error.
 """
 
 import contextlib

@@ -92,10 +92,11 @@ def test_the_default_geometry_is_the_drivers() -> None:
 
 @given(speeds, speeds, speeds)
 def test_turning_joints_move_the_body_as_the_kinematics_say(vx: float, vy: float, w: float) -> None:
-    """The kinematics give the wheel rates for a twist of the body.
+    """The driver's kinematics convert a motion of the body to wheel rates.
 
-    At these rates, each rim rolls as fast as the body moves at this wheel. Only the rolling
-    direction is compared: the rollers let the wheel move sideways.
+    The wheels of the description turn at these rates. In its rolling direction, each wheel moves
+    over the floor as fast as the body does at this place. Motion across this direction is not
+    compared, because the rollers allow it.
     """
     kinematics = OmniKinematics(
         wheel_radius_m=GEOMETRY["wheel_radius"], base_radius_m=GEOMETRY["base_radius"]

@@ -99,7 +99,7 @@ def test_the_unit_starts_the_installed_driver_and_no_shell_stays_between() -> No
 def test_the_unit_stops_the_driver_by_ctrl_c_and_lets_its_guard_finish() -> None:
     """systemd ends the driver by SIGINT.
 
-    After a crash of the driver, its guard can still stop the robot.
+    After a crash of the driver, its guard process can still stop the robot.
     """
     settings = unit_settings()
     assert settings["KillSignal"] == ["SIGINT"]

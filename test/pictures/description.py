@@ -102,10 +102,11 @@ class Solid:
         return Hits(rays[met], near[met], normals[0], far[met], normals[1])
 
     def _normals(self, start: Array, way: Array, at: Array, axis: Any, sign: float) -> Array:
-        """Return the normals of the surface where rays meet it, at the distances ``at``.
+        """Return the normals of the surface where rays enter or leave the solid.
 
-        ``axis``: the solid's axis across the face that a ray meets. ``sign``: 1 if the ray leaves
-        the solid, -1 if it enters.
+        The arguments are in the solid's own axes. ``start``, ``way``: origins and directions of the
+        rays. ``at``: distances from the origins to the surface. ``axis``: for each ray, the axis
+        across the face that it meets. ``sign``: 1 if the rays leave the solid, -1 if they enter.
         """
         rows = np.arange(len(at))
         local = np.zeros((len(at), 3))

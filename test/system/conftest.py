@@ -53,9 +53,10 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 
 @pytest.fixture
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
-    """Return a function that starts a probe of a driver.
+    """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
-    The probe publishes its newest message again if a stall made the driver refuse it.
+    If a stall of the driver makes it refuse the probe's newest message, the probe publishes this
+    message again.
     """
 
     def start(driver: Driver) -> Probe:

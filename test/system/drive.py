@@ -23,14 +23,15 @@ ACCEL_LSB = 9.80665 / 16384
 GYRO_LSB = math.radians(1 / 131)
 TICK_S, PERIOD_S = 0.01, 0.04
 SIDEWAYS = 50
-"""How far to search for a message's delta, as a number of deltas.
+"""How far to search for the delta that matches a message, as a number of deltas.
 
 The search begins at the delta that fits the message's timestamp.
 """
 LONGEST_STALL = 1000
-"""How far to search for a message's IMU frame, as a number of frames.
+"""How far to search for the IMU frame that matches a message, as a number of frames.
 
-The search begins at the frame that fits the timestamp, which a stall may shift.
+The search begins at the frame that fits the message's timestamp. After a stall of the computer, the
+matching frame may be far from it.
 """
 
 Triple = tuple[float, float, float]
@@ -175,9 +176,10 @@ def compare(
 def trace(
     sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
 ) -> list[int | None]:
-    """Return the index of the IMU frame for each message, or None if no frame has its values.
+    """Return, for each IMU message, the index of the frame with the same values; None without one.
 
-    Noise makes each frame unique.
+    Noise makes each frame unique. ``sent``: values of the frames. ``got``, ``stamps_s``: values and
+    timestamps of the messages.
     """
     found: list[int | None] = []
     at, at_s = -1, stamps_s[0]
@@ -217,10 +219,11 @@ def expected(stamp_s: float, found: Sequence[int | None], stamps_s: Sequence[flo
 def board_poses(
     sent: Sequence[bytes],
 ) -> tuple[list[tuple[int, int, int]], list[Triple], list[int]]:
-    """Return three lists: the deltas of a board, the pose after each delta, and a frame number.
+    """Return three lists, with an element for each delta in a board's frames.
 
-    The number is the index of the last IMU frame before the delta. Poses are exact after every
-    fifth delta. Between these, up to four rounded deltas are added.
+    The lists contain the delta, the pose after the delta, and the index of the last IMU frame
+    before it. After every fifth delta, the pose is the exact one that the board sends. In between,
+    up to four rounded deltas are added to it.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

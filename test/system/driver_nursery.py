@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A nursery for driver processes: it imports the driver once and forks a process for each driver.
+"""A nursery for driver processes: one process imports the driver and forks each driver process.
 
 Imports take most of a start. Tests of the start itself run a new interpreter.
 """
@@ -29,7 +29,7 @@ A request has the arguments and the environment of a driver.
 
 
 class Forked:
-    """A driver process that the nursery forked, with the methods of ``Popen`` that tests use."""
+    """A driver process that was forked, with the methods of ``Popen`` that tests use."""
 
     def __init__(self, pid: int, output: int, status: int) -> None:
         self.pid = pid
@@ -65,7 +65,10 @@ class Forked:
 
 
 class Nursery:
-    """Starts the nursery process with the first driver. The process ends with the tests."""
+    """The connection to one process, which imports the driver and forks a process for each driver.
+
+    This process starts with the first driver, and ends with the tests.
+    """
 
     def __init__(self) -> None:
         self._control: socket.socket | None = None
@@ -99,7 +102,7 @@ class Nursery:
 
 
 def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
-    """Close the control socket, and wait until the nursery has ended."""
+    """Close the control socket, and wait until the process that forks the drivers has ended."""
     control.close()
     process.wait()
 
@@ -162,7 +165,7 @@ def reap(statuses: dict[int, int]) -> None:
 def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
     """Run the driver in this forked process. End without the exit handlers of libraries.
 
-    LTTng's handler would stop a thread that the fork lacks.
+    One of them, of LTTng, would try to stop a thread that does not exist in a forked process.
     """
     from omnibot_driver import driver
 

@@ -32,8 +32,7 @@ class Driver:
     """The driver as a separate process in a namespace, by default an unused one.
 
     ``before``: Python code that runs before the driver, in a new interpreter. Without such code,
-    the driver is forked from the nursery.
-
+    the driver is forked from a process that has already imported it.
     ``more``: further ROS arguments.
     """
 

@@ -2,8 +2,9 @@
 
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
-Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. In Fast DDS, a former
-client finds nothing without a server. So this is a separate process.
+Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. This is a separate
+process because, in Fast DDS, a process that was a client of a server finds nothing without it
+later. Other tests in the same process would fail.
 """
 
 import sys

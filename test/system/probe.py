@@ -119,7 +119,7 @@ class Probe:
     def publish_again(self) -> None:
         """Publish the probe's newest message again, some seconds later.
 
-        The driver has ended its stall by then, and can log a second refusal.
+        By then, the driver's stall has ended, and the driver can log another refusal.
         """
 
         def publish() -> None:

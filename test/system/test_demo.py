@@ -164,7 +164,7 @@ def marked(mark: str, name: str = "") -> list[int]:
 
 
 def wait_until_all_have_ended(mark: str) -> None:
-    """Wait until all processes with the mark have ended. A guard ends later than its driver."""
+    """Wait until all processes with the mark have ended. A driver's guard ends after it."""
     for pid in marked(mark):
         try:
             process = os.pidfd_open(pid)

@@ -67,7 +67,7 @@ def test_a_command_that_waited_for_an_executor_that_was_held_up_is_refused(
 ) -> None:
     """The driver's executor is blocked, so a command waits for 2 s. The driver refuses it.
 
-    A recent stamp of a goal has no effect.
+    A goal is refused, too, even if its stamp is recent.
     """
     hold, control = tmp_path / "hold", "position" if topic == "cmd_pose" else "velocity"
     board: PtyBoard = start_board(control=control, running=True)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that the robot stops if the driver is killed, crashes or hangs while the robot moves."""
+"""Tests that the robot stops if the driver is killed, crashes or hangs while the robot moves.
+
+The driver's guard, a separate process, stops the robot in these cases.
+"""
 
 import math
 import os
@@ -72,7 +75,7 @@ def test_a_driver_that_dies_while_driving_leaves_a_robot_that_stands_still(
 ) -> None:
     """The driver dies while the robot drives.
 
-    The guard stops the robot without an emergency stop.
+    The guard process sends the stop bytes, but no emergency stop.
     """
     driving(probe, board)
     assert driver.end(number) == -number
@@ -87,7 +90,7 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 ) -> None:
     """The driver dies while the e-stop is latched.
 
-    The guard repeats the emergency stop, each time followed by Stop.
+    The guard process repeats the emergency stop, each time followed by Stop.
     """
     driving(probe, board)
     assert probe.call(SetBool, "estop", data=True).success
@@ -104,9 +107,9 @@ def test_a_driver_that_dies_under_the_estop_leaves_it_to_the_guard(
 def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
     board: PtyBoard, driver: Driver, probe: Probe, start_driver: Start, probe_of: Start
 ) -> None:
-    """A driver is killed, and its guard still uses the port.
+    """A driver is killed, and its guard process still uses the port.
 
-    A new driver tries again until the guard has released the port.
+    A new driver tries again until the guard process has released the port.
     """
     driving(probe, board)
     driver.end(signal.SIGKILL)
@@ -119,9 +122,9 @@ def test_the_next_driver_has_the_port_as_soon_as_the_guard_is_done(
 def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """The driver hangs while the robot drives, and the guard stops the robot.
+    """The driver hangs while the robot drives, and the guard process stops the robot.
 
-    Commands from the hang are refused. A later command is obeyed.
+    Commands that were sent during the hang are refused. A later command is obeyed.
     """
     commands = driving(probe, board)
     mark = hang(driver, board)
@@ -166,7 +169,7 @@ def test_a_robot_is_stopped_when_its_host_was_suspended(
 ) -> None:
     """The computer is suspended while the robot drives. Afterwards the driver stops the robot.
 
-    The command has not timed out: the timeout's clock omits the suspension.
+    The command timeout does not cause this, because its clock does not count the suspension.
     """
     resumed = tmp_path / "resumed"
     driver: Driver = start_driver(
@@ -225,9 +228,9 @@ def test_a_command_that_waited_while_the_driver_hung_is_obeyed_when_it_is_sent_a
 def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
     board: PtyBoard, driver: Driver, probe: Probe
 ) -> None:
-    """A guard is killed.
+    """A guard process is killed.
 
-    The driver logs this and starts another guard, which also stops the robot.
+    The driver logs this and starts another one, which also stops the robot.
     """
     with probe.commanding(0.3):
         (first,) = driver.guards()
@@ -242,9 +245,9 @@ def test_a_guard_that_is_killed_is_replaced_and_the_new_one_guards(
 def test_every_connection_has_one_guard_and_no_process_stays_behind(
     start_board: Start, start_driver: Start, probe_of: Start, tmp_path: Path
 ) -> None:
-    """The board is plugged in five times. Each connection has a guard of its own.
+    """The board is plugged in five times. Each connection has a guard process of its own.
 
-    After the driver's end, no guard is left.
+    After the driver's end, none of these processes is left.
     """
     link = tmp_path / "omnibot"
     driver: Driver = start_driver(str(link), reconnect_interval=0.05)

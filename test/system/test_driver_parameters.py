@@ -64,7 +64,10 @@ def test_wrong_parameters_end_the_start_with_a_sentence(
     ],
 )
 def test_arguments_that_are_not_understood_end_the_start(arguments: list[str]) -> None:
-    """An argument is unknown. The driver does not start, because it might use a wrong port."""
+    """The command line has an unknown or invalid argument. The driver ends at once with code 2.
+
+    One sentence gives the reason, without a traceback.
+    """
     command = [sys.executable, "-m", "omnibot_driver.driver", *arguments]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert ended.returncode == 2

@@ -162,7 +162,7 @@ def test_reset_brings_the_board_back_and_odometry_goes_on(probe: Probe, board: P
 def test_estop_latches_and_releases_to_standing_still(probe: Probe, board: PtyBoard) -> None:
     """A user latches the e-stop during a drive and releases it.
 
-    Only a new command moves the robot.
+    The robot stays at rest after the release, until a new command arrives.
     """
     active = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     drive(probe, board)

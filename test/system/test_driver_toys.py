@@ -126,7 +126,7 @@ def test_whatever_ends_the_driver_stops_a_toy(
 ) -> None:
     """A signal ends or suspends the driver while the robot drives.
 
-    The driver or its guard stops the robot.
+    The driver or its guard process stops the robot.
     """
     driver = start_toy(start_driver, toy)
     probe: Probe = probe_of(driver)
@@ -189,7 +189,10 @@ def test_the_raw_bytes_of_each_line_have_a_topic(
 def test_one_of_two_lines_that_is_missing_is_named_and_the_other_one_guarded(
     start_driver: Start, probe_of: Start, stack: ExitStack
 ) -> None:
-    """One of two lines is missing. The driver reports which one. The guard uses the other line."""
+    """One of two lines is missing. The driver reports which one.
+
+    The driver's guard process uses the other line.
+    """
     toy = Toy("line_board", stack.enter_context(ServedBoard(line_robot.LineRobot())))
     toy.ports["sense_port"] = "/dev/no-such-port"
     driver = start_toy(start_driver, toy)

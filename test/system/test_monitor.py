@@ -178,7 +178,7 @@ def test_keys_pressed_while_it_was_suspended_move_nothing(
 ) -> None:
     """The monitor is suspended while it steers, so the driver stops the robot.
 
-    Keys that were pressed meanwhile do not move it.
+    Keys that were pressed during the suspension do not move the robot.
     """
     said = probe.listen(Twist, "cmd_vel")
     terminal = monitor_of(driver, "--teleop")

@@ -31,13 +31,16 @@ READ_S = 20e-6
 EPOCH_S = 100.0
 SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
-"""For each event in the middle of a stream, how long the host then reads nothing, in s."""
+"""For each event in the middle of a stream, the time in s for which the host then reads nothing."""
 RESTART = "the board restarts"
 BOOT_S = 0.7123
 
 
 def ftdi_restarted(received: Received, random: Random) -> Chunks:
-    """Deliver bytes as an FTDI adapter does whose timer starts with each packet's first byte."""
+    """Return the chunks in which an FTDI adapter delivers the bytes.
+
+    The timer of this adapter starts with the first byte of each packet.
+    """
     chunks: Chunks = []
     start, timer = 0, math.inf
     for at, time in enumerate(received.times_s):
@@ -57,7 +60,7 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Readers of a busy computer. Their chunks already include the delays, so no delay is added."""
+"""Ways in which a busy computer reads a line. They include its delays, so ``stamp`` adds none."""
 
 
 @dataclass(slots=True)
@@ -122,7 +125,9 @@ def stamp(
 ) -> Stamped:
     """Generate one stream and stamp its samples.
 
-    The host begins to read somewhere in the first second of the stream.
+    ``loss``: share of lost bytes. ``skew``: relative error of the board's clock. ``event``: what
+    happens in the middle of the stream, a key of ``EVENTS_S``. The host begins to read somewhere in
+    the first second of the stream.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = generate(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)
@@ -173,7 +178,7 @@ def stamp(
 
 
 def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
-    """Return two streams as one, with the text of a board that has just booted between them."""
+    """Return one stream: ``before``, the text of a board that has just booted, and ``after``."""
     text = b"Paused: 0 \n"
     at = len(before.data) + len(text)
     boots_s = before.times_s[-1] + 0.5

@@ -2,8 +2,8 @@
 
 """The timing report, which writes the accuracy of stamps into docs/internals/time.md.
 
-``--seconds``: length of each stream. ``--seeds``: streams in each cell, with the clock skews of
-``SKEWS`` in turn. ``--readers``: measure only the readers of a busy computer.
+``--seconds``: length of each stream. ``--seeds``: number of streams for each row of a table. These
+use the clock skews of ``SKEWS`` in turn. ``--readers``: measure only how a busy computer reads.
 """
 
 import argparse
@@ -30,13 +30,14 @@ Two blocks arrive in this time.
 LIMITS_S = (0.2e-3, 0.5e-3)
 
 Cell = tuple[str, float, str, str]
-"""One cell of the report: the line, the share of lost bytes, the mode, and the event."""
+"""One case of the report: the line, the share of lost bytes, the mode, and the event."""
 Figures = tuple[float, float]
-"""The unevenness, and half the width of the interval with 99 % of the errors, both in s."""
+"""Result for one stream: the unevenness, and half the width of the interval with 99 % of the
+errors, both in s."""
 
 
 def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
-    """Stamp one stream, in a process of the pool. Return its cell and its figures."""
+    """Stamp one stream, in a process of the pool. Return its case and its result."""
     (line, loss, mode, event), seed = job
     skew = SKEWS[seed % len(SKEWS)]
     stamped = stamp(line, SCENARIOS[mode], loss, skew, seed, seconds, event)
@@ -45,7 +46,12 @@ def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
 
 
 def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
-    """Return a table: worst and median of each row, and how many streams keep both limits."""
+    """Return the lines of a Markdown table with one row for each case.
+
+    Each row has the worst and the median result of its streams, and how many of them keep both
+    limits.
+    ``head``: headings of the case's columns. ``rows``: results of the streams, by case.
+    """
     lines = [
         f"| {head} | steps, std (ms) | 99 % within (ms) | streams that keep both limits |",
         "|---" * (head.count("|") + 4) + "|",
@@ -61,7 +67,7 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
 
 
 def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
-    """Stamp all streams of all cells, on all processors. Return the figures of each cell."""
+    """Stamp all streams of all cases, on all processors. Return the results of each case."""
     jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
     found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
     with Pool(os.cpu_count()) as pool:

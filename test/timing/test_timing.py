@@ -56,9 +56,10 @@ def test_a_free_timer_is_seen_through_within_two_seconds_of_a_start(event: str) 
 
 
 def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_most() -> None:
-    """The clocks of the board and of an FTDI adapter run equally fast, so their phase is constant.
+    """The timer of an FTDI adapter runs exactly as fast as the board, so its phase is constant.
 
-    After 2 s, all stamps are late by the duration of a frame, within 0.5 ms.
+    The driver can measure this phase only roughly. After 2 s, all stamps are late by the duration
+    of a frame, within 0.5 ms.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
     # would show this phase. If no frame is cut, the driver knows it only to within 2 ms minus the

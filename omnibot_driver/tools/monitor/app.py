@@ -142,8 +142,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Textual starts a new thread that reads keys. The method ``suspend`` ends the old thread
-        first.
+        Textual then starts a thread that reads keys, but the old thread still runs. Entering
+        ``suspend`` ends the old thread.
         """
         with self.suspend():
             pass

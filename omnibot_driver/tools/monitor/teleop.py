@@ -47,8 +47,8 @@ MOTIONS: Final = {
 class DeadMan:
     """A dead man's switch that converts pressed keys to commands.
 
-    The caller calls ``command`` regularly. Another thread may call ``press``, which stores key and
-    time in one assignment.
+    The caller calls ``command`` regularly. Another thread may call ``press``. They need no lock,
+    because ``press`` stores key and time in one assignment.
     """
 
     def __init__(self) -> None:
@@ -91,7 +91,10 @@ class DeadMan:
         return part * self.fastest[0], part * self.fastest[1]
 
     def command(self, now_s: float) -> BodyTwist | None:
-        """Return the command to publish now: first a motion, then a few zeros, then None."""
+        """Return the command to publish now; None if nothing is to be published.
+
+        While a key moves the robot, the command is a motion. Afterwards it is zero a few times.
+        """
         self._notice_sleep(now_s)
         self._asked_s = now_s
         key, until_s = self._held

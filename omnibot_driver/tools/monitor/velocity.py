@@ -26,8 +26,8 @@ ACKNOWLEDGED_WITHIN_S: Final = 0.5
 class VelocityTopic:
     """The monitor's subscription and publisher of ``cmd_vel``.
 
-    A process must use only one message type for a topic. Both use the type of the driver's
-    subscription.
+    Both use the message type of the driver's subscription, because a process must use only one type
+    for a topic.
     ``heard``: receives each command on the topic.
     ``dead_man``: if None, nothing is published.
     """

@@ -54,7 +54,11 @@ def legend_below(axes: Axes) -> None:
 
 
 def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return about 3000 points of a longer line: the minimum and the maximum of each piece."""
+    """Return a line of about 3000 points that has the extremes of a longer line.
+
+    The longer line is cut into pieces of equal length, and each piece gives its minimum and
+    maximum. A line of at most 3000 points is returned unchanged.
+    """
     if len(times_s) <= POINTS:
         return times_s, values
     size = -(-len(times_s) // (POINTS // 2))

@@ -16,9 +16,9 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after a disconnection.
+"""Time in s after the beginning of the state "disconnected", if it is the last one in the log.
 
-A driver that still publishes /diagnostics after this time has not ended.
+If /diagnostics still shows this state later, the driver still runs. Otherwise it has ended.
 """
 
 
@@ -78,7 +78,10 @@ def _lost(states: list[Span]) -> list[Span]:
 
 
 def _alive(log: Log, state: Span) -> bool:
-    """Return whether diagnostics still reported this state 2 s (``SILENT_S``) after it began."""
+    """Return whether diagnostics still reported this state 2 s (``SILENT_S``) after it began.
+
+    Otherwise the driver had ended.
+    """
     return any(
         status.at_s > state.begin_s + SILENT_S and status.values.get("Mode") == state.what
         for status in log.diagnostics

@@ -71,9 +71,9 @@ def _scales(log: Log) -> tuple[str, str]:
 
 
 def pairs(log: Log) -> list[Pair]:
-    """Return the pairs of commands and measurements of cmd_vel and wheel_cmd, if in the log.
+    """Return the pairs of commands and measurements for cmd_vel and for wheel_cmd.
 
-    The pairs contain only finite values.
+    A pair is left out if the log lacks its commands or its measurements. All values are finite.
     """
     count = len(log.wheels)
     wheels = Pair(

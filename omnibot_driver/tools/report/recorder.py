@@ -85,7 +85,8 @@ class _Column:
         self.role = role
         self.arrived_ns, self.stamp_ns, self.values = array("q"), array("q"), array("d")
         self.rows: list[Row] = []
-        """Rows of values, used if the number of values in a row becomes known only at the end."""
+        """Rows of values of a topic with one value for each wheel. Their width becomes known only
+        at the end of the recording."""
 
     def hear(self, row: Row, arrived_ns: int, message: Any) -> None:
         header = getattr(message, "header", None)
@@ -98,7 +99,10 @@ class _Column:
         self.stamp_ns.append(stamp_ns or NO_STAMP)
 
     def series(self, start_ns: int, wheels: int) -> Series:
-        """Return the column as a series; ``wheels``: the count of wheels, 0 if unknown."""
+        """Return the messages of this topic as a series, in the order of arrival.
+
+        ``start_ns``: the time at which the log begins. ``wheels``: number of wheels, 0 if unknown.
+        """
         arrived_ns, stamp_ns = (
             np.array(column, dtype=np.int64) for column in (self.arrived_ns, self.stamp_ns)
         )
@@ -117,7 +121,7 @@ class _Column:
 class Recorder:
     """A collector of one robot's messages.
 
-    Its user calls ``hear`` for each message, and then ``log``.
+    ``hear`` records a message. At the end, ``log`` returns all of them.
     """
 
     def __init__(self, robot: str) -> None:
@@ -189,7 +193,8 @@ class Recorder:
     ) -> tuple[Span, ...]:
         """Return the spans of time in which the value on a topic stayed the same.
 
-        ``name``: function that returns a value as text, for the ``what`` of its span.
+        ``name``: function that converts a value to a text. The text becomes the ``what`` of the
+        span.
         """
         spans: list[Span] = []
         for arrived_ns, value in self._events[role]:

@@ -29,9 +29,9 @@ EARLY_S: Final = 0.001
 OTHER_CLOCK_S: Final = 1.0
 FEWEST: Final = 10
 RECOVERY_S: Final = 0.75
-"""Longest time in s in which short steps can compensate a long step of the timestamps.
+"""Longest time in s within which short steps between timestamps can compensate a long step.
 
-After this time, messages are regarded as missing.
+If they do not compensate it within this time, messages are regarded as missing.
 """
 
 
@@ -160,9 +160,10 @@ def _ended(log: Log, stamped: Series, stream: Stream) -> Span | None:
 
 
 def _ends(wide: NDArray[np.intp], most: int) -> NDArray[np.intp]:
-    """Return for each long step the index after the last step that may compensate it.
+    """Return for each long step the index at which the search for compensating short steps ends.
 
-    These steps end after ``most`` steps, counted from the long step, or before the next long step.
+    The search begins at the long step. It covers ``most`` steps, but ends before the next long
+    step.
     ``wide``: indices of the long steps.
     """
     ends: NDArray[np.intp] = wide + max(1, most)
@@ -307,7 +308,7 @@ def _arrival(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def grown(log: Log, keys: tuple[str, ...]) -> int | None:
     """Return by how much the counts ``keys`` in this robot's /diagnostics grew; None if unknown.
 
-    A smaller count comes from a restarted driver.
+    If a count decreases, the driver was restarted, and its new counts are added.
     """
     if not log.alone:
         return None

@@ -36,10 +36,10 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 
 
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
-    """Return the roles that a topic may have by its name: each with the namespace and a verdict.
+    """Return the roles that this topic may have by its name.
 
-    The verdict is whether the role fits: the message type ``kind`` must be right. A topic such as
-    ``state`` must also belong to a node in ``drivers``.
+    For each role, the result has the namespace, and whether the role fits. The message type
+    ``kind`` must fit the role. A topic such as ``state`` must also belong to a node in ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

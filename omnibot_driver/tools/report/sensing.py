@@ -26,14 +26,14 @@ LEAST_REST_S: Final = 1.0
 BLOCK: Final = 100
 TURNING_RADPS: Final = 0.1
 """Mean gyro reading in rad/s above which the robot is regarded as turning, if there is no odometry.
-A bias above this value is rare."""
+A smaller reading may be a bias."""
 LARGEST_BIAS_RADPS: Final = 0.01
 LARGEST_TILT_DEG: Final = 5.0
 LEAST_TURN_RAD: Final = 1.5
 TURN_TOLERANCE: Final = 0.05
 MOSTLY: Final = 0.9
-"""Fraction of the time between two odometry messages that gyro readings must cover. Otherwise turns
-by gyro and odometry are not compared there."""
+"""Fraction of the time between two odometry messages that gyro readings must cover. If they cover
+less, the turns by gyro and by odometry are not compared for this time."""
 STRONG_VIBRATION_MPS2: Final = 3.0
 VIBRATION_HZ: Final = 5.0
 """Frequency in Hz up to which motion is regarded as caused by driving, not by vibration."""
@@ -78,7 +78,11 @@ def at_rest(log: Log, imu: Series) -> Mask:
 
 @dataclass(frozen=True, slots=True)
 class Spectrum:
-    """Amplitude spectral densities per √Hz. Columns 0 to 2 are the gyro, 3 to 5 the force."""
+    """Amplitude spectral densities per √Hz: one row for each frequency, with six columns.
+
+    Columns 0 to 2 are the angular velocity about x, y and z, and 3 to 5 the specific force along
+    them.
+    """
 
     frequency_hz: Array
     density: Array
@@ -87,7 +91,8 @@ class Spectrum:
 def spectrum(imu: Series, rows: Mask) -> Spectrum | None:
     """Return Welch's mean spectrum of the selected ``rows``; None if there is too little data.
 
-    The mean is taken over all pieces of at least 256 readings of which none is missing.
+    The selected rows are divided into pieces without missing readings. The mean is taken over the
+    pieces of at least 256 readings.
     """
     usual_hz = rate_hz(imu)
     breaks = np.flatnonzero(np.diff(imu.stamp_s) > 1.5 / usual_hz) + 1
@@ -246,11 +251,15 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         yield Finding(
             Level.NOTE,
             "IMU",
-            f"{figure}; both have the same direction, so the sensor is mounted upright.",
+            f"{figure}. The gyro has the same sign as odom, so the sensor is mounted upright.",
             "The robot's description has the sensor upside down: set imu_rpy in the description.",
         )
     else:
-        yield Finding(Level.GOOD, "IMU", f"{figure}; the sensor hangs upside down, as described.")
+        yield Finding(
+            Level.GOOD,
+            "IMU",
+            f"{figure}. The sensor hangs upside down, as in the robot's description.",
+        )
 
 
 def _vibration(imu: Series, rest: Mask) -> Iterator[Finding]:

@@ -15,14 +15,14 @@ MOVING: Final = (0.005, 0.005, 0.01)
 """Speeds in x, y and yaw above which the robot is regarded as moving, in m/s, m/s and rad/s."""
 LEAP_M: Final = 0.1
 LEAP_RAD: Final = 0.35
-"""``LEAP_M``, ``LEAP_RAD``: limits of the difference between a step of the pose and the motion by
-the twist, in m and rad. A step above one of them is a leap. The driver's own corrections of odom
-are smaller, because fastest_linear_speed limits them."""
+"""``LEAP_M``, ``LEAP_RAD``: the change of the pose between two messages is compared with the motion
+that the twist shows. If they differ by more than one of these limits, in m and rad, the change is a
+leap. The driver's own corrections of odom are smaller, because fastest_linear_speed limits them."""
 RESET_M: Final = 0.02
 RESET_RAD: Final = 0.05
 SHORT_GAP_S: Final = 0.1
-"""Time in s from which a step between two messages is regarded as a gap, whose motion the twist
-does not show."""
+"""Length in s from which the step between two messages is regarded as a gap. The twist does not
+show the motion in a gap."""
 
 
 def moving(odom: Series) -> Mask:

@@ -161,7 +161,7 @@ def test_the_estop_stops_it_until_it_is_released(robot: TwoPorts, probe: Probe) 
 def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None:
     """A user pauses the robot during a drive. The robot stays at rest in the state "paused".
 
-    Then only a new command moves the robot.
+    After the end of the pause, the robot rests until a new command arrives.
     """
     with driven(probe, robot):
         assert probe.call(SetBool, "pause", data=True).success

@@ -26,9 +26,9 @@ Start = Callable[..., Any]
 def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, channel: int, name: str
 ) -> None:
-    """One half is unplugged during a drive. The driver stops the half that is still connected.
+    """One of the two Teensys is unplugged during a drive. The driver stops the other one.
 
-    The unplugged half is stopped at its return.
+    The driver stops the unplugged Teensy when it is plugged in again.
     """
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
@@ -53,9 +53,9 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """One half restarts or becomes silent during a drive. The robot stops.
+    """One of the two Teensys restarts or becomes silent during a drive. The robot stops.
 
-    When both halves work again, the robot obeys new commands.
+    When both work again, the robot obeys new commands.
     """
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))

@@ -19,7 +19,7 @@ from omnibot_driver.simulator.fejemis import CHANNELS, SimulatedFejemis
 
 PATIENCE_S: Final = 30.0
 STANDS_TICKS: Final = 750
-"""Ticks of the simulated boards in 1.5 s."""
+"""1.5 s as a number of the simulated boards' ticks."""
 DRIVE, FRONT = 0, 1
 
 

@@ -90,7 +90,7 @@ def test_whatever_ends_the_driver_stops_it(
 ) -> None:
     """A signal ends or suspends the driver during a drive.
 
-    The driver or its guard stops the robot.
+    The driver or its guard process stops the robot.
     """
     with driven(probe, ecu):
         driver.process.send_signal(number)
@@ -147,7 +147,7 @@ def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
 def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     """A user calls ``~/reset`` after a drive.
 
-    The ticks are then 0, but the pose in odom continues.
+    The board's tick counts become 0, but the pose in odom continues.
     """
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):

@@ -140,7 +140,7 @@ def test_a_terminal_mode_passes_lines_on_and_the_drive_mode_changes_while_it_run
 def recorded(robot: Any) -> Path:
     """Record while the robot drives, and return the path of the record.
 
-    A busy computer may stop the robot. Then the function tries again.
+    A busy computer may stop the robot early. In that case the function tries again.
     """
     for _ in range(10):
         try:
@@ -154,9 +154,9 @@ def recorded(robot: Any) -> Path:
 def test_a_calibration_records_while_it_drives_and_leaves_the_robot_standing(
     start_driver: Start, stack: ExitStack, tmp_path: Path
 ) -> None:
-    """The calibration tool records the ticks of both wheels during a drive. Then the robot rests.
+    """The calibration tool records the ticks of both wheels during a drive, and stops the robot.
 
-    The tool reports why the driver refuses a record.
+    If the driver refuses a record, the tool reports the reason.
     """
     ecu = ecu_of("firmware", stack, running=True)
     driver = start_driver(

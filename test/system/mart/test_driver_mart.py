@@ -27,7 +27,7 @@ Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
 SECOND_TICKS: Final = 500
 STANDS_TICKS: Final = 750
-"""Ticks of the simulated controller in 1.5 s. ``SECOND_TICKS`` are its ticks in 1 s."""
+"""1.5 s as a number of the simulated controller's ticks. ``SECOND_TICKS`` are its ticks in 1 s."""
 MOTIONS: Final = {
     "RM": (0.3, 0.2),
     "B": (-0.2, 0.0),
@@ -67,7 +67,7 @@ class Mart:
         assert not self.do(lambda board: board.server.hung)
 
     def answer(self, probe: Probe, service: str) -> Any:
-        """Call the service each second until the driver does not refuse it.
+        """Call the service once a second, as long as the driver refuses it.
 
         Return the last answer.
         """
@@ -162,7 +162,7 @@ def test_whatever_ends_the_driver_stops_each_motion(
 ) -> None:
     """A signal ends the driver during a motion.
 
-    The driver or its guard sends the motion's stop command.
+    The driver or its guard process sends the stop command for this motion.
     """
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
@@ -175,7 +175,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
 ) -> None:
     """The driver sends a velocity or a controlled move, and is killed before the server replies.
 
-    The guard stops the robot.
+    The driver's guard process stops the robot.
     """
     if word == "TF":
         goal = PoseStamped()
@@ -195,7 +195,7 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
 
 
 def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe) -> None:
-    """The driver is suspended during a drive. The guard stops the robot after half a second."""
+    """The driver is suspended during a drive. Its guard process stops the robot after 0.5 s."""
     with driven(probe, mart, 0.3, 0.0):
         driver.process.send_signal(signal.SIGSTOP)
         mart.stands_for_good()
