@@ -19,13 +19,15 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS
 
 STRAY_AGAIN_S: Final = 3.0
-ROLLS_S, ROLLS_AFTER_MOVE_S = 0.3, 0.6
+ROLLS_S, ROLLS_AFTER_MOVE_S, ROLLS_LONG_S = 0.3, 0.6, 1.2
 """Times in s for which a robot may coast after the end of a motion.
 
 ``ROLLS_S``: after a stop.
 
 ``ROLLS_AFTER_MOVE_S``: after a controlled move. The server replies to a failed move at once, while
 the robot still coasts.
+
+``ROLLS_LONG_S``: after a reply which says that the wheels still turned.
 """
 
 
@@ -112,6 +114,8 @@ class Measuring(Starts):
         """
         self._counted_at_rest += 1
         rolls_s = ROLLS_AFTER_MOVE_S if self._moved_last else ROLLS_S
+        if self._rolled:
+            rolls_s = ROLLS_LONG_S
         ended_s = max(self._rested_s, self._copies_stopped_s)
         if self._counted_at_rest < 2 or now - ended_s < rolls_s or before is None:
             return

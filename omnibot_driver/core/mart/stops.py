@@ -210,7 +210,8 @@ class Stops(Ground, ABC):
             and not self.conversation.doubles(now)
         ):
             self.odometry.wheel.refused()
-        slow = result is not None and stopping.planned and self._is_slow_stop(result, motion, now)
+        self._rolled = result is not None and self._is_slow_stop(result, motion, now)
+        slow = result is not None and stopping.planned and self._rolled
         told = isinstance(result, Ok) and result.form is Form.INTEGER
         if motion is Motion.SPIN and (told or slow or result is None):
             uncounted_s = max(0.0, stopping.began_s - self.odometry.wheel.told_s)

@@ -145,3 +145,25 @@ def test_a_turn_that_is_begun_anew_has_other_units(
     starts = [word for word in said if word in (b"SSP", b"L")]
     assert len(starts) > 2
     assert starts == [b"SSP", b"L"] * (len(starts) // 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
+    firmware: Firmware,
+) -> None:
+    """The wheels of a heavy robot turn for 1.3 s after a stop.
+
+    The server waits 0.6 s for them, and reports a failure. The driver does not report that the
+    robot moves without a command.
+    """
+    bench = MartBench(firmware, motor_lag_s=0.25).ready()
+    for twist in ((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9)):
+        for latched in (False, True):
+            bench.command(*twist, 2.5)
+            if latched:
+                bench.estop(True)
+            bench.run(3.0)
+            bench.estop(False)
+            bench.run(0.5)
+    assert not any("robot moves" in notice for notice in bench.notices), bench.notices
