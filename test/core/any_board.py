@@ -2,7 +2,7 @@
 
 """Test bench in simulated time that connects a session to the simulated robot of any board.
 
-The tests of the motion rules use this bench.
+The tests of the rules for motion (what may move or stop a robot) use this bench.
 """
 
 from collections.abc import Callable
@@ -79,7 +79,7 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: driving time that a start loses, in s.
+    ``late_s``: time in s by which its robot starts late.
     """
 
     # 0.5 s until a wheel turns, then another 0.5 s until the wheel has its speed.
@@ -194,7 +194,7 @@ BOARDS = [
 class AnyBench:
     """A session connected to a robot.
 
-    ``hears``: whether the robot receives data.
+    ``hears``: whether the robot receives data; false if the line to it is cut.
 
     ``speaks``: whether the robot sends data.
     """

@@ -31,7 +31,7 @@ def by_velocity(bench: Bench, command: Triple) -> None:
 
 
 def by_wheels(bench: Bench, command: Triple) -> None:
-    """Command the wheel rates that correspond to the twist ``command``."""
+    """Command wheel rates, which are computed from the twist ``command``."""
     x, y, yaw = command
     along_x, along_y, turn = math.cos(math.radians(30)) * x, y / 2, 0.143 * yaw
     bench.turn_wheels(
@@ -60,7 +60,7 @@ def stopped_after_s(
 ) -> float:
     """Command the robot until the driver sends Stop.
 
-    Return the time from the robot's first deviation from the command to Stop, in s.
+    Return the time in s from the robot's first deviation from the command to this Stop.
     """
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick
@@ -76,7 +76,7 @@ def stopped_after_s(
 
 
 def on_the_wrong_switch(frame: str, delta_period_s: float = 0.04) -> Bench:
-    """Return a bench whose board is on position control while the driver is set to velocity.
+    """Return a bench whose board is switched to position control, while the driver sends speeds.
 
     The board's pose is 3 m from its origin.
     """

@@ -14,9 +14,10 @@ from omnibot_driver.simulator.omnibot import BoardPose, BoardSettings
 PERIOD_S = 0.04
 ROUNDING_M = 1.5e-3
 ROUNDING_RAD = 1.5e-3
-"""``ROUNDING_M``, ``ROUNDING_RAD``: largest error of odom that the rounding of deltas causes.
+"""``ROUNDING_M``, ``ROUNDING_RAD``: largest error of odom (pose in the odometry frame) from the
+rounding of deltas.
 
-The error grows until the next pose corrects it.
+The error grows until the next pose of the board corrects it.
 """
 DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
@@ -50,7 +51,7 @@ def steps(estimates: list[OdometryEstimate]) -> list[tuple[float, Pose]]:
 
 
 def attached(settings_: OdometrySettings | None = None) -> Odometry:
-    """Return odometry that has received the pose (0, 0, 0) of its board twice."""
+    """Return odometry that has received its board's pose (0, 0, 0) twice, and so accepted it."""
     odometry = Odometry(settings_ or OdometrySettings())
     odometry.settle(PoseReading(0.0, 0.0, 0.0))
     odometry.settle(PoseReading(0.0, 0.0, 0.0))

@@ -95,9 +95,10 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to send commands: only if the test wants to drive, and the board runs.
+        """Whether to send commands: the test wants to drive, and the board runs.
 
-        A paused board may read a byte of a command as a letter such as P.
+        None are sent to a paused board, which may mistake a byte of a command for a letter such as
+        P.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

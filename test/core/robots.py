@@ -17,9 +17,9 @@ def standing() -> Bench:
 
 
 def paused() -> Bench:
-    """Return a bench whose board is paused and reports this.
+    """Return a bench whose board is paused and sends its «Paused» text.
 
-    The driver does not start the board.
+    The driver is set not to start the board.
     """
     bench = Bench(run=False)
     bench.open()

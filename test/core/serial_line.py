@@ -21,11 +21,11 @@ Chunker = Callable[[list[Byte], random.Random], Iterator[Read]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
-    """A simulated stream of frames.
+    """A simulated stream of frames from a board.
 
     ``skew``: relative error of the board's clock against the host's clock.
 
-    ``loss``: fraction of the frames that never arrive.
+    ``loss``: fraction of the frames that are lost.
     """
 
     seconds: float
@@ -54,7 +54,7 @@ class Board:
         return line
 
     def _frames(self, tick: int, rng: random.Random) -> list[bytes]:
-        """Return the frames of a tick. The accelerometer's x and y contain the tick's number."""
+        """Return the frames of a tick. The tick's number is in the accelerometer's x and y."""
         gyro = [rng.randrange(-3, 40) for _ in range(3)]
         frames = [struct.pack(">2B6h", 0xFF, 0xFA, tick % 8192, tick // 8192, 16384, *gyro)]
         if not self.imu_only and tick % 4 == 0:
@@ -65,7 +65,7 @@ class Board:
 
 
 def bursts(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
-    """Split the stream as an ideal line does. A read has all bytes between two idle gaps."""
+    """Split the stream into reads as on an ideal line. A read has all bytes between two pauses."""
     held = bytearray()
     last = line[0][0]
     for at, byte in line:
@@ -99,9 +99,10 @@ def blocks(line: list[Byte], _rng: random.Random) -> Iterator[Read]:
 def ftdi(
     *, latency_s: float = 0.016, restarted_by_data: bool = False, skew: float = 0.0
 ) -> Chunker:
-    """Return a function that splits the stream as a USB adapter does, in packets of 62 bytes.
+    """Return a function that splits the stream into packets of 62 bytes, as a USB adapter does.
 
-    The timer ends a packet early. It runs freely, or begins with a packet's first byte.
+    A timer of ``latency_s`` ends a packet early. The timer runs freely, or restarts with a packet's
+    first byte (``restarted_by_data``).
     """
 
     def chunk(line: list[Byte], rng: random.Random) -> Iterator[Read]:

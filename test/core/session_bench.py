@@ -27,7 +27,7 @@ OPENING = STOP
 
 
 def bare(data: bytes) -> bytes:
-    """Return ``data`` without the zeros before the frame."""
+    """Return ``data`` without the zeros that the driver sends before each frame."""
     return data.lstrip(b"\0")
 
 
@@ -146,7 +146,7 @@ class Bench:
         return joined(self.session.shutdown.sequence(on_exit, self.now))
 
     def written_since(self, mark: int) -> bytes:
-        """Return what was written after the first ``mark`` writes."""
+        """Return what was written to the board after the first ``mark`` writes of the test."""
         return b"".join(data for _, data in self.written[mark:])
 
     def still(self) -> bool:

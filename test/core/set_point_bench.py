@@ -44,7 +44,7 @@ class Words:
 
 
 class Stream(CommandPolicy):
-    """A command policy whose set-points are bytes."""
+    """A command policy, which decides when set-points are written. Its set-points are bytes."""
 
     def __init__(self, settings: CommandSettings) -> None:
         proof = StopProof()

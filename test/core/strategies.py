@@ -20,7 +20,7 @@ headings = st.floats(-10, 10)
 small_moves = st.builds(Pose, st.floats(-0.1, 0.1), st.floats(-0.1, 0.1), st.floats(-1.5, 1.5))
 """Displacements in one period of 40 ms, in body axes.
 
-The largest are too large for a real robot.
+The largest of them are faster than any real robot.
 """
 
 
@@ -37,7 +37,7 @@ def displacements(frame: str) -> st.SearchStrategy[DisplacementReading]:
 
 
 def chunkings(data: bytes) -> st.SearchStrategy[list[bytes]]:
-    """Draw divisions of the bytes into pieces, some of which may be empty."""
+    """Draw ways to divide the bytes into pieces. Some pieces may be empty."""
     cuts = st.lists(st.integers(0, len(data)), max_size=30).map(sorted)
     return cuts.map(lambda at: cut(data, at))
 

@@ -40,7 +40,7 @@ def drive(board: SimulatedBoard, seconds: float) -> list[bytes]:
 
 
 def life(board: SimulatedBoard) -> list[bytes]:
-    """Return what the board sends in each tick, through all its modes and changes of mode."""
+    """Return what the board sends in each tick while it passes through all its modes."""
     ticks = record(board, 2.6)
     board.receive(bytes(8) + b"S")
     ticks += drive(board, 2.0)

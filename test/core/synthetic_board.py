@@ -35,7 +35,7 @@ def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
 
 
 class Trip:
-    """A board with a given initial heading. Its axes may be reversed."""
+    """A simulated board with a given initial heading. Its axes may be reversed."""
 
     def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
         self.board = (12.0, -34.0, heading)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of odometry that finds its heading, follows a board's restart, and is reset."""
+"""Tests of how odometry finds its initial heading, follows a restart of the board, and is reset."""
 
 import math
 from dataclasses import replace
@@ -62,9 +62,9 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
-    """The odometry begins with a displacement of unknown duration, because the board was paused.
+    """The board was paused, so the first displacement after it has an unknown duration.
 
-    The first estimate still has a covariance of zero.
+    The first estimate of the odometry still has a covariance of zero.
     """
     odometry, trip = Odometry(SETTINGS), Trip(1.0)
     odometry.displace(replace(trip.move(0.0, 0.0, 0.0), duration_s=None), 0.0)
@@ -72,9 +72,9 @@ def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> 
 
 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
-    """The board sends one pose, and the next pose is lost.
+    """The board sends one pose, and the next pose is lost. Two poses that agree are usually needed.
 
-    After a second, the first pose is accepted without a second one that agrees.
+    After a second without another pose, the first pose is accepted.
     """
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
@@ -101,9 +101,9 @@ def test_without_a_pose_heading_0_is_assumed_after_a_second_of_deltas() -> None:
 
 
 def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
-    """The board sends no pose, so heading 0 is assumed. Then poses with another heading arrive.
+    """The board sends no pose, so heading 0 is assumed. Later, poses with another heading arrive.
 
-    Odom does not jump, and later motion has the heading of the poses.
+    Odom does not jump. Further motion is computed with the heading of the poses.
     """
     odometry = Odometry(SETTINGS)
     for _ in range(25):
@@ -115,7 +115,7 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """Two poses with the same unexpected heading show that the board has a new earth frame."""
+    """Two poses in a row have the same unexpected heading. So the board has a new earth frame."""
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     x, y, yaw = trip.board
@@ -149,9 +149,9 @@ def test_a_board_that_counts_its_heading_modulo_a_turn_surprises_nobody() -> Non
 
 
 def test_small_errors_of_the_summed_displacements_are_corrected_by_each_pose() -> None:
-    """Rounding makes the sum of the displacements differ from the board's pose.
+    """Because of rounding, the sum of the displacements differs from the board's pose.
 
-    The correction is spread over five displacements.
+    The error is corrected in five steps, one with each of the next displacements.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(0.0, 0.0, 0.0))
@@ -227,7 +227,7 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """The odometry counts each change of the board's frame, because old goals are then invalid."""
+    """The odometry counts each change of the board's earth frame, which makes old goals invalid."""
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))
     counted = [odometry.alignments]

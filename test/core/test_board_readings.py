@@ -31,9 +31,9 @@ STANDS = DisplacementReading(0.0, 0.0, 0.0, "body", 0.2, 0)
 
 
 class Teller(line_board.LineBoard):
-    """A board with its own odometry at 10 Hz.
+    """A substitute for a board, with its own odometry at 10 Hz.
 
-    ``next``: readings that the board returns with the next bytes.
+    ``next``: readings that it returns when the next bytes arrive.
     """
 
     traits = replace(
@@ -142,7 +142,7 @@ def test_a_pressed_button_latches_the_estop_and_its_release_does_nothing(bench: 
 
 
 def test_a_reset_is_done_when_the_board_shows_it(bench: AnyBench) -> None:
-    """The board reports a reset that happened before the driver's request. This report is ignored.
+    """The user requests a reset. A report of an earlier reset, from before the request, is ignored.
 
     The next report shows that the requested reset is done.
     """

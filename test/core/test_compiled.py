@@ -25,7 +25,7 @@ LOST = (0.0, 0.001, 0.01)
 def told(piece: int, lost: float) -> str:
     """Return a digest of all events and bytes of a session through all modes of the board.
 
-    ``piece``: bytes in each read. ``lost``: probability of losing a byte.
+    ``piece``: number of bytes in each read. ``lost``: probability that a byte is lost.
     """
     random, bench = Random(piece), Bench()
     session, now = bench.session, 1000.0

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reads that contain only IMU readings, after which the session has no output."""
+"""Reads that contain only IMU readings. After them, the session has nothing to write or report."""
 
 from contextlib import suppress
 
@@ -62,7 +62,7 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """Data has been received but not processed when a request comes. The data does not confirm it.
+    """A request comes while received data is not processed yet. This data does not confirm it.
 
     Only data that is received after the request confirms it.
     """

@@ -27,9 +27,9 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:
-    """The board is paused during a drive, and the robot rolls out. Frames of the pause may be lost.
+    """The board is paused during a drive, and the robot rolls out.
 
-    A second later, odom is right.
+    All frames of the pause may be lost. A second after the pause, odom is right.
     """
     on = line(seed)
     if hidden:
@@ -96,9 +96,10 @@ def test_a_driver_that_restarts_begins_at_the_identity() -> None:
 
 
 def test_a_reset_in_an_open_gap_is_not_moved_by_what_settles_the_gap() -> None:
-    """Frames are lost, and the odometry is reset before the next pose arrives.
+    """Frames are lost, and the odometry is reset before the board's next pose arrives.
 
-    That pose shows the lost motion. Odom does not include it, because it came before the reset.
+    This pose shows the lost motion. Odom does not contain this motion, because it happened before
+    the reset.
     """
     for seed in range(4):
         on = line(seed)
@@ -167,8 +168,8 @@ def float32(value: float) -> float:
 def test_wheel_counts_go_through_the_kinematics() -> None:
     """Deltas are in wheel counts. All three wheels turn backward by 1/8 of a turn.
 
-    The robot then has turned left in place. After this, B turns forward and A backward, and the
-    robot drives straight on.
+    The robot has then turned left in place. Next, B turns forward and A backward, and the robot
+    drives straight ahead.
     """
     bot = OmniBot(OmniBotSettings(delta_frame="wheel_counts"))
     bot.receive(encode(ImuFrame((0, 0, -16384), (0, 0, 0))) * 2, 0.0)

@@ -59,7 +59,7 @@ def test_a_new_line_ends_a_silence(liveness: Liveness) -> None:
 
 
 def test_a_stall_is_not_a_silence_of_the_board(liveness: Liveness) -> None:
-    """This process stalls. Data from before the end of the stall may still wait to be read.
+    """This process stalls. At the end of the stall, older data may still wait to be read.
 
     So the board has 2 s after the stall before it counts as silent.
     """
@@ -80,7 +80,8 @@ def test_a_known_silence_stays_known_through_a_stall(liveness: Liveness) -> None
 def test_it_wakes_for_whichever_limit_comes_first(liveness: Liveness) -> None:
     """No data arrives. The driver wakes after 0.5 s if the robot is driven, otherwise after 2 s.
 
-    After 0.5 s without data, a command is ended. After 2 s, the board counts as silent.
+    These are the limits of two rules: after 0.5 s without data, the driver ends a command; after 2
+    s, it regards the board as silent.
     """
     assert liveness.wake_at(driven=False) == 12.0
     assert liveness.wake_at(driven=True) == 10.5

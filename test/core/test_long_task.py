@@ -51,9 +51,9 @@ def test_it_ends_when_its_time_is_over() -> None:
 
 
 def test_a_robot_that_stands_all_along_was_not_stopped() -> None:
-    """A task continues while the robot is at rest from the beginning.
+    """A task runs while the robot is at rest. The task is not ended, because no drive was stopped.
 
-    It ends when a robot that has been driven is stopped.
+    If the robot is driven and then stopped, the task ends.
     """
     task = LongTask()
     task.begin("record", "token", 120.0, 0.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the opening of a line, of the search for the board on it, and of the states' names."""
+"""Tests of the opening of a line, the detection of the board on it, and the names of the states."""
 
 import pytest
 from robots import standing
@@ -97,7 +97,7 @@ def test_a_silent_board_is_told_once() -> None:
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """A brown-out comes while the robot drives. The old command is not sent again."""
+    """The board restarts during a drive, by a brown-out. The old command is not sent again."""
     bench.drive(0.5)
     bench.run(0.2)
     bench.board.reboot()

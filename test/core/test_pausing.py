@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pausing with P, which toggles: the board never resumes by mistake, and a pause needs proof."""
+"""Pausing with P, which also resumes: the board never resumes by mistake; a pause needs proof."""
 
 import pytest
 from robots import drive_on, paused, standing
@@ -19,7 +19,8 @@ def bench() -> Bench:
 def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Bench) -> None:
     """The user pauses a driving robot. The driver sends Stop, and then P once.
 
-    P is sent as soon as new data shows that the board runs. The board's notice confirms the pause.
+    P is sent when new data shows that the board runs. The «Paused» text of the board confirms the
+    pause.
     """
     bench.drive(0.5)
     bench.run(0.3)
@@ -32,9 +33,9 @@ def test_pausing_sends_stop_then_one_p_and_is_confirmed_by_the_notice(bench: Ben
 
 
 def test_pausing_twice_does_not_toggle(bench: Bench) -> None:
-    """The user requests a pause of a paused board. The driver sends no P.
+    """The user requests a pause of a paused board. The driver sends no P, which would resume it.
 
-    It answers when a new notice of the board arrives.
+    The driver confirms the request when a new «Paused» text of the board arrives.
     """
     bench.ask(Request.PAUSE, 5.0)
     start, asked_at = len(bench.written), bench.now
@@ -60,7 +61,7 @@ def test_pausing_a_board_that_somebody_else_has_just_paused_does_not_unpause_it(
 
 
 def test_a_lost_p_is_said_again(bench: Bench) -> None:
-    """P is lost, so the board keeps sending data, although a paused board sends only notices.
+    """P is lost, so the board keeps sending data. A paused board would send only its «Paused» text.
 
     The driver sends P again.
     """
@@ -77,9 +78,10 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board. Older data then makes the driver send P, which resumes it.
+    """Another program pauses the board. Older data makes the driver send P, which resumes it.
 
-    The late notice of the first pause does not confirm the request, so the driver sends P again.
+    The «Paused» text of the first pause arrives late. It does not confirm the driver's pause, so
+    the driver sends P again.
     """
     data = bench.board.step()
     bench.board.receive(b"P")
@@ -101,9 +103,9 @@ def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
 
 
 def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_paused() -> None:
-    """The board is started, and then a pause is requested.
+    """A paused board is started, and then a pause is requested.
 
-    A notice from before the start arrives late. It does not confirm the pause.
+    A «Paused» text from before the start arrives late. It does not confirm the new pause.
     """
     bench = paused()
     notice = b""
@@ -124,7 +126,10 @@ def test_a_pause_whose_request_crosses_a_notice_says_so_only_when_the_board_is_p
 
 
 def test_a_host_that_slept_does_not_take_old_data_for_a_lost_p(bench: Bench) -> None:
-    """The host sleeps for 3 s after P. Data that the board sent before P does not show a lost P."""
+    """After P, the host sleeps for 3 s. Then it reads data that the board sent before P.
+
+    The driver does not conclude from this data that P was lost.
+    """
     on_its_way = b"".join(bench.board.step() for _ in range(10))
     bench.session.request(Request.PAUSE, token := object(), bench.now)
     bench.session.inbound.receive(on_its_way[:80], bench.now)
@@ -173,9 +178,9 @@ def test_a_start_ends_a_pause_that_failed(bench: Bench) -> None:
 
 
 def test_a_paused_board_that_somebody_else_starts_is_paused_again(bench: Bench) -> None:
-    """Another program starts a paused board.
+    """Another program starts a board that the user has paused.
 
-    The driver pauses it again and still refuses motion.
+    The driver pauses it again, and still refuses motion.
     """
     assert bench.ask(Request.PAUSE, 5.0).success
     bench.board.receive(b"S")

@@ -30,7 +30,7 @@ class Asked:
 
 
 class Walk(Bench):
-    """A bench that checks every write. Its line is slow and may lose bytes."""
+    """A bench that checks each write of the driver. Its line is slow and may lose bytes."""
 
     def __init__(self, seed: int, latency_s: float, board: BoardSettings, *, run: bool) -> None:
         super().__init__(board, run=run)
@@ -72,7 +72,7 @@ class Walk(Bench):
             self.judge_time()
 
     def stall(self, seconds: float) -> None:
-        """Let the line carry data for ``seconds`` while the session is not served."""
+        """Simulate a stall of the driver for ``seconds``. The line still carries data."""
         for _ in range(round(seconds / TICK_S)):
             self.step_board()
         if self.session.estop_active:

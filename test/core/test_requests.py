@@ -92,7 +92,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """While requests wait and the board is silent, the session's next wake-up is in the future."""
+    """Requests wait, and the board is silent. The session's next wake-up is in the future."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -155,9 +155,9 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 
 
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
-    """A paused board does not receive the R of a reset, so the numbers in its notices continue.
+    """A paused board does not receive the R of a reset, and so does not restart.
 
-    The driver sees no restart, and the reset fails.
+    The numbers in its «Paused» texts continue, which shows this. The reset fails.
     """
     bench = Bench(run=False)
     bench.open()

@@ -2,7 +2,7 @@
 
 """Adapter that makes a LOIS ECU a ``Board`` of the driver; ``LoisConversation`` does the work.
 
-Between two groups of ticks, the odometry is predicted.
+Between two tick reports of the board, the odometry is predicted.
 """
 
 import math
@@ -41,11 +41,11 @@ from omnibot_driver.core.readings import (
 
 RESETS: Final = 8
 RESET_AGAIN_S: Final = 0.9
-"""Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four groups
-of ticks have arrived."""
+"""Time in s after which a reset is repeated. By then, stopped wheels are at rest, and four tick
+reports have arrived."""
 STEADY_S: Final = 0.3
-"""Time in s for which unchanged tick counts are regarded as steady. The usual period of the ticks
-is shorter."""
+"""Time in s. If the tick counts have not changed for this time, the wheels are regarded as at rest.
+The time is longer than the usual period of the tick reports."""
 
 
 class LoisEcuBoard(Board):
@@ -96,9 +96,10 @@ class LoisEcuBoard(Board):
 
     @property
     def shows_standstill(self) -> bool:
-        """Whether the board counts both wheels' ticks now.
+        """Whether unchanged ticks would now show that both wheels are at rest.
 
-        The public firmware counts a wheel's ticks only while its RPM target is positive.
+        The public firmware counts a wheel's ticks only while its RPM target is positive. Otherwise,
+        unchanged ticks show nothing.
         """
         return self._ecu.translation.odometry.counting
 
@@ -220,7 +221,7 @@ class LoisEcuBoard(Board):
     def due(self, now: float) -> Packets:
         """Return the lines to write now.
 
-        Such lines are settings, repeated resets, the ball command, and RPM 0/0 after a Stop.
+        They contain settings, repeated resets, the command to drop a ball, or RPM 0/0 after a Stop.
         """
         if self._leaving:
             return NO_PACKETS
@@ -317,5 +318,5 @@ class LoisEcuBoard(Board):
         self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
-        """Make ``due`` return the ball command once. A repetition would distribute another ball."""
+        """Make ``due`` return the command to drop a ball once. A repetition would drop another."""
         self._once += packed(self._ecu.distribute_ball())

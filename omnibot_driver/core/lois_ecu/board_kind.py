@@ -2,11 +2,12 @@
 
 """Detection of the kind of board: one with the public firmware, or one as the manual describes it.
 
-- Public firmware: odometry follows the ticks (0x12). Ticks count only while a wheel is commanded
-  forward.
-- Manual: odometry has its own command byte (0x20). Ticks count both ways.
+- Public firmware: an odometry report follows each tick report, with the same command byte (0x12).
+  Ticks count only while a wheel is commanded forward.
 
-This module works on changes of the counts and on the order of groups.
+- Manual: odometry reports have their own command byte (0x20). Ticks count in both directions.
+
+This module works on changes of the counts and on the order of the reports.
 """
 
 from typing import Final
@@ -16,11 +17,11 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of groups of ticks that no odometry follows directly. If odometry with its own command
-byte arrives after them, the board works as in the manual."""
+"""Number of tick reports that no odometry report follows directly. If odometry with its own command
+byte arrives after this number, the board works as in the manual."""
 UNCOUNTED_M: Final = 0.06
-"""Sum of both wheels' distances in m. If wheels roll backward this far and no count falls, ticks do
-not count backward."""
+"""Sum of both wheels' distances in m. If the wheels roll backward this far and neither count falls,
+this board does not count ticks backward."""
 
 
 class BoardKind:
@@ -37,16 +38,15 @@ class BoardKind:
         self._lone_ticks, self._uncounted_m = 0, 0.0
 
     def took_ticks(self, counts: tuple[int, int]) -> None:
-        """Record a group of ticks. ``counts``: new ticks of each wheel since the group before."""
+        """Record a tick report. ``counts``: new ticks of each wheel since the report before."""
         self._lone_ticks += 1
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
 
     def took_odometry(self, *, appended: bool) -> None:
-        """Record a group of odometry.
+        """Record an odometry report.
 
-        ``appended``: whether the group has the command byte of the ticks, as in the public
-        firmware.
+        ``appended``: whether the report has the command byte of ticks, as in the public firmware.
         """
         motion = self._motion
         if appended and not self.appends:
@@ -59,9 +59,11 @@ class BoardKind:
             motion.signed |= self._lone_ticks >= LONE_TICKS
 
     def watch(self, told: Told | None) -> None:
-        """Detect that ticks do not count backward: a wheel rolls backward, but no count falls.
+        """Detect whether this board counts ticks only forward.
 
-        ``told``: changes in the board's own odometry, None if unknown.
+        It does if a wheel rolls backward by the board's odometry, but no count falls.
+
+        ``told``: changes in the board's odometry since its last report, None if unknown.
         """
         if told is None or not self._motion.signed or self._seen_signed:
             return

@@ -1,10 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Changes from one group of odometry (0x20) to the next: turn, distance and wheel speeds.
+"""Changes from one odometry report (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware uses whole RPM. While both speeds are equal, the position does not change.
+The public firmware reports whole RPM. A defect: its position stays the same while both wheels have
+the same speed.
 
-This module works on groups of odometry, without their times.
+This module works on odometry reports, without their times.
 """
 
 import math
@@ -19,13 +20,14 @@ MOST_RPM: Final = 150.0
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """Changes that a group of odometry (0x20) reports since the group before.
+    """Changes between two consecutive odometry reports (0x20).
 
-    ``turned_m``: distance of the right rim minus that of the left rim, in m.
+    ``turned_m``: distance that the right rim moved farther than the left one, in m.
 
-    ``along_m``: distance of the middle of the axle, in m.
+    ``along_m``: distance that the middle of the axle moved, in m.
 
-    ``speeds_mps``: speeds of the left and right rim. None unless they are whole RPM.
+    ``speeds_mps``: speeds of the left and right rim in the later report, in m/s. None unless both
+    are a whole number of RPM.
     """
 
     turned_m: float
@@ -36,7 +38,7 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each group of odometry with the one before.
+    """Comparison of each odometry report with the one before.
 
     ``rpm_mps``: speed of a wheel's rim at 1 RPM, in m/s.
     """
@@ -46,13 +48,13 @@ class OdometryReader:
         self._before: BoardOdometry | None = None
 
     def begin(self) -> None:
-        """Treat the next group as the first."""
+        """Forget the last report, so that no change is computed for the next one."""
         self._before = None
 
     def take(self, group: BoardOdometry) -> Told | None:
-        """Return what changed from the last group to ``group``.
+        """Return what changed from the last report to ``group``.
 
-        Return None for the first group, and for a group whose pose is not finite.
+        Return None for the first report, and for a report whose pose is not finite.
         """
         if not all(map(math.isfinite, (group.x_m, group.y_m, group.yaw_rad))):
             return None

@@ -1,11 +1,12 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Estimation of the delay with which a group of ticks was read, from the board's time in the group.
+"""Estimation of the delay with which each tick report was read.
 
-Two models of the board's clock are fitted. In one, the clock always runs (manual). In the other, it
-stops while the board sends (public firmware).
+A tick report contains the board's time, which is compared with the arrival time. Two models of the
+board's clock are fitted. In one, the clock always runs (manual). In the other, it stops while the
+board sends (public firmware).
 
-This module works on clock counts, numbers of lines and arrival times.
+Input: clock counts, numbers of sent lines and arrival times; output: delays in s.
 """
 
 import math
@@ -19,8 +20,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
 
 LINE_S: Final = 14 * 10 / 115200
 GROUPS_KEPT: Final = 25
-"""Number of stored groups. They usually cover five seconds, in which a clock error of 100 ppm adds
-0.5 ms."""
+"""Number of stored tick reports. They usually cover five seconds, in which a clock error of 100 ppm
+adds 0.5 ms."""
 FEWEST: Final = 8
 LATEST_S: Final = 0.25
 """Longest plausible delay in s. A longer delay means that the board has restarted, or that its
@@ -30,17 +31,19 @@ UNKNOWN_S: Final = 0.012
 unknown."""
 LEAST_S: Final = 0.001
 SAME_READ_S: Final = 0.02
-"""Groups that arrive within this time in s were probably read together after a pause. Only the
-last, with the smallest delay, is stored."""
+"""Tick reports that arrive within this time in s were probably read together after a pause. Only
+the last one, with the smallest delay, is stored."""
 DISAGREES_S: Final = 0.03
-"""A deviation from the last groups is certain from this time in s on, beyond their own spread."""
+"""Margin in s. A tick report is certainly irregular if it is earlier than the fitted clock by more
+than this margin. The same holds if its delay exceeds the largest recent delay by more than this
+margin."""
 Point = tuple[float, float]
 """Arrival time in s, and the arrival time minus the board's time, in s."""
 UNIT_S: Final[dict[ClockUnit, float]] = {"ms": 1e-3, "ns": 1e-9}
 
 
 class BoardTime:
-    """Estimator of the delay of each group of ticks.
+    """Estimator of the delay with which each tick report is read.
 
     ``stddev_s``: standard deviation of the delay, in s.
     """
@@ -53,8 +56,9 @@ class BoardTime:
         """Forget the board's clock, because the board was reconnected or restarted."""
         self._before: tuple[int, float] | None = None
         self._behind_s = [0.0, 0.0]
-        """Arrival time minus board time since the first group, in s. First for a clock that always
-        runs, then for one that stops while the board sends."""
+        """Arrival time minus board time, as the change since the first tick report, in s. The first
+        value is for a clock that always runs, the second for one that stops while the board
+        sends."""
         self._kept: tuple[deque[Point], deque[Point]] = (
             deque(maxlen=GROUPS_KEPT),
             deque(maxlen=GROUPS_KEPT),
@@ -64,7 +68,7 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """Add ``lines`` to the number of lines that the board has sent."""
+        """Record that the board has sent ``lines`` more lines. Its clock may stop meanwhile."""
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:
@@ -77,11 +81,11 @@ class BoardTime:
         return late_s
 
     def deviation_s(self, counts: int, unit: ClockUnit | None, now: float) -> tuple[float, bool]:
-        """Return how much later than the last groups a group arrives by its clock, in s.
+        """Return the delay of a tick report in s, and whether this delay is irregular.
 
-        It is negative if the group is early. Also return whether this is too much for a read: a
-        read is never early, and at most as late as the last ones. 0 and False while too few groups
-        are known. Nothing is stored.
+        The delay follows from the fitted clock, and is negative if the report seems early. It is
+        irregular if a late read cannot explain it: if it is negative, or much larger than all
+        recent delays. Return 0 and False while too few reports are stored. Nothing is stored.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False
@@ -127,7 +131,7 @@ class BoardTime:
 
 
 def _above_line(kept: Sequence[Point]) -> list[float]:
-    """Return the height of each point above a straight line that touches the points from below."""
+    """Return the height of each point above a straight line that touches them from below, in s."""
     slope, least = _line_below(kept)
     return [behind_s - slope * at_s - least for at_s, behind_s in kept]
 

@@ -59,7 +59,7 @@ from omnibot_driver.core.lois_ecu.messages import (
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """One kind of command, with its command byte and its class.
+    """One kind of command: its command byte, its class, and its conversion to bytes and back.
 
     ``payload``: converts the fields of a command to a payload.
 

@@ -2,10 +2,10 @@
 
 """Correction of the motion filter: comparison of each report with the filter's expectation.
 
-While the board counts a wheel's ticks, the count is compared. Otherwise, the changes in 0x20
-(odometry) are compared.
+While the board counts a wheel's ticks, the count is compared. Otherwise, the changes in the board's
+odometry (0x20) are compared.
 
-This module works on counts and on changes of 0x20, without the robot's pose.
+This module works on counts and on changes of the board's odometry, without the robot's pose.
 """
 
 import math
@@ -37,32 +37,35 @@ line."""
 TICK_VARIANCE: Final = 1 / 8
 TURN_VARIANCE: Final = 0.3
 ALONG_VARIANCE: Final = 0.15
-"""``TICK_VARIANCE``, ``TURN_VARIANCE``, ``ALONG_VARIANCE``: error variances of a count, and of
-heading and distance in 0x20 (odometry), in squared ticks."""
+"""Variances in squared ticks, of the errors of three reported values: ``TICK_VARIANCE`` of a count,
+``TURN_VARIANCE`` and ``ALONG_VARIANCE`` of heading and distance in the board's odometry (0x20)."""
 COUNT_READ_S: Final = 0.003
 UNFORESEEN_TICKS: Final = 1.5
-"""Residual of a count, in ticks, above which the wheel's speed has changed without a new
-set-point."""
+"""Limit, in ticks, of the difference between a reported and an expected count. Above it, the wheel
+has changed its speed without a new set-point."""
 UNFORESEEN: Final = 5.0
-"""Residual of a count, in standard deviations, above which no motion of the wheel explains it."""
+"""Limit, in standard deviations, of the difference between a reported and an expected count. Above
+it, the wheel's motion cannot be the cause: the counter may have restarted."""
 SAME_TICKS: Final = 0.6
-"""Smallest residual, in ticks, at which an unchanged count is used. At a smaller residual, the next
-tick may not be due yet."""
+"""If a count has not changed, the filter is corrected only if the expected count differs by at
+least this number of ticks. With a smaller difference, the next tick may not be due yet."""
 LEAP: Final = 5.0
 LEAP_M: Final = 0.12
-"""``LEAP``, ``LEAP_M``: limits of the reported minus the expected heading, in standard deviations
-and in m at the rims. Beyond both, the board has computed the heading from an old speed."""
+"""``LEAP`` (in standard deviations), ``LEAP_M`` (in m at the rims): limits of the difference
+between the reported and the expected heading. If both are exceeded, the report is ignored: the
+board has computed the heading from an outdated wheel speed."""
 DIFFERING_RPM: Final = 2.5
 CREEPING_RPM: Final = 5.0
 BLIND_M: Final = 0.012
 SWINGING_M: Final = 0.055
-"""``BLIND_M``, ``SWINGING_M``: standard deviation in m that 1 m without ticks adds to a wheel's
-distance. ``SWINGING_M`` is for an oscillating speed."""
+"""Standard deviation in m of a wheel's distance after 1 m without counted ticks: ``BLIND_M`` at a
+steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
-"""Standard deviation in m that 1 m at an oscillating speed adds to the position, in addition to
-``SWINGING_M``."""
+"""Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
+speed. It is added to the effect of ``SWINGING_M``."""
 EQUAL_RPM: Final = 3.0
-"""Standard deviation, in RPM, of the difference of two speeds that the board reports as equal."""
+"""Standard deviation, in RPM, of the true difference of two wheel speeds if the board's odometry
+shows that they are equal."""
 
 
 class Comparison:
@@ -75,29 +78,28 @@ class Comparison:
         self._motion = motion
         self._counted_m = [0.0, 0.0]
         self._counted = [False, False]
-        """For each wheel: whether the board counted its ticks when the last group came."""
+        """For each wheel: whether the board counted its ticks at the time of the last report."""
         self._turned_m = 0.0
         self._speeds = ReportedSpeed(motion, 0), ReportedSpeed(motion, 1)
 
     # Ticks
 
     def begin_counts(self) -> None:
-        """Restart each wheel's count of ticks at zero.
-
-        Both the reported and the expected count are restarted.
-        """
+        """Restart each wheel's count of ticks at zero, both the reported and the expected one."""
         self._counted_m = [0.0, 0.0]
         variance = TICK_VARIANCE * self._motion.tick_m**2
         for wheel in self._motion.wheels:
             self._motion.filter.forget(wheel.base + COUNT, 0.0, variance)
 
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
-        """Return by how many ticks a wheel's ``ticks`` new ticks differ from the expectation.
+        """Return the difference between a wheel's reported and expected count, in ticks.
 
-        Also return whether this is more than the filter's own error can explain. The difference is
-        0 while the board does not count. Nothing is corrected.
+        Also return whether it is too large for an error of the filter. The difference is 0 while
+        the board does not count. The filter is not corrected.
 
-        ``late_s``: how much later than usual the ticks arrived.
+        ``ticks``: reported ticks since the last report.
+
+        ``late_s``: how much later than usual the report arrived.
         """
         motion = self._motion
         wheel, speed = motion.wheels[index], motion.speed_mps(index)
@@ -114,7 +116,7 @@ class Comparison:
     def count(self, index: int, ticks: int, duration_s: float, late_s: float) -> None:
         """Correct the filter by ``ticks`` new ticks of a wheel.
 
-        ``duration_s``: time since the last group.
+        ``duration_s``: time since the last report.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -144,9 +146,9 @@ class Comparison:
     # 0x20
 
     def begin_odometry(self) -> None:
-        """Restart the sums of changes of heading and distance at zero.
+        """Restart two sums at zero: the changes of heading and of distance.
 
-        Both the changes in 0x20 (odometry) and the expected changes are restarted.
+        Both the sums from the board's odometry (0x20) and the expected sums are restarted.
         """
         self._turned_m = 0.0
         tick2 = self._motion.tick_m**2
@@ -158,11 +160,11 @@ class Comparison:
         self._motion.differing_mps = math.inf
 
     def odometry(self, told: Told, duration_s: float, late_s: float) -> None:
-        """Correct the filter by the changes of 0x20 (odometry) since the last group.
+        """Correct the filter by what changed in the board's odometry (0x20) since its last report.
 
-        ``duration_s``: time since the last group.
+        ``duration_s``: time since that report.
 
-        ``late_s``: how much later than usual the group arrived.
+        ``late_s``: how much later than usual the new report arrived.
         """
         motion = self._motion
         shown = motion.shown_mps(0), motion.shown_mps(1)
@@ -198,14 +200,14 @@ class Comparison:
             self._equal(duration_s)
 
     def came_to_rest(self, index: int) -> None:
-        """Subtract the distance that was estimated for a wheel while the wheel was at rest.
+        """Remove the distance that was wrongly added for a wheel that had already come to rest.
 
         ``index``: 0 left, 1 right.
         """
         self._speeds[index].come_to_rest()
 
     def _equal(self, duration_s: float) -> None:
-        """Correct the filter by the fact that both wheels have the same, unknown speed."""
+        """Correct the filter: both wheels have the same speed, but its value is not reported."""
         motion = self._motion
         sure = not any(wheel.rests or wheel.locked or wheel.rolls_on for wheel in motion.wheels)
         if sure and not any(speed.resting.chance for speed in self._speeds):
@@ -216,7 +218,7 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the filter by the fact that neither wheel rolled more than ``ticks`` ticks."""
+        """Correct the filter: since the last report, no wheel rolled more than ``ticks`` ticks."""
         motion = self._motion
         self.begin_odometry()
         variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2

@@ -170,9 +170,9 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the ticks show that the robot is at rest after a Stop.
+        """Return whether the robot is at rest after a Stop. None if the ticks do not show it.
 
-        None if they show nothing: without recent ticks, after a backward command or RPM 0/0.
+        They do not show it if they are old, and after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -302,7 +302,7 @@ class LoisConversation:
         self._upkeep.writer.write(command, now)
 
     def distribute_ball(self) -> bytes:
-        """Return the ball command, which must be sent only once."""
+        """Return the command to drop a ball. It must be sent only once."""
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:

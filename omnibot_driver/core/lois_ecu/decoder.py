@@ -39,7 +39,8 @@ class LoisDecoder:
 
     ``sum_required``: whether lines without a checksum are discarded.
 
-    ``terminal``: whether text is a sensor's line instead of damage.
+    ``terminal``: whether text that is not a line of the protocol is a sensor's line. Otherwise, it
+    counts as damage.
 
     ``times``: for each report of the last call, the time in s at which its last line arrived.
     """
@@ -68,7 +69,7 @@ class LoisDecoder:
 
     @property
     def group_statistics(self) -> GroupStatistics:
-        """Counters of groups of lines."""
+        """Counters of groups of lines. Each group encodes one report."""
         return self._statistics.groups
 
     @property
@@ -91,7 +92,7 @@ class LoisDecoder:
         self._assembler.expect_record(kind, left, right)
 
     def forget_counters(self) -> None:
-        """Accept any counts in the next group, because a reset may have cleared the counters."""
+        """Accept any counts in the next report, because a reset may have cleared the counters."""
         self._assembler.forget()
 
     def feed(self, data: bytes, now: float) -> list[Report]:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states, for a restart of the board that is noticed late.
+"""History of a filter's states, to which the filter returns if a restart is noticed late.
 
 This module works on states and times. It does not know what a state means.
 """
@@ -11,7 +11,8 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.sparse_filter import SparseFilter
 
 KEPT: Final = 32
-"""Number of stored states: more than the groups that can arrive before a restart is noticed."""
+"""Number of stored states, one for each report. It is larger than the number of reports that can
+arrive between a restart of the board and its detection."""
 
 
 class FilterHistory:
@@ -22,7 +23,7 @@ class FilterHistory:
         self._kept: deque[tuple[float, list[float], list[list[float]]]] = deque(maxlen=KEPT)
 
     def forget(self) -> None:
-        """Discard all stored states, because the odometry frame has changed."""
+        """Discard all stored states. They are in an odometry frame that is not valid any more."""
         self._kept.clear()
 
     def keep(self, now: float) -> None:
@@ -31,9 +32,9 @@ class FilterHistory:
         self._kept.append((now, list(self._filter.mean), covariance))
 
     def go_back(self, then_s: float) -> float | None:
-        """Restore the last stored state from ``then_s`` or earlier, else the oldest one.
+        """Restore the last state that was stored at ``then_s`` or earlier, or else the oldest one.
 
-        Return the time of the restored state in s. None if no state is stored.
+        Return the time in s at which the restored state was stored. None if no state is stored.
         """
         if not self._kept:
             return None

@@ -22,9 +22,10 @@ class FusedOdometry:
 
     ``twist_covariance``: variances in (m/s)² and (rad/s)².
 
-    ``displacement``: since the previous estimate, in the robot's axes.
+    ``displacement``: motion since the previous estimate, in the robot's axes at that estimate.
 
-    ``wheel_ways_m``: distances of the board's left and right wheel since then, at nominal size.
+    ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate, at
+    nominal wheel size.
     """
 
     stamp_s: float

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Assembly of reports that take several lines: a marker line, then lines with values.
+"""Assembly of reports from groups of lines: a marker line, then lines with values.
 
 ``record_lines`` assembles records. This module works on lines and arrival times.
 """
@@ -34,12 +34,15 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group of a valid length is complete. The board sends a group's lines
-1.2 ms apart."""
+"""Silence in s after which a group is complete, if a report can have its number of lines. The board
+sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group, as a fraction of the time between the last two markers. The limit
-is at least ``QUIET_S`` and at most ``LATE_S``."""
+"""Longest pause within a group. It is this fraction of the time from the marker line of the group
+before to that of the group.
+
+The pause is at least ``QUIET_S`` and at most ``LATE_S``.
+"""
 
 # Lines after the marker. The public firmware sends odometry (6 lines) with the command byte of the
 # ticks (3 lines).
@@ -74,7 +77,7 @@ class Assembler:
         self._payloads: list[int] = []
         self._done = False
         self._begun_at: dict[int, float] = {}
-        """Time at which the last group began, by command byte."""
+        """Arrival time of the last marker line, by command byte."""
         self._late_s: dict[int, float] = {}
         """Longest pause allowed within a group, in s, by command byte."""
         self._astray = False
@@ -90,9 +93,9 @@ class Assembler:
 
     @property
     def resolves_at(self) -> float:
-        """Time at which a held group is returned if nothing follows it.
+        """Time at which a held group is returned if no line follows it.
 
-        Infinity if no group is held, or if the held group may be unfinished.
+        Infinity if no group is held, or if lines of the held group may still be missing.
         """
         return self._at + QUIET_S if self._may_be_complete() else math.inf
 
@@ -142,7 +145,7 @@ class Assembler:
         self._record.damage()
 
     def rest(self, now: float) -> list[Timed]:
-        """Return the held group if its length is valid and nothing has come for ``QUIET_S``."""
+        """Return the held group if it may be complete and no line has come for ``QUIET_S``."""
         return self._end(now) if now >= self.resolves_at else []
 
     def finish(self, now: float) -> list[Timed]:
@@ -162,11 +165,11 @@ class Assembler:
         self._code, self._payloads, self._done, self._astray = code, [], False, False
 
     def _may_be_minus_one(self, code: int) -> bool:
-        """Return whether the next line, which looks like a marker, may be a count of -1 instead."""
+        """Return whether a line that looks like a marker may be a value of -1 in the group."""
         return code == self._code == Code.TICKS and not self._done and 0 < len(self._payloads) < 3
 
     def _may_be_complete(self) -> bool:
-        """Return whether a held group has a valid length, and nothing shows that it continues."""
+        """Return whether the held group may be complete, by its number of lines and its values."""
         if self._code is None or self._done:
             return False
         if len(self._payloads) not in _LENGTHS[Code(self._code)]:

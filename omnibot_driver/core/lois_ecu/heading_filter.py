@@ -2,7 +2,7 @@
 
 """Filter of compass headings that rejects the false headings of the public firmware near north.
 
-The firmware averages headings as plain numbers: 359, 1 and 1 give 120.
+The firmware averages headings as plain numbers: 359, 1 and 1 degrees give 120.
 
 This module works on degrees and the odometry's yaw.
 """
@@ -12,8 +12,8 @@ from typing import Final
 
 NEAR_DEG: Final = 20.0
 NEAR_PART: Final = 0.2
-"""``NEAR_DEG + NEAR_PART * turn``: allowed error of a heading. ``turn``: the odometry's turn in
-degrees."""
+"""``NEAR_DEG + NEAR_PART * turn``: largest accepted difference of a heading from the expected one,
+in degrees. ``turn``: change of the odometry's yaw since the last heading, in degrees."""
 SURE_AFTER: Final = 4
 NORTH_DEG: Final = 45.0
 MISTAKEN_DEG: Final = (120.0, -120.0)
@@ -37,7 +37,7 @@ class HeadingFilter:
         self._agreed = 0
 
     def begin_frame(self, yaw_rad: float) -> None:
-        """Continue in a new odometry frame.
+        """Continue in a new odometry frame, for example after a reset of the odometry.
 
         ``yaw_rad``: yaw of the new frame in the present frame.
         """

@@ -22,7 +22,7 @@ END: Final = b"\n"
 LENGTH: Final = 14
 LENGTH_WITHOUT_SUM: Final = 12
 MARKER: Final = 0xFFFFFFFF
-"""Payload of the line that begins a group."""
+"""Payload of the marker: the line that begins a group of lines. A group encodes one report."""
 
 _SUMMED: Final = 11
 _HEX: Final = re.compile(rb":[0-9a-fA-F]+\n").fullmatch

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Prediction of the board's odometry (0x20), which uses the last measured speed of each wheel.
+"""Prediction of the board's own odometry (0x20).
 
-The firmware measures a wheel's speed at the wheel's ticks. The motion filter calls this module in
-each of its steps.
+The firmware measures a wheel's speed at each tick of the wheel, and computes its odometry from the
+last measured speeds. The motion filter calls this module in each of its steps.
 
 This module works on the states of the filter, without reports.
 """
@@ -27,18 +27,20 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation, in ticks, of the motion
-that 0x20 (odometry) misses when a wheel starts."""
+"""When a wheel starts, the board's odometry (0x20) misses a part of its motion. Mean
+``START_TICKS`` and standard deviation ``START_STDDEV_TICKS`` of this part, in ticks."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that 0x20 (odometry) misses above ``FAST_RPM``.
+"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses above
+``FAST_RPM``.
 
-Sending delays a tick. If the next tick comes soon after it, the board measures no speed.
+While the board sends, it notices ticks late. If the next tick comes soon after a late one, the
+board measures no speed.
 """
 
 
 def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, float]) -> None:
-    """Predict the last measured speed of each wheel, and the changes of 0x20 that result.
+    """Predict the last measured speed of each wheel, and the board's odometry (0x20).
 
     ``before``: speeds of the left and right wheel at the beginning of the step, in m/s.
     """

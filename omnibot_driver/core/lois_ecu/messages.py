@@ -20,7 +20,7 @@ MOST_SAMPLES: Final = 1024
 RECORD_END: Final = 0x00000000
 HEADING_END: Final = 0x016A016A
 HEADING_PADDING: Final = 0x016A
-"""Padding of a heading record: 362 degrees, which is not a heading."""
+"""Value that the board appends to a heading record: 362 degrees, which is not a heading."""
 
 
 class Code(IntEnum):
@@ -93,7 +93,7 @@ class TerminalMode(IntEnum):
 
 
 class RecordKind(Enum):
-    """What the board records: the times between ticks (RPM), torques or compass headings."""
+    """What the board records: times between ticks (RPM), motor torques or compass headings."""
 
     RPM = "rpm"
     TORQUE = "torque"
@@ -185,7 +185,8 @@ class SetTerminalMode:
 class Reset:
     """A command that resets the board.
 
-    Manual: controllers, interfaces and counters. Public firmware: only the ticks.
+    According to the manual, it resets controllers, interfaces and counters. The public firmware
+    resets only the tick counters.
     """
 
 
@@ -262,7 +263,8 @@ class Heading:
 class Ticks:
     """Signed encoder ticks of both wheels since the board started or was reset.
 
-    ``time_counts``: sending time in ns (manual) or ms (public firmware), modulo 2³².
+    ``time_counts``: sending time by the board's clock, modulo 2³². Its unit is ns according to the
+    manual, but ms in the public firmware.
     """
 
     time_counts: int
@@ -274,7 +276,10 @@ class Ticks:
 class BoardOdometry:
     """The robot's pose and velocity in the earth frame, as the board computes them.
 
-    Velocities may be NaN or infinite. ``appended``: whether it has the command byte of ticks.
+    Velocities may be NaN or infinite.
+
+    ``appended``: whether the report has the command byte of ticks (0x12), as in the public
+    firmware.
     """
 
     x_m: float
@@ -290,8 +295,13 @@ class BoardOdometry:
 class Record:
     """A complete record with as many samples as were requested.
 
-    ``left``, ``right``: samples by wheel. RPM: times between ticks, in ``record_request.COUNT_S``.
-    Torque: 12-bit values. Headings: degrees, all in ``left``.
+    ``left``, ``right``: samples by wheel.
+
+    RPM: times between encoder ticks, in the unit ``record_request.COUNT_S``.
+
+    Torque: 12-bit values.
+
+    Headings: degrees, all in ``left``.
     """
 
     kind: RecordKind

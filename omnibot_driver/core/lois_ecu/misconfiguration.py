@@ -26,8 +26,8 @@ OWN_GAINS: Final = (
     " 0.04 m on average, and by 0.2 to 2 m in a few drives. Run `calibrate step`, or set these"
     " parameters"
 )
-"""Advice if the user has not set all gains. Its numbers are from 150 forward drives with the
-compiled firmware."""
+"""Advice if the user has not set all gains; the braces are for the names of the missing ones. The
+numbers are from 150 forward drives with the compiled firmware."""
 LOOK_AT: Final = 600
 """Number of bytes without a valid line before advice is given. The board sends at least 70 bytes
 per second."""
@@ -48,7 +48,7 @@ class Suspicion:
         self._seen = b""
 
     def understood(self) -> None:
-        """Clear the advice, because a decoded report shows that nothing is misconfigured."""
+        """Clear the advice. A decoded report shows that the board is not misconfigured."""
         self._seen, self.advice = b"", None
 
     def look(self, data: bytes) -> None:

@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kalman filter of the motion of both wheels, and of the values by which the board reports it.
+"""Kalman filter of both wheels' motion, and of the values that the board reports about it.
 
-The wheels have their nominal size. Left and right are those of the board. This module works on
-commands and the firmware's counters, without messages.
+The wheels have their nominal size. Left and right are those of the board.
+
+Input: commands to the board, and values that the firmware counts or measures; it does not read
+reports.
 """
 
 import math
@@ -37,12 +39,13 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 STEP_S: Final = 0.025
 LONGEST_STEP_S: Final = 2.0
-"""Longest time in s that one call of ``advance`` predicts. If more time has passed, only its end is
-predicted."""
+"""Longest time in s that one call of ``advance`` predicts. If more time has passed, only the last
+``LONGEST_STEP_S`` are predicted."""
 ROLLED_OUT_S: Final = 0.15
 """Assumed time in s for which a wheel rolls on at its last speed after it has lost power."""
 LATE_PART: Final = 0.6
-"""Assumed standard deviation of the time at which a command takes effect, in controller periods."""
+"""Assumed standard deviation of the time at which a command takes effect, as a fraction of the
+speed controller's period."""
 ROUNDED: Final = 0.4
 ROUNDED_STDDEV: Final = 0.15
 """``ROUNDED``, ``ROUNDED_STDDEV``: mean and standard deviation of the firmware's rounding down of a
@@ -52,11 +55,12 @@ measured speed, in RPM."""
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: excess of a backward speed, as a fraction of the set-point.
+"""How much faster than its set-point a wheel rolls backward, as a fraction of the set-point. Mean
+``EXCESS_MEAN`` and standard deviation ``EXCESS_STDDEV``.
 
-``EXCESS_CHANGE``: standard deviation that a change of the set-point adds to this excess.
+``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
 
-First value: with the board's own gains. Second value: with the user's gains.
+In each pair, the first value is for the board's own controller gains, the second for the user's.
 """
 DUTY_STDDEV: Final = 0.3
 ROLLING_MPS: Final = 1e-6
@@ -73,7 +77,7 @@ class MotionFilter:
 
     ``holds``: whether the board keeps the last measured speed of a wheel at rest.
 
-    ``tuned``: whether the user set the speed controllers' gains.
+    ``tuned``: whether the user set the gains of the speed controllers.
     """
 
     def __init__(self) -> None:
@@ -85,8 +89,9 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference of both measured speeds since this attribute was last reset, in
-        m/s."""
+        """Smallest difference between the speeds that the board should report for both wheels, in
+        m/s, since the last comparison of distances. If it is small, the board's position may have
+        missed motion."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 
@@ -173,7 +178,9 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt(self, index: int, stddev_m: float, *, counted: bool = False) -> None:
-        """Add an error to a wheel's distance, and to all states that depend on that distance.
+        """Add an error to a wheel's estimated distance, and to all states that depend on it.
+
+        ``stddev_m``: standard deviation of the error.
 
         ``counted``: whether the board counted the wheel's ticks when the error arose.
         """
@@ -184,12 +191,15 @@ class MotionFilter:
         self.filter.disturb(terms, stddev_m**2)
 
     def doubt_way(self, index: int, stddev_m: float) -> None:
-        """Add an error to a wheel's distance that its count does not show."""
+        """Add an error to a wheel's distance, but not to its expected count of ticks."""
         terms = [term for term in self._way_terms(index) if term[0] != PER_WHEEL * index + COUNT]
         self.filter.disturb(terms, stddev_m**2)
 
     def _doubted(self, index: int) -> Terms:
-        """Return which states are wrong, and by how much, if a wheel's distance is wrong by 1 m."""
+        """Return the states that are wrong if a wheel's estimated distance is wrong by 1 m.
+
+        Each state comes with the size of its error.
+        """
         wheel, base = self.wheels[index], PER_WHEEL * index
         terms = [*self._way_terms(index), (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
@@ -198,7 +208,7 @@ class MotionFilter:
         return terms
 
     def _way_terms(self, index: int) -> Terms:
-        """Return which states change, and by how much, if a wheel rolls 1 m."""
+        """Return the states that change if a wheel rolls 1 m, each with the size of its change."""
         base, yaw = PER_WHEEL * index, self.yaw_rad
         terms = [(base + WAY, 1.0), (X, math.cos(yaw) / 2), (Y, math.sin(yaw) / 2)]
         counts = self.wheels[index].counts(self.speed_mps(index), signed=self.signed)
@@ -241,10 +251,10 @@ class MotionFilter:
             self._begin_biases()
 
     def _begin_biases(self) -> None:
-        """Reset the biases.
+        """Reset the estimated speed errors (biases) of both wheels.
 
-        In duty mode, a bias is a relative error of the speed. Otherwise, it is the rounding of the
-        measured speed, in m/s.
+        In duty mode, a bias is a relative error of the speed. Otherwise, it is the amount by which
+        the firmware rounds down the measured speed, in m/s.
         """
         for index, wheel in enumerate(self.wheels):
             if wheel.course.kind == "duty" and wheel.course.target_mps:

@@ -36,10 +36,11 @@ LATE_S: Final = 0.012
 """Assumed standard deviation of an arrival time in s, until a better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The pose is predicted for this number of tick periods after the last report, and for at least
-``UNHEARD_S`` s."""
+"""The pose is predicted for this number of tick periods after the last report, or for ``UNHEARD_S``
+s if this is longer."""
 FEWEST_UNFORESEEN: Final = 2.0
-"""Fewest ticks by which a count must differ from the expectation to show a restart."""
+"""Smallest difference between a reported and an expected count, in ticks, that can show a restart
+of the board."""
 HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
@@ -65,7 +66,7 @@ class LoisOdometry:
         self.connect()
 
     def configure(self, settings: LoisEcuSettings) -> None:
-        """Use the new ``settings`` from the next group on."""
+        """Use the new ``settings`` from the next report on."""
         motion, yaw_rad = self._motion, self._motion.yaw_rad
         self._settings = settings
         period_s = settings.periods_ms.get(Stream.TICKS, 0) / 1e3
@@ -104,7 +105,7 @@ class LoisOdometry:
 
     @property
     def resting(self) -> tuple[bool, bool]:
-        """Whether the left and the right wheel are assumed at rest despite a backward command."""
+        """For each wheel: whether it is assumed at rest although it is commanded backward."""
         left, right = self._motion.wheels
         return left.rests, right.rests
 
@@ -143,10 +144,11 @@ class LoisOdometry:
         self._comparison.begin_counts()
 
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
-        """Return whether counts near zero differ from all that the wheels can have done.
+        """Return whether only a restart of the board explains that the counts are near zero.
 
-        A robot at rest may be pushed, and then its wheels differ from the expectation too. But at
-        rest, counts that have begun at zero are still zero.
+        This is the case if they differ from the prediction by more than the wheels can have rolled.
+        A robot at rest is an exception, because a push may have changed its counts. If it has
+        restarted, its counts are at most 1. Larger counts do not show a restart.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
@@ -156,7 +158,13 @@ class LoisOdometry:
         return any(sure and abs(count) >= FEWEST_UNFORESEEN for count, sure in found)
 
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
-        """Add an error to each wheel's distance, because its count may have begun at zero."""
+        """Add an error to each wheel's distance, because the board may have restarted unnoticed.
+
+        The error is the difference between the reported and the expected ticks. Its cause may be a
+        restart, after which the counts begin at zero, or true motion.
+
+        ``late_s``: how much later than usual the ticks arrived.
+        """
         for index, (count, _) in enumerate(self._unforeseen(ticks, now, late_s)):
             self._motion.doubt_way(index, count * self._settings.tick_m)
 
@@ -231,11 +239,11 @@ class LoisOdometry:
         return [self._estimate()]
 
     def heard_odometry(self, group: BoardOdometry, now: float, late_s: float = 0.0) -> None:
-        """Process odometry: 0x20, or odometry directly after ticks (0x12).
+        """Process an odometry report, which corrects the next predictions and estimates.
 
-        The reported odometry corrects the next predictions and estimates.
+        It is message 0x20, or in the public firmware a message 0x12 directly after the ticks.
 
-        ``late_s``: how much later than usual the odometry arrived, in s.
+        ``late_s``: how much later than usual the report arrived, in s.
         """
         told = self._board.take(group)
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
@@ -262,7 +270,7 @@ class LoisOdometry:
         return self._fused(max(now, self._at_s))
 
     def _keep(self, now: float) -> None:
-        """Store the state after a report. It is restored if later predictions prove wrong."""
+        """Store the state after a report, for a restart of the board that is noticed later."""
         self._heard_at_s, self._lost_s = now, -math.inf
         for index, wheel in enumerate(self._motion.wheels):
             speed_mps = abs(self._motion.speed_mps(index))
@@ -270,7 +278,10 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors of a long silence: if a Stop was lost, the wheels rolled on."""
+        """Add the errors of a long silence.
+
+        If a Stop was lost in the silence, the wheels rolled on.
+        """
         heard_s = max(self._heard_at_s, self._lost_s)
         if self._at_s > -math.inf:
             self._advance(heard_s + self._unheard_s)

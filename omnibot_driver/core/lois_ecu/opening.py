@@ -2,7 +2,8 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-All settings are written in rounds, until a date and ticks with the requested period confirm them.
+All settings are written again and again (in rounds). They are confirmed when a requested date has
+arrived, and ticks arrive with the requested period.
 """
 
 import math
@@ -35,11 +36,12 @@ LINE_S: Final = 0.02
 # For up to 13 ms, the board may receive nothing. Without this pause, the beginning of a motion
 # command and the end of another line could form a new motion command.
 AFTER_MOTION_S: Final = 0.015
-"""Shortest time in s from a motion command to a command that is not a setting. It is shorter than
-the time between two set-points."""
+"""Shortest time in s from a motion command to a command that is not a setting, for example for the
+LED. It is shorter than the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s from a group to the next round or date request, used in turn. With a constant delay,
-the board might be sending, and so not receiving, each time."""
+"""Delays in s, used in turn, from a tick report to the next round of settings or request for a
+date. The board cannot receive while it sends. With a constant delay, it might be sending each
+time."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
 period."""
@@ -47,15 +49,16 @@ DATE_AGAIN_S: Final = 3.0
 """Shortest time in s between two requests for an unknown date."""
 MOST_ROUNDS: Final = 40
 RECOVER_AFTER_S: Final = 3.0
-"""Time in s without an answer before a recovery. It is longer than the two seconds of a boot."""
+"""Time in s without an answer after which the driver restores the board's mode. It is longer than a
+boot, which takes two seconds."""
 BOOT_LEFT_SHORT_CORRECTION: Final = 1.0761719
 """Value of the left short correction in the public firmware after a boot."""
 
 
 class SettingsWriter:
-    """Queue of setting commands. ``due`` returns the lines to write now.
+    """Queue of commands that write settings. ``due`` returns the lines to write now.
 
-    ``points``: the set-points that were sent.
+    ``points``: the set-points that were sent, which show whether the robot drives.
     """
 
     def __init__(self, settings: LoisEcuSettings, points: SetPoints) -> None:
@@ -64,8 +67,8 @@ class SettingsWriter:
         self._in_period = self._answered = False
         self._queue: deque[tuple[float, Command]] = deque()
         self._others: deque[tuple[float, Command]] = deque()
-        """Commands that are not settings, each with its earliest time. They survive a restart of
-        the board."""
+        """Commands that are not settings, for example for the LED, each with its earliest sending
+        time. They are still sent if the board restarts."""
         self._rounds_left = 0
         self._round_at_s = math.inf
         self._date_asked_at_s, self._dates_asked = -math.inf, 0
@@ -96,7 +99,7 @@ class SettingsWriter:
 
     @property
     def _waits(self) -> bool:
-        """Whether settings wait because the robot drives. Writing a gain resets the controller."""
+        """Whether settings wait because the robot drives. Writing a gain resets its controller."""
         return self._points.driving and self._rounds >= ROUNDS
 
     @property
@@ -131,7 +134,7 @@ class SettingsWriter:
         self._others = deque(sorted(self._others, key=lambda entry: entry[0]))
 
     def ask_date(self, now: float) -> None:
-        """Request the date once, unless dates come periodically or a request was sent recently."""
+        """Request one date, unless dates come periodically or a request was sent recently."""
         if self._dates_come_periodically or now < self._date_asked_at_s + DATE_AGAIN_S:
             return
         self._date_asked_at_s = now
@@ -184,7 +187,7 @@ class SettingsWriter:
     def _turned(self, rounds: int) -> list[Command]:
         """Return the commands of a round. Each round begins with another command.
 
-        In a fixed order, a board that sends a group once a round could always miss the same line.
+        A board that sends a report once a round could otherwise miss the same line in each round.
         """
         found = list(self.commands())
         first = 0 if self.settings.with_sum else 2  # the first two must keep their order

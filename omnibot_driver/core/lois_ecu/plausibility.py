@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Plausibility of a complete group of lines: its values, and their change since the last group.
+"""Plausibility of a complete report: its values, and their change since the last report.
 
-If two groups fit each other, but not the group before them, the board has restarted or was reset.
+If two reports fit each other, but not the report before them, the board has restarted or was reset.
 
 This module works on values and arrival times.
 """
@@ -14,8 +14,8 @@ from typing import Final, Generic, Literal, TypeVar
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
 
 FASTEST_TICKS_PER_S: Final = 300.0
-"""Largest plausible rate of ticks: 60 ticks per turn at five turns per second, six times the
-firmware's highest speed."""
+"""Largest plausible rate of ticks: 60 ticks per turn at five turns per second. The firmware's
+highest speed is a sixth of this."""
 TICKS_MARGIN: Final = 30
 FASTEST_MPS: Final = 5.0
 FASTEST_RADPS: Final = 20.0
@@ -24,15 +24,16 @@ POSE_MARGIN_RAD: Final = 1.0
 FARTHEST: Final = 1e5
 """Largest position in m, and largest yaw in rad, that a robot can reach on one battery charge."""
 LATEST_S: Final = 0.3
-"""Longest plausible time in s from the sending of a group to its arrival."""
+"""Longest plausible time in s from the sending of a report to its arrival."""
 SLOWEST_CLOCK: Final = 0.5
-"""Lowest plausible rate of the board's clock, as a fraction of real time. The clock stops while the
-board sends."""
+"""Lowest plausible rate of the board's clock, as a fraction of real time. The rate may be below 1,
+because the clock of the public firmware stops while the board sends."""
 SURE_AFTER: Final = 2
-"""Number of further comparisons that must confirm the unit of the board's clock."""
+"""Number of further pairs of tick reports that must show the same unit of the board's clock, before
+the unit is regarded as known."""
 LEARNT_FROM_S: Final = 0.15
-"""Shortest time in s between two groups that can show the clock's unit. Over a shorter time, the
-errors of the arrival times are too large."""
+"""Shortest time in s between two tick reports that can show the clock's unit. Over a shorter time,
+the errors of the arrival times are too large."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -48,9 +49,10 @@ def wrapped(difference: int) -> int:
 
 
 class Gate(Generic[Group]):
-    """Check of each group against the last accepted group.
+    """Check of each report against the last accepted report of the same kind.
 
-    ``reachable(before, after, duration_s)``: whether ``before`` can become ``after`` in this time.
+    ``reachable(before, after, duration_s)``: whether ``after`` can follow ``before`` after this
+    time in s.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:
@@ -59,7 +61,7 @@ class Gate(Generic[Group]):
         self._aside: tuple[Group, float] | None = None
 
     def passes(self, group: Group, now: float) -> bool:
-        """Return whether to accept ``group``. Store it for the comparison with the next group."""
+        """Return whether to accept ``group``. Store it for the comparison with the next report."""
         aside = self._aside
         if self._last is not None and not self.would_pass(group, now):
             if aside is None or not self._reachable(aside[0], group, now - aside[1]):
@@ -70,17 +72,17 @@ class Gate(Generic[Group]):
         return True
 
     def would_pass(self, group: Group, now: float) -> bool:
-        """Return whether the group can follow the last accepted one. Nothing is stored."""
+        """Return whether the report can follow the last accepted one. Nothing is stored."""
         last = self._last
         return last is not None and self._reachable(last[0], group, now - last[1])
 
     def forget(self) -> None:
-        """Forget the last groups, so that the next group is accepted without a check."""
+        """Forget the last reports, so that the next report is accepted without a check."""
         self._last = self._aside = None
         self._begins_anew()
 
     def _begins_anew(self) -> None:
-        """Forget what a subclass has inferred from earlier groups: the counters restarted."""
+        """Forget what a subclass has inferred from earlier reports: the counters have restarted."""
 
 
 class TicksGate(Gate[Ticks]):
@@ -153,7 +155,7 @@ def _odometry_follows(before: BoardOdometry, after: BoardOdometry, duration_s: f
 
 
 def in_range(group: Ticks | BoardOdometry | GpsPosition) -> bool:
-    """Return whether a group's position is finite and in range. Ticks are always in range.
+    """Return whether a report's position is finite and in range. Ticks are always in range.
 
     Velocities are not checked.
     """

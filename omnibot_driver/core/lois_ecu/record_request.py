@@ -2,7 +2,7 @@
 
 """Request for a record. It is sent up to three times, because the board may lose lines.
 
-The repetitions come soon, because each request restarts the record.
+The repetitions follow quickly: each request restarts the record, so a late one would delay it.
 """
 
 import math
@@ -29,10 +29,12 @@ from omnibot_driver.core.lois_ecu.readings import (
 )
 
 SAID_AFTER_S: Final = (0.0, 0.13, 0.29)
-"""Times in s, since the first request, at which a request is sent. The intervals are longer than a
-pause of the board's reception, and are not multiples of its usual periods."""
+"""Times in s at which a request is sent, since the first one. The intervals are longer than the
+time for which the board may receive nothing, and not multiples of the usual periods of its
+reports."""
 COUNT_S: Final[Mapping[ClockUnit, float]] = {"ms": 1e-4, "ns": 1e-7}
-"""Time unit, in s, of an RPM record's samples, by the unit of the time in 0x12 (ticks)."""
+"""Unit, in s, of the times in an RPM record. It follows from the unit of the board's clock in its
+tick reports (0x12)."""
 
 
 def command_of(kind: RecordKind, samples: int) -> Command:
@@ -80,7 +82,7 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings, with the result of the request if it is known now.
+        """Return the readings, followed by the result of the request if it is known now.
 
         ``prevented``: why the record cannot come, as a sentence. Empty if it can come.
         """

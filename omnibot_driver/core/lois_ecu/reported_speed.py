@@ -1,9 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Corrections of one wheel by the speeds that a LOIS ECU reports for it.
+"""Corrections of one wheel's estimated motion by the speeds that a LOIS ECU reports for the wheel.
 
-The board measures a wheel's speed at each tick of this wheel. So the reported speed of a wheel at
-rest is old. While the board sends, it notices ticks late. The measured speed is then wrong.
+The board measures a wheel's speed only at the wheel's ticks. Two errors follow from this:
+
+- While a wheel is at rest, the board keeps reporting its last speed.
+- While the board sends, it notices ticks late, and measures a wrong speed.
 
 This module works on reported speeds and the motion filter, without messages.
 """
@@ -16,11 +18,11 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 from omnibot_driver.core.lois_ecu.wheel_motion import BIAS, HELD, PUSH, SPEED, WINDUP_M, X, Y
 
 ODOMETRY_AGE_S: Final = 0.0135
-"""Assumed age in s of the values of odometry when its last line arrives. The board takes these
-values before it sends the first line."""
+"""Assumed age in s of the values in an odometry report when its last line arrives. The board takes
+these values before it sends the first line."""
 DOUBT: Final = 3.0
-"""Residual, in standard deviations, above which the filter increases the variance of its
-estimate."""
+"""Difference between the reported and the expected value, in standard deviations, above which the
+filter increases the variance of its estimate."""
 FASTER_RPM: Final = 2.5
 """Lowest reported speed in RPM that is used. A slower wheel may have rested between its last two
 ticks."""
@@ -29,22 +31,23 @@ LONGEST_LAG_S: Final = 0.3
 SPEED_PART: Final = 0.04
 JUMP_RPM: Final = 8.0
 JUMP_RPM_PER_S: Final = 200.0
-"""``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change of speed between two reports.
-A larger change shows a delayed tick."""
+"""``JUMP_RPM + JUMP_RPM_PER_S * duration``: largest plausible change, in RPM, from one reported
+speed to the next. A larger change is an error of measurement, because a tick was noticed late."""
 STRAY_RPM: Final = 2.0
 STRAY_PART: Final = 0.1
-"""``STRAY_RPM + STRAY_PART * expected``: largest plausible residual of a reported speed. It applies
-only with a constant set-point and gains that the user set."""
+"""``STRAY_RPM + STRAY_PART * expected``: largest plausible difference, in RPM, between a reported
+and an expected speed. It applies only with a constant set-point and gains that the user set."""
 COASTED_TICKS: Final = 1.0
 """Number of ticks to subtract from the distance of a wheel that came to rest. Such a wheel has
 rolled less far than its last speed suggests."""
 SWINGS_RPM: Final = 4.0
 SWINGS_PART: Final = 0.4
-"""Assumed fraction of the time between two reports for which an unexpected change of speed
-lasts."""
+"""Assumed duration of an unexpected change of speed, as a fraction of the time between two
+reports."""
 UNSEEN_PART: Final = 0.6
-"""Largest assumed integral of a controller while its wheel does not tick, as a fraction of
-``WINDUP_M``. At ``WINDUP_M``, the wheel starts."""
+"""The speed controller of a wheel at rest integrates the speed error, and starts the wheel when the
+integral is ``WINDUP_M``. While the wheel does not tick, the integral is assumed to be at most this
+fraction of ``WINDUP_M``."""
 
 
 class ReportedSpeed:
@@ -62,15 +65,16 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Record the estimated speed, because no speed was reported in the last ``duration_s``."""
+        """Use the estimated speed, because no speed was reported in the last ``duration_s``."""
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)
 
     def come_to_rest(self) -> None:
-        """Record that the wheel has come to rest, and subtract the distance that it did not roll.
+        """Record that the wheel is at rest, and subtract the distance added since it stopped.
 
-        The wheel rests since its reported speed last changed, or since a later start command.
+        It is assumed at rest since its reported speed last changed, or since a later command to
+        start, which it did not obey.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:
@@ -126,7 +130,7 @@ class ReportedSpeed:
         estimate.forget(base + HELD, shown, rpm_mps**2 / 12)
 
     def _jumps(self, told_rpm: float, duration_s: float) -> bool:
-        """Return whether a reported speed is implausible, because a delayed tick caused it."""
+        """Return whether a reported speed is implausible, because the board noticed a tick late."""
         motion, wheel = self._motion, self._wheel
         change_rpm = abs(told_rpm - abs(self._told) / motion.rpm_mps)
         if change_rpm > JUMP_RPM + JUMP_RPM_PER_S * duration_s:

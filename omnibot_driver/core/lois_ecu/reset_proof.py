@@ -15,14 +15,14 @@ from omnibot_driver.core.lois_ecu.messages import Ticks
 FEW_TICKS: Final = 20
 """Largest assumed number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
 JUMP_TICKS: Final = 60
-"""Number of ticks that no wheel can roll between a reset and the next counts. A fall by this number
-proves the reset."""
+"""Number of ticks that no wheel can roll between a reset and the next counts. If a count falls by
+this number or more, the board has obeyed the reset."""
 STEADY_TICKS: Final = 3
-"""Smallest count whose change to zero at rest proves a reset. Backlash of the gears explains
-smaller changes."""
+"""If a count of at least this size becomes zero while the wheel is at rest, the board has obeyed
+the reset. Backlash of the gears can cause smaller changes."""
 UNPROVED_S: Final = 2.5
-"""Longest time in s to wait for a proof while the reset is repeated. If the counts were zero
-before, no proof is possible."""
+"""Longest time in s for which the driver repeats the reset and waits for a proof. If the counts
+were already zero before, no proof is possible."""
 
 
 class ResetProof:
@@ -30,7 +30,7 @@ class ResetProof:
 
     ``before``: counts when the reset was sent, None if unknown.
 
-    ``steady``: whether these counts had not changed for some time.
+    ``steady``: whether these counts had not changed for some time, so that the wheels were at rest.
     """
 
     def __init__(self, before: Ticks | None, *, steady: bool) -> None:
@@ -39,16 +39,17 @@ class ResetProof:
         self._seen: Ticks | None = None
 
     def again(self, before: Ticks | None, *, steady: bool) -> None:
-        """Record that the reset is repeated. Replace ``before`` if the new counts can prove more.
+        """Record that the reset is repeated, with the counts ``before`` this repetition.
 
-        New counts can prove more only if they are not near zero and the wheels are at rest.
+        The new counts replace the earlier ones if they can prove the reset. They can if they are
+        not near zero and the wheels are at rest.
         """
         if before is not None and steady and _largest(before) >= STEADY_TICKS:
             self._before, self._steady = before, steady
             self._waits_since_s, self._seen = math.inf, None
 
     def look(self, ticks: Ticks, now: float) -> bool:
-        """Return whether the driver can report the reset now.
+        """Return whether the driver can report the result of the reset now.
 
         The counts must be near zero. They must also prove the reset, unless ``UNPROVED_S`` has
         passed.

@@ -2,8 +2,8 @@
 
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
-The public firmware repeats the last speed of a wheel at rest. Just before, the reported speed has
-fallen to between 5 and 17 RPM.
+When a wheel stops, the public firmware keeps reporting the last speed that it measured. This speed
+is usually between 5 and 17 RPM, and lower than the reported speed before.
 
 This module works on reported speeds and the time between them.
 """
@@ -14,31 +14,34 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""``SLOWEST_RPM``, ``FASTEST_RPM``: range of the last reported speed of a wheel that came to rest.
-At a lower speed, the wheel is starting. At a higher speed, another tick follows."""
+"""``SLOWEST_RPM``, ``FASTEST_RPM``: range of the last speed that the board measures before a wheel
+stops. A lower speed is that of a wheel that starts. At a higher speed, at least one more tick
+follows."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
 HIDDEN_PART: Final = 0.3
-"""Fraction of the time that is counted while the board reports no speeds."""
+"""While the board reports no speeds, the clock of this module runs at this fraction of real
+time."""
 FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
-"""Probabilities of rest, by the number of repetitions of the speed, counted on the public firmware:
+"""Probabilities that a wheel is at rest. Index: how often the reported speed has been repeated. The
+values were counted on the public firmware:
 
 ``FAST``: after a fall to a speed above ``FAST_RPM``.
 
-``FAR``: after a fall by ``FELL_FAR_RPM``.
+``FAR``: after a fall by at least ``FELL_FAR_RPM``.
 
-``LONE``: after such a fall from a speed that was reported only once.
+``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
 
 ``NEAR``: after a smaller fall.
 
-``TUNED``: after any fall, with gains that the user set.
+``TUNED``: after any fall, if the user set the gains.
 """
 
 
@@ -68,7 +71,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Record an estimated speed, because no speed was reported in the last ``since_s``."""
+        """Use an estimated speed, because no speed was reported in the last ``since_s``."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 
@@ -98,7 +101,10 @@ class RestingWheel:
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
-        """Return the probabilities of rest that apply now. Empty if the wheel surely rolls."""
+        """Return the probabilities of rest, by the number of repetitions of the last speed.
+
+        Empty if the wheel surely rolls.
+        """
         if not SLOWEST_RPM < rpm < FASTEST_RPM:
             return ()
         if rpm > FAST_RPM:

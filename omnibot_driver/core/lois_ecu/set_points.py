@@ -17,7 +17,8 @@ from omnibot_driver.core.lois_ecu.messages import SetDuty, SetRpm
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 CLEAR_AFTER_S: Final = 2.0
-"""Time in s from a Stop until RPM 0/0 is sent, which ends the counting of ticks."""
+"""Time in s from a Stop until RPM 0/0 is sent, after which the board does not count ticks any
+more."""
 CLEAR_AGAIN_S: Final = 0.15
 
 
@@ -73,7 +74,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` again put RPM 0/0 before the next set-points."""
+        """Make ``wheels`` put RPM 0/0 before the next set-points again, as after a Stop."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

@@ -17,8 +17,8 @@ DriveMode = Literal["rpm", "duty"]
 USUAL_PERIODS_MS: Final[Mapping[Stream, int]] = MappingProxyType(
     {Stream.TICKS: 200, Stream.ODOMETRY: 200}
 )
-"""Periods in ms that the odometry needs. While the board sends, it cannot receive, so shorter
-periods harm."""
+"""Periods in ms of the reports that the odometry needs. Shorter periods are harmful, because the
+board cannot receive while it sends."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

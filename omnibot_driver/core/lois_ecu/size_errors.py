@@ -2,10 +2,10 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-The drive is repeated with each error, positive and negative. The spread of the poses is the
-covariance.
+Copies of the drive are computed with each error, once positive and once negative. The spread of
+their final poses is the covariance.
 
-This module works on distances of the wheels.
+Input: distances of the wheels; output: covariance of x, y and yaw.
 """
 
 import math
@@ -19,12 +19,12 @@ KINDS: Final = 3
 wheels."""
 WHEEL_SCALE: Final = 0.01
 WHEEL_SLIP: Final = 0.005
-"""``WHEEL_SCALE``, ``WHEEL_SLIP``: standard deviations of a wheel's relative size, and of the
-fraction of both wheels' distances lost by slip."""
+"""``WHEEL_SCALE``: standard deviation of the relative error of a wheel's size. ``WHEEL_SLIP``:
+standard deviation of the fraction of the distance that is lost because both wheels slip."""
 
 
 class SizeErrors:
-    """Copies of one drive. Each is computed with another error: of a wheel's size, or by slip."""
+    """Copies of one drive, each with an assumed error: of one wheel's size, or of a slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)

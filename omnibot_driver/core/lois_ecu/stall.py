@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a wheel that is commanded to turn, but is at rest and may never start by itself.
+"""Detection of a stalled wheel: commanded to turn, but at rest, and possibly unable to start.
 
-Ticks show forward motion, and 0x20 (odometry) backward motion.
+Forward motion is seen in the ticks, backward motion in the board's odometry (0x20).
 
 This module works on set-points, reports and times.
 """
@@ -18,21 +18,21 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 # The public firmware's controller keeps using the last measured speed of a wheel at rest. If this
 # speed is higher than a new set-point, the motor gets no power. RPM 0/0 clears the speed.
 STALLED_S: Final = 2.0
-"""Time in s without motion after which a wheel is stalled. With the firmware's gains, a wheel
-starts in half of this time."""
+"""Time in s without motion after which a commanded wheel is regarded as stalled. With the
+firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
-"""``TOO_FAST``, ``TOO_FAST_RPM``: limits above a set-point, as a factor and in RPM. If a repeated
-speed is beyond both, the wheel is at rest."""
+"""``TOO_FAST`` (factor), ``TOO_FAST_RPM`` (in RPM): limits of a reported speed above its set-point.
+If a speed exceeds both and is repeated, the wheel is at rest and the speed is old."""
 UNLIKE: Final = 1.15
-"""The speed of each wheel is divided by its set-point. If both wheels roll backward, the two
-quotients are assumed to differ at most by this factor."""
+"""If both wheels roll backward, both may be too fast, but by about the same factor (speed divided
+by set-point). The two factors are assumed to differ at most by ``UNLIKE``."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
-"""Smallest number of groups without motion after which a wheel is stalled. On a bad line, few
-groups arrive."""
+"""Smallest number of reports without motion after which a wheel is stalled. It prevents a false
+alarm on a bad line, where few reports arrive."""
 
 
 class StallWatch:
@@ -49,14 +49,14 @@ class StallWatch:
         self._seen_at = [math.inf, math.inf]
         self.saturated = [False, False]
         self._quiet = [0, 0]
-        """For each wheel: number of groups, since the wheel last turned or was started, that could
-        have shown motion, but did not."""
+        """For each wheel: number of reports without motion, since the wheel last turned or was
+        started. Only reports that could have shown its motion are counted."""
         self._ticks: Ticks | None = None
         self._told: tuple[float, float] | None = None
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record a set-point. A duty bypasses the controller, so it cannot stall a wheel."""
+        """Record a set-point. A duty bypasses the speed controller, so no wheel stalls by it."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
@@ -114,7 +114,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        A repeated speed is old if the other wheel's speed has changed, or far above the set-point.
+        A repeated speed is old if the other wheel's speed has changed meanwhile, or if it is far
+        above its set-point.
         """
         if told is None or self._told is None:
             return False
@@ -142,7 +143,7 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether a wheel has no power, because its reported speed reaches its set-point."""
+        """Return whether a wheel gets no power: its reported speed is not below its set-point."""
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 

@@ -2,7 +2,8 @@
 
 """Changes of the terminal mode, and the standstill that is needed before a change of any mode.
 
-In a terminal mode, the board reports neither motion nor its e-stop button.
+In a terminal mode, the board passes on the lines of a sensor. It then reports neither motion nor
+its e-stop button.
 
 This module works on modes and times.
 """
@@ -17,7 +18,7 @@ UNPROVED_S: Final = 2.0
 """Time in s for which the driver sends Stop if it cannot see whether the robot is at rest."""
 AGAIN_S: Final = 0.5
 STILL_TALKS_S: Final = 0.3
-"""Time in s after a mode is written for which reports of the earlier mode may still arrive."""
+"""Time in s after a mode is written. In this time, reports of the earlier mode may still arrive."""
 
 
 class ModeChange:
@@ -29,8 +30,8 @@ class ModeChange:
     def __init__(self) -> None:
         self.wanted = TerminalMode.HOST
         self._told: TerminalMode | None = None
-        """The sensor's mode that was written last. None once the board's own messages have arrived
-        again."""
+        """The terminal mode that was written last. None if the board's own messages have arrived
+        since then."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping = ""
         self._stopping_since_s: float | None = None
@@ -57,7 +58,7 @@ class ModeChange:
 
     @property
     def terminal(self) -> bool:
-        """Whether lines of a sensor are expected."""
+        """Whether the board is expected to send the lines of a sensor."""
         return self._told is not None
 
     @property
@@ -123,10 +124,7 @@ class ModeChange:
         return TerminalMode.HOST
 
     def protocol_heard(self, now: float) -> None:
-        """Record that the board sent a message of its own.
-
-        This message shows that a terminal mode has ended or not begun.
-        """
+        """Record that the board sent a message of its own, so that it is in no terminal mode."""
         if self._told is None or now - self._said_at_s < STILL_TALKS_S:
             return
         if not self.sensor_wanted:

@@ -10,8 +10,8 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
 STANDS_AFTER_S: Final = 0.6
-"""Time in s without a tick after which a wheel is at rest. At the lowest speed, 2 RPM, a tick comes
-every 0.5 s."""
+"""Time in s without a tick after which a wheel is regarded as at rest. At the lowest speed, 2 RPM,
+a tick comes every 0.5 s."""
 TRAITS: Final = Traits(
     imu_period_s=None,
     authorities=frozenset({Authority.BASE, Authority.WHEELS}),

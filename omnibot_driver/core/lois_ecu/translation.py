@@ -35,24 +35,26 @@ from omnibot_driver.core.readings import DisplacementReading
 
 DAY_S: Final = 86400
 UNKNOWN_FROM_YEAR: Final = 38
-"""Two-digit year (38 for 2038). If a date has this year or a later one, the GPS receiver does not
-have the date yet."""
+"""Two-digit year (38 for 2038). A date from this year on is false: the GPS receiver does not have
+the date yet."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
 RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
-"""``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count that wheels can
-cause by rolling back. A larger fall shows a restart."""
+"""``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count, in ticks, that
+wheels can cause by rolling back. If a count falls further, the board has restarted."""
 ROLLED_OUT_TICKS: Final = 10
 STARTING_TICKS_PER_S: Final = 20.0
-"""``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count after a restart, while a
-wheel rolls out and starts again."""
+"""``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count, in ticks, after a restart
+of the board. A wheel may roll out and start again in this time."""
 SILENT_S: Final = 1.0
-"""Pause in s after which counts near zero need not be unforeseen to show a restart."""
+"""Pause in s without tick reports. After a longer pause, counts near zero show a restart even if
+the wheels may have rolled back to them."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Wheels that roll back are assumed to do it for at most this time in s, if the clock's unit is
-unknown again. The clock then cannot confirm how long ago the last ticks were sent."""
+"""Longest time in s for which wheels are assumed to have rolled back, if the unit of the board's
+clock is unknown again. Without the unit, the clock cannot confirm the time since the last tick
+report."""
 
 
 class Translation:
@@ -68,7 +70,7 @@ class Translation:
         self.restarts = 0
         self.last_ticks_at_s = -math.inf
         self.ticked_at_s = -math.inf
-        """Time in s at which the counts of ticks were last seen to change."""
+        """Time in s of the last report in which a count of ticks had changed."""
         self._connect()
 
     @property
@@ -188,9 +190,12 @@ class Translation:
         return []
 
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
-        """Return how long ago the board's clock began, in s, if that was since the last ticks.
+        """Return how long ago the board's clock began at zero, in s. None if unknown.
 
-        A clock in ms may have begun earlier. None if unknown.
+        The clock begins at zero when the board starts. A clock in ns also does every 4.3 s, so the
+        age is known only if the clock began after the last tick report.
+
+        ``duration_s``: time since that report.
         """
         if self._unit is None:
             return None
@@ -200,10 +205,11 @@ class Translation:
         return None if wrapped_too else age_s
 
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
-        """Return whether ``ticks`` that may have begun at zero show a restart.
+        """Return whether ``ticks`` show a restart. Their counts and clock may have begun at zero.
 
-        The clock has wrapped shortly before, so it fits the last ticks within ``LATEST_S``. If it
-        fits even better, odometry gets an error instead.
+        A clock in ns begins at zero every 4.3 s, so a small clock value alone proves nothing. The
+        board has restarted if the clock does not fit the last reports, and rolling wheels do not
+        explain the counts. Otherwise, the odometry gets an error for a possible restart.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)
@@ -259,7 +265,7 @@ class Translation:
 
 
 def _began_within(duration_s: float, ticks: Ticks) -> bool:
-    """Return whether the clock, in ns, and the counts began at zero at most ``duration_s`` ago."""
+    """Return whether clock (in ns) and counts may have begun at zero in the last ``duration_s``."""
     age_s = ticks.time_counts * UNIT_S["ns"]
     most = ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * age_s
     return age_s <= duration_s and max(abs(ticks.left), abs(ticks.right)) <= most

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Schedule of all that is written to a LOIS ECU, except set-points, resets and the ball command.
+"""Schedule of all that is written to a LOIS ECU except set-points, resets and the ball command.
 
-This module combines the classes for settings, modes, records and recovery. It does not know what
-the board sends.
+(The ball command makes a device on the robot drop a ball.) This module combines the classes for
+settings, modes, records and recovery. It does not know the reports of the board.
 """
 
 import math
@@ -18,7 +18,7 @@ from omnibot_driver.core.lois_ecu.terminal import ModeChange
 
 
 class Upkeep:
-    """Scheduler of settings, modes, records and recovery. ``due`` returns what to write now.
+    """Scheduler of settings, modes, records and recovery. ``due`` returns the lines to write now.
 
     ``opened``: whether the writing of the present settings has begun.
     """

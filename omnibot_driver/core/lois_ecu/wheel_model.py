@@ -26,7 +26,8 @@ CommandKind = Literal["rpm", "duty"]
 class _Effect:
     """Effect that a command has on a wheel at the time ``at_s``.
 
-    ``halts``: whether the RPM target becomes zero. ``kind`` and ``speed_mps`` are then ignored.
+    ``halts``: whether the RPM target becomes zero. In this case, ``kind`` and ``speed_mps`` have no
+    meaning.
     """
 
     at_s: float
@@ -40,7 +41,8 @@ class WheelModel:
 
     ``kind``, ``target_mps``: the command that the motor follows now.
 
-    ``hidden_mps``: the firmware's RPM target. A negative duty lowers it with each tick.
+    ``hidden_mps``: the firmware's RPM target as a speed of the rim. It is kept in duty mode, where
+    it decides whether ticks are counted. A negative duty lowers it with each tick.
     """
 
     def __init__(self, step_s: float = STEP_S) -> None:
@@ -91,9 +93,10 @@ class WheelModel:
         return self._effects[0].at_s if self._effects else math.inf
 
     def carry_out(self, now: float) -> tuple[bool, bool]:
-        """Make all commands take effect that are due at ``now``.
+        """Apply all effects of commands that are due at ``now``.
 
-        Return whether the measured speed was cleared, and whether the motor's command changed.
+        Return two values: whether the firmware has cleared its measured speed, and whether the
+        motor follows another command.
         """
         cleared = False
         before = self.kind, self.target_mps

@@ -2,7 +2,7 @@
 
 """Motion of a wheel under its commands, as a step of the motion filter.
 
-This module works on commands and the states of one wheel.
+Input: commands and the filter's states of one wheel; output: the states after the step.
 """
 
 import math
@@ -13,16 +13,16 @@ from omnibot_driver.core.lois_ecu.wheel_model import WheelModel
 
 WAY, SPEED, PUSH, COUNT, HELD = range(5)
 PER_WHEEL: Final = 5
-"""Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², counted ticks in
-m, and last measured speed in m/s."""
+"""Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
+tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""Indices of the body's states: position, and the turn and distance that 0x20 (odometry) should
-show.
+"""Indices of the body's states: position (``X``, ``Y``), and the turn and the distance that the
+board's odometry (0x20) should show (``TURN``, ``ALONG``).
 
 ``BIAS``: first of two states, the error of each wheel's speed.
 
-``EXCESS``: first of two states, the excess of each wheel's backward speed, as a fraction of its
-set-point.
+``EXCESS``: first of two states, how much faster than its set-point each wheel rolls backward, as a
+fraction of the set-point.
 """
 STATES: Final = 18
 
@@ -30,26 +30,27 @@ CONTROL_RATE: Final = 2.0
 """Assumed rate in 1/s at which the controller reaches a target speed, critically damped."""
 # The user's gains and motors are unknown, so the assumed noise is large.
 PUSH_PER_SPEED: Final = 2.2
-"""Assumed standard deviation of a wheel's acceleration, in m/s² for each m/s of the recent speed
-error."""
+"""Assumed standard deviation of a wheel's acceleration, in m/s² for each m/s by which its speed
+recently differed from its target."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
-"""Variance that the ground adds to a speed, in (m/s)² per s."""
+"""Variance that uneven ground adds to a wheel's speed, in (m/s)² per s."""
 WINDUP_M: Final = 0.08
-"""Integral of target minus measured speed, in m, at which a wheel at rest starts to move."""
+"""Integral of target minus measured speed, in m, in the speed controller. At this value, a wheel at
+rest starts to move."""
 DUTY_S: Final = 0.15
 DUTY_PART: Final = 0.3
 COASTING_S: Final = 0.15
 DRY_MPS2: Final = 0.7
-"""``COASTING_S``, ``DRY_MPS2``: time constant in s, and deceleration by dry friction, of a wheel
-without power."""
+"""``COASTING_S``: time constant in s with which a wheel without power slows down. ``DRY_MPS2``: its
+additional deceleration by dry friction, in m/s²."""
 COAST_PART: Final = 0.35
 ROLLS_ON_S: Final = 0.35
 ROLLED_OUT_S: Final = 1.0
 """Longest assumed time in s for which a wheel rolls on after its set-point changed sign."""
 UNSETTLED_S: Final = (0.27, 0.06)
-"""Assumed time in s, before a halt, for which the wheel's motion differed from the model. First for
-the board's own gains, then for the user's."""
+"""If a wheel halts soon after a new set-point, its speed is assumed to have been wrong for this
+time in s. First value: with the board's own gains. Second value: with the user's gains."""
 STEADY_PART: Final = 0.2
 STANDS_MPS: Final = 0.01
 FADED_MPS: Final = 1e-4
@@ -63,11 +64,12 @@ class Step:
 
     ``new``: means of the states after the step.
 
-    ``unsure_mps``: standard deviation of each last measured speed, by the wheel's first state.
+    ``unsure_mps``: standard deviation of each wheel's last measured speed, by the index of the
+    wheel's first state.
 
-    ``rows``: changed rows of the transition matrix.
+    ``rows``: changed rows of the transition matrix, by state.
 
-    ``noises``: errors to add, each with its effect on the states and its variance.
+    ``noises``: errors to add, each as the states that it changes, with factors, and its variance.
     """
 
     dt: float
@@ -78,7 +80,7 @@ class Step:
 
 
 class Wheel:
-    """What is known of one wheel in addition to its states in the motion filter.
+    """Properties of one wheel that are not states of the motion filter.
 
     ``base``: index of the wheel's first state in the filter.
 
@@ -90,8 +92,9 @@ class Wheel:
         self.base = base
         self.course = WheelModel()
         self.rolled_to_m = 0.0
-        """Distance in m that the wheel had rolled when it last certainly turned, or began a
-        command. Motion that is estimated later may have to be subtracted."""
+        """Distance in m that the wheel had rolled when it last certainly turned, or when a command
+        began. If the wheel is later found to be at rest since then, the distance added after this
+        is subtracted."""
         self.begin_again()
 
     def begin_again(self) -> None:
@@ -100,24 +103,26 @@ class Wheel:
         self.restless_mps = 0.0
         """Largest recent difference between target and speed, in m/s. It decays with time."""
         self.unsettled_mps = 0.0
-        """Difference between target and speed at the last new set-point, in m/s. It decays with
-        time."""
+        """Difference between target and speed when the last new set-point took effect, in m/s. It
+        decays with time."""
         self.wound_m = 0.0
         """Integral of target minus measured speed since the controller was reset, in m."""
         self.cut = False
-        """Whether the wheel has no power, because the integral ``wound_m`` is still too small."""
+        """Whether the wheel has no power after a reset of the controller, because the integral
+        ``wound_m`` is still too small."""
         self.rolls_on = False
-        """Whether the reported speed may be from before the last reset of the controller."""
+        """Whether the reported speed may be from before the last reset of the controller, so that
+        it is not used."""
         self.rolls_on_s = 0.0
         self.rolled_mps = 0.0
         self.rolled_s = math.inf
-        """``rolled_mps``, ``rolled_s``: speed in m/s at the last reset of the controller, and time
-        in s since then."""
+        """``rolled_mps``: speed in m/s at the last reset of the controller. ``rolled_s``: time in s
+        since this reset."""
         self.locked = False
-        """Whether the wheel rests without power, because the last measured speed exceeds its
-        target."""
+        """Whether the wheel is at rest and gets no power. The reason is that the last measured
+        speed, which the controller still uses, exceeds the target."""
         self.rests = False
-        """Whether the wheel is at rest. A repeated measured speed has shown this."""
+        """Whether the wheel is at rest, as found from a measured speed that the board repeats."""
         self.blind = False
 
     def begin_anew(self, speed_mps: float) -> None:
@@ -134,9 +139,9 @@ class Wheel:
         return self.restless_mps < STEADY_PART * abs(self.course.target_mps)
 
     def counts(self, speed_mps: float, *, signed: bool) -> float:
-        """Return the factor by which forward motion changes the count: 1, -1, or 0.
+        """Return 1 if forward motion increases the tick count, -1 if it decreases the count.
 
-        It is 0 while the board does not count.
+        Return 0 while the board does not count.
 
         ``signed``: whether ticks count in both directions.
         """
@@ -148,7 +153,7 @@ class Wheel:
         return -1.0 if rolls_back else 1.0
 
     def roll(self, step: Step, target_mps: float, *, holds: bool, signed: bool) -> None:
-        """Add the motion of the wheel in one step to ``step``.
+        """Add the motion of the wheel during one step of the filter to ``step``.
 
         ``holds``: whether the board keeps the last measured speed of a wheel at rest.
 

@@ -94,7 +94,7 @@ class OmniBot:
 
     @property
     def settings(self) -> OmniBotSettings:
-        """Settings that the board's data does not show."""
+        """Settings that cannot be inferred from the board's data."""
         return self._settings
 
     @settings.setter
@@ -124,9 +124,9 @@ class OmniBot:
 
     @property
     def edge(self) -> SampleBoundary | None:
-        """Where the last read ended in the stream of IMU samples; None if this place is unknown.
+        """Where the last read ended, relative to the IMU frames of the stream; None if unknown.
 
-        The place follows from the undecoded bytes, which may begin with an IMU frame.
+        The place follows from the bytes that are not decoded yet, which may begin an IMU frame.
         """
         if self._pieces:
             begun: bytes | None = joined(self._pieces)
@@ -194,7 +194,7 @@ class OmniBot:
         return readings
 
     def flush(self, now: float) -> list[Reading]:
-        """Return the last readings after the line was closed, from the bytes still held."""
+        """Return the readings from the bytes still held. Called after the line was closed."""
         readings = self._decode_pieces()
         found = self._decoder.flush(now)
         return readings + self._translation.readings(found, self._decoder.skipped, now)
@@ -268,5 +268,5 @@ class OmniBot:
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return the two alternatives for the guard: Stop, or emergency stop followed by Stop."""
+        """Return two alternatives for the guard process: Stop, or emergency stop and then Stop."""
         return LAST_WORDS

@@ -40,7 +40,7 @@ class CommandEncoder:
     """Encodes orders as packets, with the scales of ``settings``.
 
     * ``settings``: may be replaced at any time.
-    * ``saturated``: number of commands slowed down because a value exceeded 16 bits.
+    * ``saturated``: number of commands that were slowed down, because a value exceeded 16 bits.
     """
 
     def __init__(self, settings: OmniBotSettings) -> None:

@@ -36,8 +36,8 @@ BROKEN_OFF: Final = 9.0
 HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
-"""Extra cost of a frame with added bytes, if a header begins where the frame would end without
-them."""
+"""Extra cost of a frame that seems to have gained bytes, if another header begins where the frame
+would end without them."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
@@ -49,9 +49,9 @@ BAD_TAIL: Final = 2.5
 Such a run is rare.
 """
 UNKNOWN_START: Final = 1.0
-"""Cost of assuming that the first bytes are not the beginning of a frame.
+"""Cost of assuming that the bytes begin within a frame, not at the beginning of one.
 
-After a silence, a whole frame is more likely.
+After a silence, a complete frame is more likely.
 """
 BAD_BYTE: Final = 0.35
 """Cost of each byte of a run of unexplained bytes, in addition to ``BAD_RUN``.
@@ -59,15 +59,17 @@ BAD_BYTE: Final = 0.35
 A run of 14 bytes costs more than any true IMU frame.
 """
 BAD_HEADER: Final = 0.5
-"""Cost of a header within unexplained bytes; it may arise by chance, or from a gyro at rest."""
+"""Cost of a header within unexplained bytes. Such a header may arise by chance, or from the values
+of a gyro at rest."""
 GAP: Final = 5.0
 """Cost of a pause of the line within a frame; the board sends a frame without a pause."""
 BAD_TEXT: Final = 4.0
-"""Cost of a complete text within unexplained bytes: nine fixed bytes hardly arise by chance."""
+"""Cost of a complete «Paused» text within unexplained bytes. Its nine fixed bytes hardly arise by
+chance."""
 KNOWN_GAP: Final = 11.0
-"""Cost of a pause within a frame, on a line that so far paused only between frames.
+"""Cost of a pause within a frame, on a line that has so far paused only between frames.
 
-The frame is then accepted only with more evidence.
+The cost is high, so only strong evidence makes the decoder accept the frame.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -78,43 +80,45 @@ frame."""
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Cost of an IMU frame, by the number of words that differ much from the frame before.
+"""Cost of an IMU frame. Index: number of its words that differ much from the frame before.
 
-One such word is odd; a shock changes several.
+A single word is most likely damaged. A shock changes several words, so more words add little.
 """
 AFTERSHOCK: Final = 1.5
-"""Cost of an odd IMU frame after another odd one.
+"""Cost of an IMU frame with unusual content after another one with unusual content.
 
-It is low because a shock lasts several frames.
+The cost is low, because a shock lasts several frames.
 """
 WEIGHTLESS: Final = 2.5
 """Cost of an acceleration below 0.5 g or above 2.5 g: a fall, a shock, or misread words."""
 LOOK_ALIKE: Final = 12.0
 """Cost of an acceleration below 0.5 g if one of its words has the bytes of an IMU header.
 
-The header of this frame is then probably a gyro word of -6 in another frame.
+In this case, the supposed header of the frame was probably a gyro value of -6 in another frame.
 """
 JUMP: Final = 2.5
-"""Cost of a counter that did not advance by one, because an earlier frame was lost."""
+"""Cost of a counter that did not advance by one. It is the cost of the explanation that an earlier
+frame was lost."""
 IMPOSSIBLE: Final = 2.0
 """Cost of a movement that a robot with this board cannot make."""
 OFF_BEAT: Final = 1.0
-"""Cost of an unexpected number of IMU frames per delta, or of deltas per pose.
+"""Cost of an unexpected number of IMU frames before a delta, or of deltas before a pose.
 
-At 25 Hz, four and five are expected.
+At 25 Hz, four IMU frames and five deltas are expected.
 """
 
 CONTRADICTED: Final = 1.5
-"""Cost of a pose whose turn since the last pose differs from the sum of the turns in the deltas."""
+"""Cost of a pose that contradicts the deltas: its heading has changed by another angle than the sum
+of their turns."""
 
 IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
 ROUNDING: Final = 1.5
 ROUNDING_PER_DELTA: Final = 0.5
-"""``ROUNDING``, ``ROUNDING_PER_DELTA``: rounding error of a sum of deltas, in 0.1 mrad.
+"""Largest rounding error of a sum of n deltas, in 0.1 mrad: ``ROUNDING`` + n *
+``ROUNDING_PER_DELTA``.
 
-For n deltas, the error is at most ``ROUNDING`` + n * ``ROUNDING_PER_DELTA``. For five deltas, it is
-at most 4.
+For five deltas, it is at most 4.
 """
 FASTEST: Final = 1e5
 """Largest possible speed: 10 m/s or 10 rad/s, in the unit 0.1 mm/s or 0.1 mrad/s."""
@@ -126,7 +130,7 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missed deltas after which deltas are no longer expected."""
+"""Number of missing deltas after which no delta is expected, if none has arrived so far."""
 
 
 class Context(NamedTuple):
@@ -140,12 +144,12 @@ class Context(NamedTuple):
     deltas: int = 0
     """Number of deltas since the last pose."""
     shaken: bool = False
-    """Whether the last IMU frame had an unusual norm, or differed much from the one before."""
+    """Whether the last IMU frame had an unusual norm, or differed much from the frame before."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """Return the part of the context that stays valid after unknown frames were lost."""
+        """Return what is still known after an unknown number of frames were lost."""
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 
@@ -155,7 +159,7 @@ NOTHING_KNOWN: Final = Context()
 class Expectation:
     """Judges the content of a frame by the frames before it.
 
-    Learns from accepted frames how much the IMU's words scatter.
+    From accepted frames, it learns how much the IMU's words usually scatter.
     """
 
     def __init__(self, counts_per_g: float, schedule: Schedule = USUAL) -> None:
@@ -172,14 +176,14 @@ class Expectation:
         self._accel_limit = 2400.0
         self._gyro_limit = 800.0
         self.calm = (floor(self._lightest), ceil(self._heaviest), 2400, 800)
-        """Limits of the content of an IMU frame that has no cost, in counts (integers compare
-        faster).
+        """Limits of an IMU frame's content. Within these limits, the content has no cost.
 
-        Least and largest squared acceleration; largest steps of an acceleration and a gyro word.
+        The values are the least and the largest squared acceleration, and the largest change of an
+        acceleration word and of a gyro word. They are in counts, as integers, which compare faster.
         """
 
     def weigh(self, frame: Frame, before: Context) -> tuple[float, Context]:
-        """Return the cost of a complete frame's content, and the context after it."""
+        """Return the cost of a complete frame's content, and what is known after the frame."""
         if type(frame) is ImuFrame:
             last, seq, pose, imus, deltas, shaken, turned = before
             ax, ay, az = frame.accel
@@ -269,10 +273,10 @@ class Expectation:
 
 
 def may_be_lent(frame: Frame, before: Context) -> bool:
-    """Return whether the last byte of this frame may be the first byte of the next header.
+    """Return whether the frame's last byte may be the first byte of the next header instead.
 
-    The byte must occur in headers. An IMU frame's last word must also differ from that of the IMU
-    frame before, unless the byte is FF.
+    The byte must occur in headers. If it is not FF and ends an IMU frame, the last word must also
+    differ from that of the IMU frame before.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

@@ -2,9 +2,10 @@
 
 """The frame decoder: finds frames in a stream of bytes, and proves that they are frames.
 
-A header alone proves nothing: a gyro at rest gives the same bytes. A frame *in step* with the last
-one is accepted unless evidence speaks against it. *Uncertain* bytes wait until ``trellis`` has a
-clear result, or ``DOUBT_BYTES`` are held.
+A header alone proves nothing: a gyro at rest gives the same bytes. If a frame directly follows an
+accepted one (it is *in step*), it is accepted unless evidence speaks against it. All other bytes
+are *uncertain*. They wait until the search in ``trellis`` has a clear result, or until
+``DOUBT_BYTES`` are held.
 
 This module reads no clock, and no input makes it raise an exception.
 """
@@ -33,17 +34,17 @@ from omnibot_driver.core.omnibot.schedule import USUAL, Schedule
 from omnibot_driver.core.omnibot.trellis import Segment, read
 
 SPOKEN_AGAINST: Final = 3.0
-"""If the content of a frame costs this much or more, the decoder waits for the bytes after the
-frame."""
+"""If the content of a frame costs this much or more, the frame waits. The bytes after it then
+decide whether it is accepted."""
 DOUBT_BYTES: Final = 170
-"""Number of uncertain bytes at which the decoder must decide. In nominal mode the board sends this
-number of bytes in 100 ms."""
+"""Number of uncertain bytes at which the decoder must decide. In nominal mode, the board sends this
+number in 100 ms."""
 SHORTEST_RUN: Final = DELTA_LENGTH
 """Least number of bytes for which the fast path is tried: the length of the shortest frame."""
 CALM_S: Final = 10.0
-"""Time in s without damage after which a line is regarded as one that loses few bytes.
+"""Time in s without damage after which a line is regarded as calm: it loses few bytes.
 
-The decoder then needs less evidence to accept the last byte of a frame.
+On a calm line, the decoder needs less evidence to accept the last byte of a frame.
 """
 FRAMES_TO_SETTLE: Final = 3
 """An uncertain frame is discarded when this number of certain frames has followed it."""
@@ -62,9 +63,10 @@ class DecoderStatistics:
 class FrameDecoder:
     """Finds the frames in the bytes of a line, which may arrive in chunks of any size.
 
-    ``single_imu`` decodes some frames without this class, and must update these attributes:
+    The faster code in ``single_imu`` decodes some frames instead of this class. It must update
+    these attributes:
 
-    * ``context``: what the frames so far show.
+    * ``context``: what is known from the frames so far.
     * ``expectation``: which content the next frame may have.
     * ``pauses``: where the line was idle.
     * ``last_arrival_s``: arrival time of the last bytes in s.
@@ -81,9 +83,10 @@ class FrameDecoder:
         self.skipped: list[int] = []
         """For each frame of the last call, the number of discarded bytes right before it."""
         self.at_rest = False
-        """Whether all received bytes are decoded, and the line usually pauses only between frames.
+        """Whether all received bytes are decoded, on a line that usually pauses only between
+        frames.
 
-        If so, faster code may decode the next bytes.
+        If it is true, faster code may decode the next bytes.
         """
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
@@ -148,7 +151,7 @@ class FrameDecoder:
         self.context = NOTHING_KNOWN
 
     def _take_whole(self, data: bytes, pause_s: float, found: list[Frame]) -> bool:
-        """Accept ``data`` if it consists of due frames with usual content; else return False."""
+        """Accept ``data`` if it consists of due frames with usual content, else return False."""
         if pause_s > LATE_S or len(data) > TICK_BYTES:
             return False
         walk, order = Walk(self.context), self._pose_byte_order
@@ -216,9 +219,9 @@ class FrameDecoder:
         return True
 
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
-        """Return whether, by the arrival times, the last byte held may begin another frame.
+        """Return whether the last byte held may begin another frame, by the arrival times.
 
-        ``start``, ``length``: of the last frame held. ``due``: another frame may follow it
+        ``start``, ``length``: of the last frame held. ``due``: whether another frame may follow it
         directly.
         """
         pauses, calm = self.pauses, self.calm
@@ -287,9 +290,9 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """Yield the pieces before the first undecided one, each with whether to accept it.
+        """Yield the supposed frames before the first undecided one, each with whether to accept it.
 
-        A piece is decided if later bytes cannot change it, or if it ends by ``until``.
+        A frame is decided if later bytes cannot change the decision, or if it ends by ``until``.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

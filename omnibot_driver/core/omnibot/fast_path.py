@@ -2,8 +2,8 @@
 
 """The fast path: decodes frames with expected content more quickly than the decoder's own loop.
 
-The loop would accept the same frames; a test compares both. ``single_imu`` is faster still, for one
-IMU frame.
+The decoder's loop would accept the same frames, which a test checks. For a read of one IMU frame,
+the module ``single_imu`` is faster still.
 """
 
 import struct
@@ -48,16 +48,18 @@ UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
 )
 
 LEARN_EVERY: Final = 8
-"""The expectation learns from one frame in ``LEARN_EVERY``; more frames would add little."""
+"""Only one frame in ``LEARN_EVERY`` is used to learn the usual scatter of the IMU. More frames
+would add little."""
 
 
 class Walk:
     """Consecutive frames from the first byte held on. No evidence speaks against these frames.
 
-    * ``ends``: the position after each frame.
-    * ``lessons``: IMU frames to learn from: number of frames before it, the frame, the IMU frame
-      before.
-    * ``known``: for some places: number of frames before it, and the Context's fields there.
+    * ``ends``: the position in the bytes after each frame.
+    * ``lessons``: IMU frames from which the usual scatter is learned. Each entry: number of frames
+      before it, the frame, and the IMU frame before.
+    * ``known``: what was known at some places. Each entry: number of frames before the place, and
+      the fields of ``Context`` there.
     """
 
     __slots__ = ("ends", "frames", "known", "lessons")
@@ -69,7 +71,7 @@ class Walk:
         self.known: list[tuple[int, Any]] = [(0, context)]
 
     def add(self, end: int, frame: Frame, before: Context) -> None:
-        """Add a frame that ends at ``end``. ``before``: the context before it."""
+        """Add a frame that ends at ``end``. ``before``: what was known before the frame."""
         number = len(self.frames)
         is_lesson = not number % LEARN_EVERY and not before.imus & 3
         if is_lesson and type(frame) is ImuFrame and before.imu is not None:
@@ -79,7 +81,7 @@ class Walk:
         self.ends.append(end)
 
     def known_after(self, count: int, expectation: Expectation) -> Context:
-        """Return the context after the first ``count`` frames."""
+        """Return what is known after the first ``count`` frames."""
         place = len(self.known) - 1
         while self.known[place][0] > count:
             place -= 1
@@ -91,10 +93,10 @@ class Walk:
 
 
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
-    """Return whether a frame follows at position ``at``, so that odd content before it is a shock.
+    """Return whether a frame follows at ``at``. If so, odd content before ``at`` is from a shock.
 
     The bytes after this frame must be able to begin another frame. At the end of ``held``, return
-    ``closed``.
+    ``closed``: whether no more bytes come.
     """
     if at == len(held):
         return closed
@@ -113,9 +115,10 @@ def take_run(
     order: ByteOrder,
     walk: Walk,
 ) -> tuple[int, Context]:
-    """Add expected frames from ``at`` on to ``walk``; return their end and the context after them.
+    """Add the expected frames from ``at`` on to ``walk``; return where they end.
 
-    Omit the last frame if its last byte may belong to the next header.
+    Also return what is known after them. The last frame is omitted if its last byte may belong to
+    the next header.
     """
     last, seq, pose, imus, deltas, shaken, turned = context
     if last is None:

@@ -2,8 +2,9 @@
 
 """The order in which a running board sends frames, and what it reveals about lost frames.
 
-At 25 Hz: a delta every fourth IMU frame, a pose every fifth delta. So the number of discarded bytes
-shows which frames were lost. SEQ and arrival times correct errors.
+At 25 Hz, the board sends a delta after every fourth IMU frame, and a pose after every fifth delta.
+So the number of discarded bytes shows which frames were lost. The count is approximate; the
+counters in the frames and the arrival times correct it.
 """
 
 from functools import cache
@@ -58,8 +59,8 @@ class FrameSchedule:
     def hear(self, kind: Kind, skipped: int) -> int:
         """Record a received frame of this kind; return how many IMU frames were lost before it.
 
-        ``skipped``: discarded bytes before it. For a pose, return 0: the next result includes its
-        losses.
+        ``skipped``: discarded bytes before the frame. For a pose, return 0: the losses before a
+        pose are in the next result.
         """
         cycle = self._cycle
         while skipped and skipped >= LENGTH[cycle.kinds[self._next]] / 2:
@@ -78,8 +79,7 @@ class FrameSchedule:
         return lost
 
     def hear_imus(self, count: int) -> None:
-        """Record that the board has sent ``count`` IMU frames in a row, and nothing between
-        them."""
+        """Record ``count`` IMU frames that the board has sent without other frames between them."""
         self._imus += count
         if self._imus >= self._imus_alone:
             self._cycle, self._next = IMU_ONLY, 0

@@ -25,7 +25,8 @@ COMMAND_HEADER: Final = b"\xff\xfe"
 LENT: Final = (0xFF, 0xFA, 0xFB, 0xFC)
 """The bytes that occur in frame headers.
 
-If a frame lost a byte and seems to end with such a byte, this byte begins the next header.
+If a frame has lost a byte, its apparent last byte belongs to the next header. So a frame that ends
+with one of these values is doubtful.
 """
 
 _IMU: Final = struct.Struct(">2s6h")
@@ -93,7 +94,10 @@ class PoseFrame:
 
 @dataclass(frozen=True, slots=True)
 class PausedFrame:
-    """A text sent at 1 Hz while the board is initialising or paused; ``count`` is 0..255."""
+    """The text «Paused: i», sent at 1 Hz while the board is initialising or paused.
+
+    ``count``: the number i, 0..255.
+    """
 
     count: int
 

@@ -2,10 +2,11 @@
 
 """The pauses in which the line was idle, and how reliable they are.
 
-A board pauses only between frames; adapters and late readers (``late_reads``) cause other pauses.
-Accepted frames show whether this line pauses only between frames.
+A board pauses only between frames. Two other causes of a pause between reads are an adapter that
+collects bytes, and a computer that reads late (``late_reads``). Accepted frames show whether the
+pauses of this line are only between frames.
 
-This module knows positions and times; it does not know what a frame contains.
+Input: positions of bytes and times; this module does not know what a frame contains.
 """
 
 from bisect import bisect_right
@@ -33,10 +34,10 @@ A longer pause shows lost bytes, an adapter that collects bytes, or a late reade
 BYTE_S: Final = 10 / 115200
 """Time in s to send one byte at the default 115200 baud."""
 TICK_BYTES: Final = 14 + 9 + 15
-"""Largest number of bytes that the board sends in one tick. A read of more bytes after a pause was
-late."""
+"""Largest number of bytes that the board sends in one tick (10 ms). If more bytes come in a read
+after a pause, the read was late."""
 PAUSES_TO_TRUST: Final = 16
-"""After this number of pauses between frames, the line is assumed to cause the pauses, not an
+"""Number of pauses between frames after which the board is assumed to cause the pauses, not an
 adapter."""
 
 _FIRST: Final = attrgetter("first")
@@ -48,9 +49,9 @@ class InterFrameGaps:
     * ``byte_s``: time in s that the line takes for a byte.
     * ``sharp``: whether the first byte after a pause normally begins a frame.
     * ``between``: whether a frame normally begins somewhere in the read after a pause.
-    * ``certain``: whether ``sharp`` and ``between`` have been confirmed as often as is counted.
-    * ``at_pace``: whether the last read's bytes came without a pause before them.
-    * ``collected``: whether the last read's bytes were collected for more than a tick.
+    * ``certain``: whether enough pauses have confirmed both, so that further ones are not counted.
+    * ``at_pace``: whether the line was not idle before the last read's bytes.
+    * ``collected``: whether an adapter collected the last read's bytes for more than a tick.
     """
 
     def __init__(self, byte_s: float) -> None:
@@ -66,9 +67,10 @@ class InterFrameGaps:
         self._sharp = self._between = 0
 
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
-        """Record that ``arrived`` bytes were read at ``now``, ``pause_s`` s after the last read.
+        """Record a read of ``arrived`` bytes, and the pause before it if the line was idle.
 
-        ``place``: position of the first new byte among the bytes held.
+        ``pause_s``: time in s since the read before. ``place``: position of the first new byte
+        among the bytes held. ``now``: time of the read in s.
         """
         idle_s = pause_s - arrived * self._byte_s
         self.at_pace = idle_s < PACE_S
@@ -89,16 +91,23 @@ class InterFrameGaps:
         self.gaps.append(Gap(place, place + width, price, pause_s))
 
     def stood_between(self, pause_s: float, arrived: int) -> None:
-        """Record that ``arrived`` bytes, read after a pause of ``pause_s``, are complete frames."""
+        """Learn from a read of complete frames that this line pauses between frames.
+
+        Nothing is learned if the line was not idle before the read. ``pause_s``: time in s since
+        the read before. ``arrived``: number of bytes in the read.
+        """
         if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
 
     def stands_out(self, pause_s: float, arrived: int) -> bool:
-        """Return whether the line was idle before these bytes for longer than ``GAP_S``."""
+        """Return whether the line was idle for longer than ``GAP_S`` before these bytes.
+
+        ``pause_s``: time since the read before. ``arrived``: number of bytes.
+        """
         return pause_s - arrived * self._byte_s > GAP_S
 
     def compare(self, ends: Sequence[int]) -> None:
-        """Check by accepted frames whether the pauses of this line are between frames.
+        """Check whether the pauses among the bytes held are between accepted frames.
 
         ``ends``: the position after each accepted frame, among the bytes held.
         """
@@ -111,7 +120,7 @@ class InterFrameGaps:
             start = end
 
     def against(self, data: bytes | bytearray, start: int, end: int) -> float:
-        """Return the cost of assuming that ``data[start:end]`` is a frame with these pauses."""
+        """Return the cost of assuming that ``data[start:end]`` is a frame despite its pauses."""
         return sum(
             gap.price
             for gap in self._within(start, end)
@@ -128,7 +137,7 @@ class InterFrameGaps:
         return any(start < gap.first < end and gap.pause_s >= IDLE_S for gap in self.gaps)
 
     def in_its_tick(self, start: int) -> bool:
-        """Return whether a pause ended at ``start`` and all later bytes came within half a tick."""
+        """Return whether the bytes from ``start`` on came after a pause, all within half a tick."""
         for gap in self.gaps:
             if gap.first == start and gap.pause_s <= LATE_S:
                 came = next(read.now for read in self._reads if read.end > start)

@@ -2,10 +2,11 @@
 
 """The cause of a pause between two reads: an idle line, or a late reader.
 
-Bytes lost in a frame delay all later frames by whole ticks; a late read does not.
+If the line is idle within a frame, bytes were lost there. All later frames then seem late by whole
+ticks. After a late read, later frames are on time again.
 
-This module knows lengths, ticks and times; it does not know what a frame contains, or which is
-accepted.
+Input: lengths of frames, and positions and times of reads; this module does not know what a frame
+contains, or which frames are accepted.
 """
 
 from bisect import bisect_right
@@ -29,32 +30,34 @@ IDLE_S: Final = 0.1
 """Pause in s that no adapter causes: ten of the board's ticks. An adapter causes pauses of at most
 16 ms."""
 HALF_TICK_S: Final = TICK_S / 2
-"""Delay in s below which a frame still counts as sent in its own tick."""
+"""Delay in s below which a frame is regarded as sent in its own tick (10 ms)."""
 GAP_S: Final = 4e-3
-"""Pause in s that is longer than any pause of the board while it sends a frame."""
+"""Pause in s that is longer than any pause of the board within a frame."""
 NEAR_S: Final = 2e-3
-"""Largest difference, in s, between the delay after lost bytes and a whole number of ticks.
+"""Tolerance in s when a delay is compared with whole ticks.
 
-Lost bytes delay frames by whole ticks.
+If bytes were lost, later frames seem late by a whole number of ticks.
 """
 INTO_TICK_S: Final = 1e-3
-"""Time in s from the beginning of a tick to a delta or pose, which an IMU frame precedes."""
+"""Time in s from the beginning of a tick to a delta or pose. An IMU frame comes first in each
+tick."""
 PUNCTUAL_S: Final = 1e-3
 """The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
-"""Largest difference, in s, between the time in which bytes arrived and the time that the line
-needs for them. Within this difference, they arrived at the pace of the line."""
+"""Tolerance in s when the time in which bytes arrived is compared with the time that the line needs
+for them. Within it, the bytes arrived at the pace of the line, so they had not waited to be
+read."""
 FEW_BYTES: Final = 2
 """The pace at which bytes arrive can be measured only with more bytes than this."""
 TICKS_TO_PROVE: Final = 2
-"""Number of late ticks that prove lost bytes, not counting the first late tick.
+"""Number of further late ticks, after the first one, that prove lost bytes.
 
-Each tick must be in a read of its own, and be as late as the first.
+Each of these ticks must be in a read of its own, and be as late as the first.
 """
 MOST_BYTES: Final = 6 * IMU_LENGTH
-"""Number of bytes after a frame within which the cause of a pause in it is decided.
+"""Number of bytes after a frame within which the cause of a pause in the frame must be found.
 
-Without proof of an idle line, the reader was late.
+If they do not prove an idle line, the reader was late.
 """
 
 
@@ -84,8 +87,9 @@ _END: Final = attrgetter("end")
 class Gap(NamedTuple):
     """A pause between two reads, caused by an idle line or by a late reader.
 
-    * ``first``, ``before``: the pause is before one of the bytes ``first`` to ``before`` - 1.
-    * ``price``: cost of a frame across the pause, if the line was idle.
+    * ``first``, ``before``: the place of the pause. It is directly before one of the bytes
+      ``first`` to ``before`` - 1.
+    * ``price``: cost of a frame that contains the pause, if the line was idle.
     * ``pause_s``: time in s between the two reads.
     """
 
@@ -100,8 +104,9 @@ def cause(
 ) -> Cause:
     """Return the cause of ``gap``, a pause within the supposed frame ``data[start:end]``.
 
-    ``reads``: all reads since the pause. ``byte_s``: time of a byte in s. UNDECIDED: more bytes are
-    needed.
+    ``reads``: all reads since the pause. ``byte_s``: time in s that the line takes for a byte.
+
+    UNDECIDED means that more bytes are needed.
     """
     # A paused board does not send frames in ticks.
     if is_text(data, start):
@@ -161,10 +166,10 @@ def cause(
 def _by_the_next_frame(
     reads: list[Read], first: Read, data: bytes | bytearray, start: int, byte_s: float
 ) -> Cause:
-    """Return the cause of a pause, from the next frame, which begins at ``start``.
+    """Return the cause of a pause within a frame. It is inferred from the next frame, at ``start``.
 
-    The line was idle if this frame also has a pause, whole ticks later. ``first``: the read that
-    ended the first pause.
+    The line was idle if the next frame also contains a pause, and this pause ends whole ticks
+    later. ``first``: the read that ended the pause in question.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

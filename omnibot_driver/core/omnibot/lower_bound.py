@@ -2,10 +2,10 @@
 
 """A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
 
-The headers show the smallest possible number of damaged frames.
+The headers show how many frames at least are damaged.
 
-This module knows the shapes of frames and the lowest prices; it does not know the search
-(``trellis``).
+Input: bytes; output: for each place, the least possible cost of the bytes after it. This module
+does not know the search (``trellis``), which uses the bound.
 """
 
 import re
@@ -22,14 +22,15 @@ _BEGINNING: Final = re.compile(rb"\xff[\xfa-\xfc]|\xff\Z|P")
 _RAMP: Final = [BAD_BYTE * left for left in range(int(DAMAGE / BAD_BYTE), 0, -1)]
 """Costs of the last 15, 14, ... 1 bytes of a run of unexplained bytes (a bad run).
 
-The first cost is a little below ``DAMAGE``, the cost of a damaged frame.
+The largest of these costs is a little below ``DAMAGE``, the cost of a damaged frame.
 """
 
 
 def least_costs(data: bytes) -> list[float]:
     """Return, for each node of the graph in ``trellis``, the least cost to the end of ``data``.
 
-    Along an edge, the least cost decreases by at most the price. An incomplete last frame costs 0.
+    The bound is consistent: along an edge of the graph, it decreases by at most the edge's cost. An
+    incomplete last frame costs 0.
     """
     size = len(data)
     ends = _undamaged(data)

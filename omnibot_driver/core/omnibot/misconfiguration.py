@@ -25,20 +25,21 @@ LARGEST: Final = 1e7
 A value outside was read in the wrong byte order.
 """
 POSE_PERIODS: Final = 2
-"""Longest time between two poses that are compared, in pose periods. So one pose between them may
-be lost."""
+"""Longest time between two poses that are compared, in periods of the poses. The value of 2 allows
+one lost pose between them."""
 CLEARLY_M: Final = 0.01
 TIMES: Final = 4.0
-"""``CLEARLY_M``, ``TIMES``: when a pose contradicts the configured frame of the deltas.
+"""``CLEARLY_M``, ``TIMES``: when a pose contradicts the setting of the deltas' frame (earth or
+body).
 
-The sum of the deltas must miss the pose by more than ``CLEARLY_M``. In the other frame, it must
-miss the pose by less than this distance divided by ``TIMES``.
+The sum of the deltas in the configured frame must miss the pose by more than ``CLEARLY_M``. This
+error must also be more than ``TIMES`` times the error in the other frame.
 """
 
 FEWEST_DELTAS: Final = 10
 FOR_S: Final = 1.0
-"""``FEWEST_DELTAS``, ``FOR_S``: smallest number of consecutive deltas, and their shortest duration
-in s, that prove the configured period wrong."""
+"""``FEWEST_DELTAS``, ``FOR_S``: a period of the deltas other than the configured one must be seen
+in at least this number of consecutive deltas, and for at least this time in s."""
 RATE_TOLERANCE: Final = 0.1
 
 _OTHER_ORDER: Final[dict[ByteOrder, ByteOrder]] = {"big": "little", "little": "big"}
@@ -62,7 +63,7 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Store a delta. With it, the next pose shows whether the deltas' frame is set correctly.
+        """Store a delta. The sum of deltas is compared with the next pose, to check their frame.
 
         ``reading``: the delta as the settings interpret it.
         """
@@ -74,10 +75,10 @@ class MisconfigurationChecks:
             self._moved.clear()
 
     def spaced(self, reading: DisplacementReading, imus: int, now: float) -> None:
-        """Check the configured period of the deltas, each time a delta arrives.
+        """Check the configured period of the deltas. Called for each delta.
 
-        ``now``: its arrival in s. ``imus``: IMU frames since the previous delta, which give the
-        period. Arrival times must confirm it.
+        ``imus``: number of IMU frames since the previous delta, which shows the period. ``now``:
+        arrival time of the delta in s. The arrival times must confirm the period.
         """
         broken = reading.lost or reading.restarted or reading.duration_s is None
         if imus == self._imus_per_delta or not imus or broken:
@@ -99,7 +100,7 @@ class MisconfigurationChecks:
             )
 
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
-        """Check the byte order of the poses, and the frame of the deltas, with a new pose.
+        """Check two settings with a new pose: the byte order of poses, and the frame of the deltas.
 
         ``reading``: the pose as the settings interpret it. ``order``: configured byte order.
         """

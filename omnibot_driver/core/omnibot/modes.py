@@ -50,10 +50,9 @@ class ModeTracker:
     def __init__(self, schedule: Schedule = USUAL) -> None:
         self.mode = Mode.UNKNOWN
         self._imus_alone = self.imus_to_come = schedule.imus_alone
-        """``_imus_alone``: number of IMU frames, without a delta between them, that show IMU-only
-        mode.
+        """``_imus_alone``: number of IMU frames in a row, without a delta, that show IMU-only mode.
 
-        ``imus_to_come``: how many of these frames have not arrived yet.
+        ``imus_to_come``: how many of them are still missing for this.
         """
 
     def apply(self, happening: Happening) -> None:
@@ -78,7 +77,7 @@ class ModeTracker:
             self.apply(Happening.HEARD_MOTION)
 
     def hear_imus(self, count: int) -> None:
-        """Update the mode after a row of IMU frames.
+        """Update the mode after a row of IMU frames without a delta between them.
 
         ``count``: number of these frames, at most ``imus_to_come``.
         """

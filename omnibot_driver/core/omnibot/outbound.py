@@ -2,8 +2,8 @@
 
 """The encoding of frames and letters for a line that loses bytes, and for unknown firmware.
 
-Zeros are sent before each frame or letter. After a motion frame, nothing is sent until the next
-frame or letter is due. No payload contains a letter or a header.
+Zeros are sent before each frame or letter (S, P, R). The bytes within a frame contain neither a
+letter nor a header. After a motion frame, nothing is sent until the next frame or letter is due.
 docs/internals/omnibot_protocol.md ("The line to the board") gives the reasons.
 
 This module knows bytes; it does not know what is commanded, nor when.
@@ -26,14 +26,16 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """Zeros before Stop, the emergency stop or a letter.
 
-Seven zeros complete any frame that lost its end, and one zero may be lost. Three wake a board.
+If the frame before lost its end, seven zeros complete it. One more is sent, because one may be
+lost. Three zeros wake a board.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """Zeros before a motion frame.
 
-The zeros may complete a damaged frame. They are few, so that the motion frame soon replaces it.
+If the frame before lost its end, the zeros may complete it as a wrong command. They are few, so
+that the motion frame soon replaces this command.
 """
 
 _LETTERS: Final = FORCE_START + TOGGLE_PAUSE + RESET

@@ -19,9 +19,9 @@ DELTA_PERIODS_S: Final = (0.01, 0.02, 0.04, 0.05, 0.1, 0.2)
 DELTAS_MISSING: Final = 6
 """Number of missing deltas after which the board is assumed to be in IMU-only mode."""
 FEWEST_ALONE: Final = 25
-"""Least number of IMU frames, without a delta between them, that show IMU-only mode.
+"""Smallest number of IMU frames in a row, without a delta, that shows IMU-only mode.
 
-Enough for any period of the deltas.
+The number is large enough for any period of the deltas.
 """
 
 _IMU_BYTES_PER_S: Final = 1400
@@ -40,7 +40,7 @@ class Schedule:
         self.imus_per_delta = round(delta_period_s / TICK_S)
         self.deltas_per_pose = round(POSE_PERIOD_S / delta_period_s)
         self.imus_alone = max(FEWEST_ALONE, DELTAS_MISSING * self.imus_per_delta + 1)
-        """Number of IMU frames, without a delta between them, that show IMU-only mode."""
+        """Number of IMU frames in a row, without a delta, that shows IMU-only mode."""
         self.bytes_per_s = _IMU_BYTES_PER_S + _DELTA_BYTES / delta_period_s + _POSE_BYTES_PER_S
         self.rates_hz: dict[RateName, float] = {
             "IMU": 1.0 / TICK_S,

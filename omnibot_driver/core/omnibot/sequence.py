@@ -1,11 +1,11 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The counters of the board's deltas and poses: missing deltas, and whether the board restarted.
+"""The counters of the board's deltas and poses. They show lost deltas and a restart of the board.
 
-SEQ wraps every 10.24 s at 25 Hz; arrival times show how often. Poses have their own counter, and
-reveal lost deltas sooner.
+The counter SEQ of the deltas has one byte and wraps every 10.24 s at 25 Hz. The arrival times show
+how often. Poses have a counter of their own, which shows lost deltas sooner.
 
-This module knows counters and arrival times; it does not know what a frame contains.
+Input: counters and arrival times; this module does not know what a frame contains.
 """
 
 from typing import Final
@@ -16,20 +16,22 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Smallest difference of elapsed and counted time, in s, that suggests a restart.
+"""Smallest difference, in s, between the elapsed time and the time that a counter shows, that
+suggests a restart.
 
-The clock's drift is added to this limit. Arrival times err by up to 0.24 s if the host's buffer is
-full and every tenth byte is lost.
+The drift of the clock is added to this limit. Arrival times are wrong by up to 0.24 s if the host's
+buffer is full and every tenth byte is lost.
 """
 DRIFT: Final = 0.01
-"""Largest relative error of the board's clock, and so of the time that the counter shows.
+"""Largest relative error of the board's clock, and so of the time that a counter shows.
 
-After minutes of silence, this error is too large. Only the board's pose then proves a restart.
+After minutes of silence, the resulting error is too large to show a restart. Only the board's pose
+can then prove one.
 """
 EARLY_S: Final = 0.2
-"""Largest excess of counted over elapsed time after a restart, in s.
+"""After a restart, a counter may show more time than has elapsed, by at most this time in s.
 
-The last delta before the restart may be read late. A restart takes longer than this.
+The cause is a late read of the last delta before the restart. A restart takes longer than this.
 """
 
 
@@ -60,21 +62,21 @@ class Sequence:
         self._since_pose = 0
         self._told = 0
         self._regular = False
-        """Whether a pose has ever come after the expected number of deltas. Until then, the
-        counters of poses are ignored."""
+        """Whether a pose has ever come after the expected number of deltas. Until this has
+        happened, the counters of poses are ignored."""
         self._paused = self._reconnected = False
         self._ahead: int | None = None
         """Counter of the last delta if it was too high for the elapsed time, else None.
 
-        It may be damaged. Until a delta continues it, the number of lost deltas follows from the
-        elapsed time.
+        Such a counter may be damaged. Until the next delta continues it, the number of lost deltas
+        is computed from the elapsed time.
         """
         self._left: tuple[int, float, int] | None = None
         """The last counter before a supposed restart, its arrival time in s, and the first counter
         after it."""
 
     def pause(self) -> None:
-        """Record that the board paused. Its next counter may continue the count or be zero."""
+        """Record that the board paused. Its next counter may continue, or restart at zero."""
         self._paused, self._pose = True, None
 
     def reconnect(self) -> None:
@@ -125,8 +127,8 @@ class Sequence:
     def pose(self, count: int, now: float) -> Step:
         """Return what the counter of a new pose shows about lost deltas and about a restart.
 
-        ``now``: arrival in s. ``lost`` of the result: missing deltas whose motion the pose
-        includes.
+        ``now``: arrival in s. In the result, ``lost`` is the number of missing deltas whose motion
+        is contained in the pose.
         """
         before, self._pose = self._pose, count
         counted, self._since_pose = self._since_pose, 0
@@ -147,8 +149,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if ``count`` continues the counter from before the
-        restart."""
+        """Withdraw a supposed restart if ``count`` continues the counter from before it."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

@@ -2,8 +2,9 @@
 
 """The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
-Readings and state are as on the normal path; a test compares both. A frame may arrive in several
-reads (pieces). If the fast path rejects it, the decoder gets each piece with its arrival time.
+The results are the same as on the normal path, which a test checks. A frame may arrive in several
+reads (pieces). If the fast path rejects the frame, the decoder gets each piece with its arrival
+time.
 """
 
 import struct
@@ -31,8 +32,8 @@ def is_begun(
 ) -> bool:
     """Return whether the pieces and ``data`` together are an incomplete IMU frame that is due.
 
-    If ``GAP_S`` has passed since the first piece, return False: the decoder must judge such a
-    pause.
+    If ``GAP_S`` or more has passed since the first piece, return False, because only the decoder
+    can judge a pause within a frame.
     """
     if pieces:
         data = joined(pieces) + data
@@ -56,8 +57,8 @@ def take_pieces(
 ) -> ImuReading | None:
     """Return the reading of the IMU frame that begins with the pieces and ends with ``data``.
 
-    Return None and change nothing if the frame is not accepted or a byte may be lost. The same
-    holds when ``GAP_S`` has passed since the first piece.
+    Return None and change nothing if the frame is not accepted, if a byte may be lost, or if
+    ``GAP_S`` has passed since the first piece.
     """
     first, came_at = pieces[0]
     last = decoder.context.imu
@@ -85,8 +86,10 @@ def take_single(
 ) -> ImuReading | None:
     """Return the reading of ``data`` if it is one IMU frame that was due, with usual content.
 
-    Otherwise return None and change nothing. ``now``: arrival in s of the ``first`` bytes. The
-    caller has checked the last byte if ``data`` came in pieces.
+    Otherwise return None and change nothing. ``now``: arrival time in s of the ``first`` bytes.
+
+    If ``data`` came in pieces, the caller must have checked whether the last byte may belong to the
+    next header.
     """
     pause_s = now - decoder.last_arrival_s
     if (

@@ -42,7 +42,8 @@ class Translation:
     """Translates the frames of one line, and infers the board's mode and wrong settings from them.
 
     * ``settings``: may be replaced, except ``delta_period_s``.
-    * ``singles_to_come``: IMU frames that ``single_imu`` may take without this class.
+    * ``singles_to_come``: number of IMU frames that the fast path ``single_imu`` may still decode
+      without this class.
     * ``heard_s``: arrival time in s of the last decoded bytes.
     """
 
@@ -61,17 +62,15 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """``singles_to_come``: number of IMU frames that ``single_imu`` may still take.
-
-        ``_most_singles``: the initial value of ``singles_to_come``.
-        """
+        """``singles_to_come``: number of IMU frames that the fast path ``single_imu`` may still
+        decode. ``_most_singles``: its initial value."""
         self.heard_s = -math.inf
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
-        """Return the readings of the frames that one read brought at ``now``.
+        """Return the readings of the frames that one read, at the time ``now``, completed.
 
-        ``skipped``: discarded bytes before each frame. Each frame's arrival is estimated, because
-        bytes arrive one by one.
+        ``skipped``: number of discarded bytes before each frame. The arrival time of each frame is
+        estimated from its place in the read, because bytes arrive one by one.
         """
         self._catch_up()
         before_s, self.heard_s = self.heard_s, now
@@ -92,7 +91,7 @@ class Translation:
         self.modes.apply(happening)
 
     def _catch_up(self) -> None:
-        """Add the IMU frames that ``single_imu`` took to the mode, schedule and IMU count."""
+        """Update mode, schedule and IMU count by the IMU frames that ``single_imu`` decoded."""
         singles = self._most_singles - self.singles_to_come
         self.singles_to_come = self._most_singles = 0
         if singles:

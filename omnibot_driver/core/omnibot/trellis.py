@@ -2,8 +2,9 @@
 
 """The search for the cheapest interpretation of a stretch of bytes, and for its sure frames.
 
-An interpretation is a path in a graph. Its edges are frames, damaged frames and unexplained bytes,
-each with a cost. A frame on the cheapest path is sure if every path without it costs clearly more.
+An interpretation is a path in a graph. The edges of the graph are frames, damaged frames and
+unexplained bytes, each with a cost. A frame on the cheapest path is sure if every path without this
+frame costs clearly more.
 
 This module knows how a line damages the shapes of frames; it does not know which frames are
 accepted.
@@ -29,12 +30,13 @@ from omnibot_driver.core.values import value
 SURE: Final = 3.5
 """A frame is sure if every other interpretation of its first byte costs at least this much more.
 
-Such an interpretation is at least 30 times less likely.
+A difference of this size means that the other interpretation is at least 30 times less likely.
 """
 STEP: Final = 5.5
 """First cost limit of the search, as a distance above the lower bound of the cost.
 
-The limit rises until the search finds a path.
+Interpretations that cost more than the limit are not searched. The limit rises until the search
+finds one.
 """
 BEYOND: Final = 0.025
 """Small addition to the cost limit, so that rounding errors have no effect.
@@ -66,7 +68,8 @@ _HEADLESS: Final = {
     0xFF: ((13, cost_model.HEADER_BYTE), (8, cost_model.HEADER_BYTE), (14, cost_model.HEADER_BYTE)),
     **{kind: ((length - 1, cost_model.HEADER_BYTE),) for kind, length in _LENGTHS.items()},
 }
-"""Shapes of a frame that has lost one of its two header bytes, by the header byte that is left."""
+"""Possible lengths and costs of a frame that has lost one of its two header bytes, by the header
+byte that is left."""
 _HEADER: Final = 0xFF
 _TEXT: Final = 0x50
 _BEGINNINGS: Final = (_HEADER, _TEXT)
@@ -89,8 +92,8 @@ class Segment:
 
 
 _Edge = tuple[int, int, float, Frame | None, Context | None]
-"""Start node, end node, and price. If the edge is a complete frame, also this frame and the context
-after it."""
+"""Start node, end node and cost of an edge. If the edge is a complete frame, also this frame and
+what is known after it."""
 
 
 def read(
@@ -136,7 +139,10 @@ class _Search:
         self._contexts: dict[int, Context]
 
     def run(self, in_step: bool, closed: bool) -> None:
-        """Find the best interpretation, and all others that cost at most ``SURE`` more."""
+        """Find the best interpretation, and all others that cost at most ``SURE`` more.
+
+        ``in_step``: an accepted frame ended right before. ``closed``: no more bytes follow.
+        """
         self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
         step = STEP
         limit = self._least[1] + step + BEYOND
@@ -257,9 +263,9 @@ class _Search:
         self._edges.append(edge)
 
     def _context(self, node: int) -> Context:
-        """Return the context on the cheapest path to ``node``.
+        """Return what is known from the frames on the cheapest path to ``node``.
 
-        After a damaged frame or a bad run, little of the context is known.
+        After a damaged frame or unexplained bytes, little is known.
         """
         found, damaged, at = self._contexts.get(node), False, node
         while found is None:

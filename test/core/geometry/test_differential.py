@@ -77,7 +77,7 @@ def test_body_and_back_is_the_same_wheels(
 def test_each_wheel_rolls_about_the_instantaneous_centre(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """The speed of a rim is the yaw rate times the wheel's distance from the centre of the turn."""
+    """A robot turns about a point. A rim's speed is the yaw rate times its distance from it."""
     twist = robot.body_twist(wheel_rates)
     if abs(twist.yaw_rate_radps) < 1e-3:
         return

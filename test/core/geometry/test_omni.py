@@ -25,10 +25,10 @@ def as_tuple(twist: BodyTwist) -> tuple[float, float, float]:
 
 @given(twists)
 def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) -> None:
-    """The wheel rates are the rim speeds of the manual's equations, divided by the wheel radius.
+    """The rim speeds of the manual's equations, divided by the wheel radius, are the wheel rates.
 
-    With the base radius L, the rim speeds of A and B are ∓cos 30° Vx - sin 30° Vy - L Ω. That of C
-    is Vy - L Ω.
+    In the manual, the rims of A and B move at ∓cos 30° Vx - sin 30° Vy - L Ω, and that of C at Vy -
+    L Ω. L is the base radius.
     """
     vx, vy, omega = as_tuple(twist)
     rim_a = -0.8660254037844386 * vx - 0.5 * vy - 0.143 * omega
@@ -41,9 +41,10 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The body twist is the manual's odometry matrix, with the factor 1/(2 cos 30°).
+    """The body twist is computed from wheel rates by the manual's odometry matrix, corrected.
 
-    The matrix that the manual prints in full is wrong by a factor of 4/3.
+    Its factor is 1/(2 cos 30°). The matrix that the manual prints in full is wrong by a factor of
+    4/3.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258

@@ -14,7 +14,7 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 @pytest.mark.slow
 @given(small_moves)
 def test_roll_is_the_integral_of_a_constant_twist(tangent: Pose) -> None:
-    """``roll`` returns the displacement under a constant twist, as the textbook's integral does."""
+    """``roll`` converts a constant twist to a displacement, as the textbook's integral does."""
     chord = roll(tangent)
     expected = arc(tangent.x_m, tangent.y_m, tangent.yaw_rad)
     assert (chord.x_m, chord.y_m) == pytest.approx(expected, abs=1e-9)

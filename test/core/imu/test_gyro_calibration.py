@@ -49,8 +49,10 @@ def stand(
     """Give readings at 100 Hz to the calibration, and a displacement after every fourth reading.
 
     ``rates``: the readings of the gyro.
-    ``force``: every reading of the accelerometer.
-    ``rolling``: every displacement, or None for no displacements.
+
+    ``force``: the specific force in every reading of the accelerometer.
+
+    ``rolling``: the motion in every displacement, or None if there are no displacements.
     """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):
@@ -155,7 +157,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A gap in the readings restarts a calibration. After several gaps, its time is over.
+    """A gap in the readings restarts a calibration. Several gaps come, until its time is over.
 
     The calibration fails and leaves the bias as it was.
     """

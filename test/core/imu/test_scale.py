@@ -17,7 +17,7 @@ Triple = tuple[int, int, int]
 
 @pytest.mark.parametrize(("range_g", "counts"), [(2, 16384), (4, 8192), (8, 4096), (16, 2048)])
 def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
-    """A sensor measures 1 g. For each range, the datasheet's section 6.2 gives the counts."""
+    """A sensor measures 1 g. In each range, its counts are those in the datasheet (section 6.2)."""
     scale = ImuScale(accel_range_g=range_g)
     assert scale.specific_force((counts, -counts, 0)) == pytest.approx((9.80665, -9.80665, 0.0))
 
@@ -28,7 +28,7 @@ def test_one_g_is_the_datasheets_counts(range_g: int, counts: int) -> None:
 def test_ten_degrees_a_second_are_the_datasheets_counts(
     range_dps: int, counts_per_10_dps: int
 ) -> None:
-    """A sensor measures 10°/s. For each range, the datasheet's section 6.1 gives the counts."""
+    """A sensor turns at 10°/s. In each range, its counts are those in the datasheet (section 6)."""
     scale = ImuScale(gyro_range_dps=range_dps)
     assert scale.angular_velocity((0, counts_per_10_dps, -counts_per_10_dps)) == pytest.approx(
         (0.0, 0.17453292519943295, -0.17453292519943295)
@@ -80,7 +80,7 @@ def test_gravity_tells_which_range_the_sensor_is_set_to(actual_g: int, believed_
 
 @pytest.mark.parametrize("gravity", [0.0, 7.0, 12.0, 100.0])
 def test_what_is_gravity_in_no_range_is_a_bias_or_a_broken_sensor(gravity: float) -> None:
-    """Gravity at rest fits no range. The advice is to check the range, the bias and the sensor."""
+    """The gravity measured at rest fits no range. The advice is to check range, bias and sensor."""
     assert gravity_advice(gravity, 2).endswith(
         "check `accel_range` and `accel_bias`, or the sensor"
     )

@@ -24,7 +24,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 class Bench(AnyBench):
-    """A session with a simulated LOIS ECU. At first, the session has been nominal for 1.5 s."""
+    """A session with a simulated LOIS ECU. It begins 1.5 s after the session has become nominal."""
 
     def __init__(self, firmware: str, settings: LoisEcuSettings | None = None) -> None:
         self.lois = LoisRobot(firmware)

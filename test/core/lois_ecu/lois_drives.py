@@ -30,9 +30,9 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""Settings with gains for the speed controllers of both wheels.
+"""Settings with the user's gains for the speed controllers of both wheels.
 
-With the boot gains of the public firmware, the right wheel's speed would oscillate.
+With the board's own gains (public firmware), the right wheel's speed would oscillate.
 """
 REPEAT_S = 0.05
 
@@ -128,7 +128,7 @@ class Drive:
 
     @property
     def nees(self) -> float:
-        """Normalised squared error of x, y and yaw. Its mean is 3 if the covariance is right."""
+        """Normalised squared error (NEES). Its mean over drives is 3 if the covariance is right."""
         c, e = self.last.covariance, self.error
         rows = [
             [c.xx, c.xy, c.x_yaw, e.x_m],
@@ -154,12 +154,12 @@ class Drive:
 
 
 def nominal(firmware: Firmware, seed: int = 0) -> LoisSettings:
-    """Return settings with exact wheel sizes. The ground loads the motors by 1 % of duty."""
+    """Return settings of a simulated board: exact wheel sizes, and a load of 1 % duty."""
     return LoisSettings(quirks=QUIRKS[firmware], seed=seed, load_percent=1.0)
 
 
 def wrong(firmware: Firmware, seed: int) -> LoisSettings:
-    """Return settings with slip, load, and wheel sizes that are wrong by about 1 %."""
+    """Return settings of a simulated board: slip, load, and wheel sizes wrong by about 1 %."""
     random = Random(f"wrong {seed}")
     return LoisSettings(
         quirks=QUIRKS[firmware],
@@ -204,7 +204,7 @@ class Rig:
         return bytes(byte for byte in data if self._random.random() >= self._loss)
 
     def say(self, data: bytes) -> None:
-        """Send these bytes to the board on behalf of the driver."""
+        """Send these bytes to the board, and record them in the driver as its own."""
         self.board.receive(self._arrived(data))
         self.driver.wrote(data, self.now)
 
@@ -225,7 +225,7 @@ class Rig:
                     self.estimates.append((reading, self.place))
 
     def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
-        """Send the set-points every ``REPEAT_S`` for ``seconds``. Two zeros are a Stop."""
+        """Send the set-points every ``REPEAT_S`` for ``seconds``. Two zeros are sent as Stop."""
         for _ in range(round(seconds / REPEAT_S)):
             unit = math.tau / 60
             self.say(self.driver.wheels((left_rpm * unit, right_rpm * unit)))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The stream of a LOIS ECU that drives: its reports, and the timed pieces that encode them."""
+"""Reports that a LOIS ECU sends during a drive, and the bytes that encode them, with times."""
 
 import math
 import struct
@@ -22,7 +22,7 @@ Piece = tuple[float, bytes]
 
 
 def float32(number: float) -> float:
-    """Return the number rounded to a 32-bit float, as a decoder of the lines gives it."""
+    """Return the number rounded to a 32-bit float, which is the precision of the board's lines."""
     (rounded,) = struct.unpack(">f", struct.pack(">f", number))
     return float(rounded)
 

@@ -46,7 +46,7 @@ def test_in_place_it_is_within_3_percent_of_the_angle(firmware: Firmware) -> Non
 def test_the_covariance_is_honest(firmware: Firmware, name: str) -> None:
     """Wheels of wrong sizes slip on uneven ground. The covariance fits the error of the pose.
 
-    The limit allows one wrong alarm in 10,000 drives.
+    The limit of the test is so high that only one in 10,000 drives fails by chance.
     """
     assert motion(wrong(firmware, 1000), name).nees < 21.1
 
@@ -64,7 +64,7 @@ def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """The wheels reverse several times a second. A board as in the manual reports each tick.
+    """The wheels reverse several times a second, on a board that counts ticks in both directions.
 
     The odometry ends within 5 cm and 5° of the true pose.
     """
@@ -78,9 +78,10 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """One byte in a hundred is lost, which damages 60 % of the groups of lines.
+    """One byte in a hundred is lost, which damages 60 % of the reports.
 
-    The tick counters of the next groups include the lost ticks, so the odometry stays accurate.
+    The tick counts in later reports include the ticks of the lost ones, so the odometry stays
+    accurate.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)
     assert off_m(one) < 0.1 * max(one.way_m, 2.0)

@@ -37,10 +37,10 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the board's own gains, the right wheel stops. The board still reports its last speed.
+    """With the board's own gains, the right wheel stops. The board still reports its old speed.
 
     The covariance fits the error of the pose. The median of five drives is checked, because a few
-    drives are worse.
+    drives have a larger error.
     """
     seeds = range(1000, 1005)
     drives = [motion(wrong("firmware", seed), name, LoisEcuSettings()) for seed in seeds]
@@ -54,7 +54,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 ) -> None:
     """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
 
-    The odometry detects the rest. Otherwise its heading would be wrong by 600°.
+    The odometry detects the rest. If it did not, its heading would be wrong by 600°.
     """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -86,9 +86,10 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """Too much feed-forward makes the wheels roll backward at twice their set-points.
+    """The user's feed-forward is so large that wheels roll backward at twice their set-points.
 
-    No ticks are counted, but report 0x20 shows the speed. The distance is right within 3 %.
+    No ticks are counted, but the board's odometry (0x20) shows the speed. The distance is right
+    within 3 %.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)
@@ -98,15 +99,16 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 
 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At 62 RPM, some ticks follow so soon that the firmware does not measure their speed.
+    """At 62 RPM, some ticks follow each other so soon that the firmware measures no speed at them.
 
-    The filter then adds variance to the yaw. At 32 RPM, it adds none.
+    Its heading is then less accurate, so the filter adds variance to the yaw. At 32 RPM, it adds
+    none.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)
 
     def variances() -> list[float]:
-        """Return the yaw variances in rad² after a drive at 62 RPM, and at 32 RPM."""
+        """Return the yaw variances in rad² after two drives: at 62 RPM, and at 32 RPM."""
         drives = [drive(settings, [(6.0, (-25, -25))]) for settings in (fast, usual)]
         return [one.last.covariance.yaw_yaw for one in drives]
 

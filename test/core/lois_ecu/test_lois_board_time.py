@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The delay of a read, estimated from the board's time in each group of ticks."""
+"""The delay of a read, estimated from the board's time in each tick report."""
 
 from random import Random
 
@@ -30,9 +30,9 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 
 
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
-    """Several groups are read together.
+    """Several tick reports are read together.
 
-    The estimated times of the groups are in the order in which the board sent them.
+    The sending times that are estimated for them are in the order in which the board sent them.
     """
     board = BoardTime()
     taken_s = []
@@ -46,7 +46,10 @@ def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> 
 
 
 def test_its_error_is_that_of_the_reads() -> None:
-    """Reads are up to 30 ms late at random. The delay has a standard deviation of 5 to 25 ms."""
+    """Reads are up to 30 ms late at random.
+
+    The standard deviation that is estimated for the delay is 5 to 25 ms.
+    """
     board, random = BoardTime(), Random(1)
     for step in range(100):
         board.sent(4)
@@ -68,9 +71,9 @@ def test_nothing_is_said_before_the_unit_is_known_and_after_a_restart() -> None:
 
 
 def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
-    """The host stalls, and twenty groups come in one read.
+    """The host stalls, and twenty tick reports come in one read.
 
-    Later estimates of the delay are right.
+    After the stall, the estimated delays are right.
     """
     board = BoardTime()
     found = []
@@ -92,7 +95,7 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 ) -> None:
     """Reads come at any times, and the board's clock has any rate.
 
-    The estimated delays are finite, and leave the groups in order.
+    The estimated delays are finite, and no report seems to be sent before the one before it.
     """
     board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
     for seconds, passed in reads * 3:
@@ -106,9 +109,10 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """The clock in ns leaps by less than a late read may explain. It has also wrapped.
+    """The board's clock in ns jumps by at most 0.2 s, the length of a late read. It also wraps.
 
-    The next group deviates from the line through the last ones. A group without a leap does not.
+    As all reads were in time, the delay of the next tick report is irregular. It is not irregular
+    without a jump.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)
@@ -120,9 +124,9 @@ def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None
 
 
 def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
-    """Reads are up to 0.1 s late at random. Then a read that is 0.1 s late shows nothing.
+    """Reads are up to 0.1 s late at random. A further read that is 0.1 s late is not irregular.
 
-    A read is never early.
+    A read that seems early is irregular, because no read is early.
     """
     board, random = BoardTime(), Random(2)
     for step in range(60):
@@ -134,7 +138,7 @@ def test_a_late_read_is_certain_only_if_reads_are_usually_in_time() -> None:
 
 
 def test_nothing_deviates_before_enough_groups_are_known() -> None:
-    """The first groups of a connection have nothing to deviate from."""
+    """Too few tick reports have arrived, or the clock's unit is unknown. No delay is irregular."""
     board = BoardTime()
     assert board.deviation_s(0, "ns", 5.0) == (0.0, False)
     board.late_s(0, "ns", 0.0)
@@ -147,7 +151,7 @@ def nanoseconds(board_s: float) -> int:
 
 
 def settled_on_time() -> BoardTime:
-    """Return the estimator after 60 groups with a clock in ns that were read in time."""
+    """Return the estimator after 60 tick reports, read in time, of a clock in ns."""
     board = BoardTime()
     for step in range(60):
         board.late_s(nanoseconds(0.2 * step), "ns", 0.2 * step)

@@ -96,7 +96,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 ) -> None:
     """Another program has left the board in some terminal mode.
 
-    The driver restores its own mode.
+    The driver switches the board back to the mode of the protocol.
     """
     rig = Rig(nominal(firmware))
     rig.run(2.1)
@@ -112,9 +112,9 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 
 
 def test_a_board_without_checksum_is_driven_without() -> None:
-    """The user wants lines without checksum: value 4 of command 0x11.
+    """The user wants lines without checksums, which value 4 of command 0x11 selects.
 
-    The command overwrites the left wheel's "short correction". The driver restores the value.
+    This command also overwrites the left wheel's "short correction". The driver restores the value.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     for _ in range(140):
@@ -128,10 +128,10 @@ def test_a_board_without_checksum_is_driven_without() -> None:
 
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
-    """After a forward drive, the ticks prove that the robot rests.
+    """After a forward drive, the ticks prove that the robot is at rest.
 
-    The public firmware does not count the ticks of a backward drive, so its ticks prove nothing
-    after such a drive.
+    The public firmware does not count the ticks of a backward drive. After a backward drive, its
+    ticks prove nothing.
     """
     rig = Rig(nominal(firmware))
     rig.run(5.0)
@@ -169,9 +169,10 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """The robot drives at 30 RPM and is stopped. No RPM 0/0 follows the Stop.
+    """The robot drives at 30 RPM and is stopped. Here, no RPM 0/0 follows the Stop.
 
-    Without feed-forward, 8 RPM then do not start the wheels.
+    The firmware therefore keeps the last measured speed. Without feed-forward, a set-point of 8 RPM
+    does not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)
@@ -263,7 +264,7 @@ def test_what_is_not_a_lois_ecu_is_told_in_a_sentence(data: bytes, words: str) -
 
 
 def test_the_number_of_damaged_groups_survives_a_new_connection() -> None:
-    """The driver counts damaged groups over all connections, not only since the last one."""
+    """The driver counts damaged groups of lines. The count continues after a reconnection."""
     ecu = LoisConversation(LoisEcuSettings())
     groups = [encode_report(Ticks(1000 + 200 * i, 5 + i, 7 + i)) for i in range(3)]
     last_line_at = 3 * len(groups[0]) // 4

@@ -33,9 +33,10 @@ class DeafBench(Bench):
 
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
-    """A request for one date replaces the date period, so the driver sends the period again.
+    """A request for one date ends the periodic dates, so the driver sends the period again.
 
-    One of these lines is lost. The period is still set in the end.
+    It sends the period several times, and one of these lines is lost. The period is still set in
+    the end.
     """
     times = DeafBench(firmware, 500).sent
     for nth in range(1, times + 1):
@@ -46,9 +47,9 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:
-    """The driver requests a date to confirm the settings. The request ends the date period.
+    """To confirm the settings, the driver requests one date. The request ends the periodic dates.
 
-    The driver restores the period.
+    The driver then restores the period that the user has set.
     """
     bench = DeafBench(firmware, period_ms)
     assert isinstance(bench.session.board, LoisEcuBoard)

@@ -58,9 +58,9 @@ def test_an_undamaged_stream_is_decoded_whole_in_any_chunks(firmware: bool) -> N
 
 
 def test_a_group_comes_out_with_its_last_byte_where_nothing_speaks_against_it() -> None:
-    """The decoder returns a plausible group as soon as it receives the group's last byte.
+    """A group of lines is plausible. The decoder returns it as soon as the last byte arrives.
 
-    Only the first group of each kind has to wait.
+    Only the first group of each kind waits for the next line or for a silence.
     """
     decoder = LoisDecoder()
     for at, (ticks, odometry) in enumerate(zip(TICKS, ODOMETRY, strict=True)):
@@ -134,7 +134,7 @@ def test_a_damaged_group_is_dropped_whole_and_the_next_is_whole(name: str, damag
 
 
 def test_a_doubled_marker_costs_nothing() -> None:
-    """A marker arrives twice, with an empty group in between that counts as damaged.
+    """The marker line of a group arrives twice. The first marker counts as a damaged, empty group.
 
     The group after the second marker is returned.
     """
@@ -147,9 +147,9 @@ def test_a_doubled_marker_costs_nothing() -> None:
 
 @pytest.mark.parametrize("lost", range(11))
 def test_ticks_with_odometry_behind_them_survive_any_lost_line(lost: int) -> None:
-    """A group of odometry lines follows a group of tick lines, and one line is lost.
+    """The board sends ticks and then odometry, both with the same command byte. A line is lost.
 
-    The group that is still complete is decoded.
+    The report that is still complete is decoded.
     """
     decoder = LoisDecoder()
     found: list[Report] = []
@@ -210,9 +210,9 @@ def test_a_record_that_was_not_asked_for_is_dropped() -> None:
 
 
 def test_ticks_that_leap_are_dropped_unless_the_next_ones_go_on_from_there() -> None:
-    """The tick counts of one group jump, so the decoder drops the group.
+    """The tick counts of one report jump, so the decoder discards the report.
 
-    If the next group continues the jump, the board has restarted.
+    If the next report continues from the new counts, it is returned: the board has restarted.
     """
     decoder = LoisDecoder()
     said = [

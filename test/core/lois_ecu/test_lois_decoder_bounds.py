@@ -83,9 +83,10 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 
 @pytest.mark.parametrize("code", [b"17", b"04"])
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
-    """A torque sample of 0/0 looks like the end of the record. The decoder reads on after it.
+    """A torque sample of 0/0 looks like the end of the record, but more samples follow.
 
-    The command number of a torque record differs between firmware and manual.
+    The decoder continues to read after it. The command byte of a torque record differs between
+    firmware and manual; both are tested.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)
@@ -100,7 +101,7 @@ def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> No
 
 
 def test_a_record_without_end_is_not_kept() -> None:
-    """A record never ends. The decoder holds at most the requested number of samples."""
+    """A record has no end. The decoder holds at most the requested number of samples."""
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.RPM, 10, 10)
     decoder.feed(b":04000a000b3d\n" * 5000, 0.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Groups of lines whose last lines are read late or are lost."""
+"""Tests of messages whose last lines are read late or are lost."""
 
 import itertools
 
@@ -22,7 +22,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "
 
 
 def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
-    """Decode the pieces and return all reports, even those that only a silence completes."""
+    """Decode the pieces. Return all reports, also those that only a silence completes."""
     decoder, found = LoisDecoder(), list[Report]()
     for at, data in given:
         if decoder.resolves_at <= at:
@@ -34,7 +34,10 @@ def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
 @FIRMWARE
 @pytest.mark.parametrize("pause_s", [0.06, 0.1, 0.14])
 def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: float) -> None:
-    """The host reads each burst of lines in two parts, ``pause_s`` apart. No report is lost."""
+    """The board sends bursts of lines. The host reads each burst in two parts, ``pause_s`` apart.
+
+    No report is lost.
+    """
     said = reports(4.0, firmware=firmware)
     bursts = [
         (at, b"".join(encode_report(report) for _, report in group))
@@ -51,9 +54,9 @@ def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: fl
 
 @given(st.data(), st.booleans())
 def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject, cut: bool) -> None:
-    """The host reads each burst in parts within 145 ms.
+    """The host reads each burst of lines in several parts, all within 145 ms.
 
-    The reports are the same as from one read.
+    The reports are the same as if each burst came in one read.
     """
     firmware = data.draw(st.booleans())
     said = reports(2.4, firmware=firmware)
@@ -73,10 +76,10 @@ def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject,
 @pytest.mark.parametrize("step_s", [0.1, 0.2, 0.4, 2.0])
 @pytest.mark.parametrize("kind", ["ticks", "ticks and odometry", "odometry", "position"])
 def test_lines_of_two_groups_never_make_one_group(kind: str, step_s: float) -> None:
-    """The end of one burst and the beginning of the next are lost.
+    """The end of one burst of lines and the beginning of the next burst are lost.
 
-    The remaining lines may look like one group, but their times differ. The decoder makes no report
-    of them.
+    The remaining lines may look like one group. The decoder still makes no report of them, because
+    their arrival times are too far apart.
     """
     groups: list[list[Report]] = []
     for n in range(1, 7):

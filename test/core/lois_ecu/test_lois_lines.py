@@ -175,7 +175,7 @@ def test_a_velocity_that_is_not_a_number_is_reported_as_such() -> None:
 
 
 def test_a_record_of_tick_times_ends_with_zeros() -> None:
-    """A record of tick times ends with zeros. The shorter channel is padded with the value 10.
+    """A record of tick times ends with zeros. The value 10 fills up the channel with fewer samples.
 
     The decoder removes this padding.
     """
@@ -187,9 +187,9 @@ def test_a_record_of_tick_times_ends_with_zeros() -> None:
 
 
 def test_a_record_of_torque_may_come_under_the_number_of_the_tick_times() -> None:
-    """The public firmware answers a request for torque (0x17) with the number of tick times (0x04).
+    """The public firmware answers a request for torque (0x17) with the byte of tick times (0x04).
 
-    The decoder accepts both numbers.
+    The decoder accepts both command bytes.
     """
     for code in (b"04", b"17"):
         decoder = LoisDecoder()
@@ -228,7 +228,7 @@ def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
 def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
     """The encoder refuses values out of range.
 
-    An example is a period of 0, which would make the board deaf.
+    An example is a period of 0: the board would send all the time, and so could not receive.
     """
     with pytest.raises(FrameError):
         encode_command(command)

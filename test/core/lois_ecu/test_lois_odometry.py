@@ -49,10 +49,10 @@ def test_the_boards_own_odometry_would_be_wrong() -> None:
 
 @BOTH
 def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
-    """In a forward drive, the odometry names ticks as its source.
+    """In a forward drive, the odometry names "ticks" as its source.
 
-    In a backward drive, the public firmware counts no ticks. The odometry then names commands and
-    heading.
+    In a backward drive, the public firmware counts no ticks. The odometry then names "commands and
+    heading".
     """
     rig = settled(firmware)
     rig.order(20, 20, 4.0)
@@ -71,7 +71,7 @@ def test_it_says_where_the_board_is_blind(firmware: Firmware) -> None:
 
 @BOTH
 def test_a_robot_that_stands_does_not_move_in_odom(firmware: Firmware) -> None:
-    """The robot has stopped, but report 0x20 repeats the old velocity. The pose does not move."""
+    """The robot is at rest, but the board still reports its old velocity. The pose stays."""
     rig = settled(firmware)
     rig.order(20, 25, 4.0)
     rig.order(0, 0, 2.0)
@@ -177,7 +177,7 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """The user changes the wheel radius. Only distances after the change are scaled with it."""
+    """The user changes the wheel radius. The new radius is used only for distances after this."""
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)
@@ -197,9 +197,9 @@ def test_other_wheels_count_from_the_next_group_on() -> None:
 
 
 def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
-    """The odometry predicts motion between two groups of ticks, and a setting changes meanwhile.
+    """The odometry predicts motion between two tick reports. Then the user changes a setting.
 
-    The next group does not add the predicted motion again.
+    The second report does not add the predicted motion again.
     """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
@@ -218,9 +218,9 @@ def test_a_way_is_counted_once_although_a_setting_changes_on_it() -> None:
 
 
 def test_wheels_that_were_held_before_they_were_stopped_are_where_their_ticks_say() -> None:
-    """The wheels stop while the board is silent, but the predicted pose moves on.
+    """The wheels stop while the board is silent. The odometry still predicts motion.
 
-    The next ticks show a shorter distance. The odometry is corrected to this distance.
+    The next ticks show a shorter distance. The pose is corrected to this distance.
     """
     ours = LoisEcuSettings()
     odometry = LoisOdometry(ours)
@@ -255,9 +255,9 @@ def test_a_velocity_that_is_not_a_number_is_not_a_speed() -> None:
 
 
 def test_duty_backward_is_known_by_commands_alone() -> None:
-    """The robot drives backward by duty, so only the commands are known.
+    """The robot drives backward by duty, so its motion is estimated from the commands alone.
 
-    The sigma of the distance is more than 20 % of the distance.
+    The standard deviation of the distance is more than 20 % of the distance.
     """
     odometry = LoisOdometry(LoisEcuSettings(drive_mode="duty"))
     odometry.wrote(SetDuty(-40, -40), 0.0)
@@ -288,13 +288,13 @@ def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
 def test_a_wheel_that_changes_its_speed_by_itself_is_foreseen_less(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With the board's own gains, a wheel's speed oscillates between two groups of reports.
+    """With the board's own gains, a wheel's speed may oscillate between two reports.
 
-    Unexpected ticks therefore increase the variance of a predicted speed.
+    If more ticks come than expected, the variance of a predicted speed therefore increases.
     """
 
     def variance() -> float:
-        """Return the variance in (m/s)² of the predicted speed after a group with 4 extra ticks."""
+        """Return the variance of a predicted speed in (m/s)², after a report with 4 extra ticks."""
         odometry, ticks = LoisOdometry(LoisEcuSettings()), 0
         odometry.wrote(SetRpm(20, 20), 0.0)
         for step in range(52):

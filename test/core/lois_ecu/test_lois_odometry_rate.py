@@ -23,7 +23,7 @@ def published(board: LoisEcuBoard, now: float) -> bool:
 def test_odometry_that_is_late_is_not_published_twice_at_once(
     firmware: str, delay_s: float
 ) -> None:
-    """Odometry is published late. The next odometry is not published at once."""
+    """Odometry is published late. The next odometry follows a period later, not at once."""
     bench = Bench(firmware)
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)

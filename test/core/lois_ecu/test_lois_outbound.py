@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to a LOIS ECU lose characters. A short loss never makes another valid line."""
+"""Lines to a LOIS ECU lose characters. Test that a short loss never makes another valid line."""
 
 from collections.abc import Iterator
 from itertools import combinations
@@ -48,7 +48,7 @@ def heard(data: bytes, *, with_sum: bool, lenient: bool) -> list[tuple[int, int]
 
 
 def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
-    """Yield each set of at most ``most`` positions out of ``length``."""
+    """Yield each set of at most ``most`` lost positions in ``length`` characters."""
     for count in range(most + 1):
         yield from combinations(range(length), count)
 
@@ -75,9 +75,9 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """Some characters in a row are lost, but fewer than a line has.
+    """Characters in a row are lost from two lines, but fewer than a line has.
 
-    The rest of two lines never forms another valid line.
+    The remaining characters never form another valid line.
     """
     length = 14 if with_sum else 12
     for talk in TALKS.values():
@@ -90,9 +90,10 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """As many characters as a line has are lost across two set-points. The rest is a valid line.
+    """Characters are lost from two set-points in a row, exactly as many as a line has.
 
-    Because of this, the driver sends set-points 18 ms apart.
+    The remaining characters are a valid line with a wrong set-point. To prevent this, the driver
+    sends set-points at least 18 ms apart.
     """
     data = encode_command(SetRpm(17, 17)) + encode_command(SetRpm(0, 0))
     joined = data[:7] + data[21:]
@@ -103,10 +104,11 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """If as many characters as a line has are lost, the rest may be a wrong motion line.
+    """A motion line and the line of the LED lose together as many characters as a line has.
 
-    After a motion line, the driver therefore sends the LED's line 15 ms later. After the LED's
-    line, a motion line needs no pause.
+    If the motion line comes first, the remaining characters may be a wrong motion line. To prevent
+    this, the driver sends the LED's line at least 15 ms after a motion line. If the LED's line
+    comes first, there is no danger.
     """
     length = 14 if with_sum else 12
     motion = encode_command(SetRpm(16, 20), with_sum=with_sum)

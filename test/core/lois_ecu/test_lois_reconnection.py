@@ -90,8 +90,8 @@ def test_after_a_silence_the_clock_tells_a_restart_from_wheels_that_rolled_back(
 ) -> None:
     """After a silence of 12 s, the tick counters are at zero.
 
-    If the board's clock does not fit the silence, the board has restarted. Otherwise the wheels
-    have rolled back.
+    If the board's clock continued during the silence, the wheels have rolled back. If it began
+    again, the board has restarted.
     """
     ours = LoisEcuSettings()
     driver, now, place_m = LoisConversation(ours), 0.0, []

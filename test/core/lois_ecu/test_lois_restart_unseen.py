@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of restarts of a documented board, whose clock in ns and counts start from zero."""
+"""Tests of restarts that are hard to see, on a board as in the manual.
+
+Its clock counts ns and wraps every 4.3 s. After a restart, clock and tick counts begin at zero.
+"""
 
 import math
 from itertools import pairwise
@@ -29,9 +32,9 @@ def restarts(bench: Bench) -> int:
 
 @pytest.mark.parametrize("seconds", [2.9, 3.0, 3.1, 3.4, 3.7, 4.0])
 def test_a_restart_is_not_taken_for_wheels_that_roll_back(seconds: float) -> None:
-    """The board restarts during a drive. Its counts and its clock then have small values again.
+    """The board restarts during a drive. Its tick counts and its clock begin at zero again.
 
-    The odometry does not regard the smaller counts as wheels that rolled back.
+    The odometry does not mistake the smaller counts for wheels that rolled back.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, seconds)
@@ -43,7 +46,7 @@ def test_a_restart_is_not_taken_for_wheels_that_roll_back(seconds: float) -> Non
 
 
 def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: float) -> None:
-    """Drive, so that the board's clock wraps ``wrapped_for_s`` before the end of the drive."""
+    """Drive for ``seconds``. The board's clock wraps ``wrapped_for_s`` before the drive ends."""
     since_s = (bench.board.now_s + seconds) % CLOCK_WRAPS_S
     bench.run((wrapped_for_s - since_s) % CLOCK_WRAPS_S)
     bench.drive_on(speed_mps, seconds)
@@ -54,9 +57,10 @@ def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: f
 def test_a_restart_shows_although_the_clock_wraps_at_that_time(
     wrapped_for_s: float, speed_mps: float
 ) -> None:
-    """The board restarts while its clock is near zero. So its new time nearly continues the old.
+    """The board restarts shortly after its clock wrapped, or shortly before it would wrap.
 
-    The driver notices the restart, and the odometry does not jump back by the lost counts.
+    The clock begins at zero, so its value hardly differs from that without a restart. The driver
+    still notices the restart, and the odometry does not jump back by the lost counts.
     """
     bench = Bench("documented")
     begin_drive(bench, speed_mps, 2.4, wrapped_for_s)
@@ -73,7 +77,10 @@ def test_a_restart_shows_although_the_clock_wraps_at_that_time(
 
 
 def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None:
-    """As above, but the robot is at rest. Its pose remains."""
+    """The board restarts at rest, shortly before its clock would wrap.
+
+    The driver notices the restart, and the pose does not change.
+    """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.6, -2.0 - 0.15)
     bench.run(2.0)
@@ -87,7 +94,11 @@ def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None
 
 
 def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
-    """The board restarts exactly when its clock wraps. The wheels may have rolled back as well."""
+    """The board restarts exactly when its clock wraps, so the clock does not show the restart.
+
+    The counts could also be from wheels that rolled back. The covariance contains the possible
+    error.
+    """
     bench = Bench("documented")
     begin_drive(bench, 0.3, 1.3, 0.0)
     assert 5 < max(wheel.ticks for wheel in bench.board.wheels) < 30
@@ -100,9 +111,10 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
-    """The robot drives forward and back to where it has booted. The clock then wraps.
+    """The robot drives forward and then back to where the counts are zero. The clock wraps then.
 
-    The ticks may arrive late, so that the clock does not fit either.
+    The ticks may also be late, so that the clock does not fit the last reports. The driver still
+    assumes no restart.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6

@@ -10,7 +10,7 @@ GROUP_S = 0.1
 
 
 def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
-    """Return a detector that has received these speeds, one with each group."""
+    """Return a detector that has received these speeds, one with each report."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
         wheel.tell(rpm, GROUP_S, tuned=tuned)
@@ -52,9 +52,9 @@ def test_a_steady_speed_is_that_of_a_wheel_that_rolls() -> None:
 
 
 def test_one_tick_that_came_late_is_not_a_fall() -> None:
-    """A late tick makes the next tick seem early: one report has 27 RPM instead of 18.
+    """The board notices a tick late. The next tick seems early: the speed is 27 RPM instead of 18.
 
-    The wheel has not stopped.
+    The 18 RPM after this single high speed are not a fall. The wheel has not stopped.
     """
     assert told(18, 18, 18, 27, 18, 18, 18).chance < 0.5
 
@@ -69,14 +69,17 @@ def test_a_wheel_that_starts_and_a_fast_one_do_not_rest(rpm: float) -> None:
 
 
 def test_another_speed_ends_the_rest() -> None:
-    """The reported speed changes, which shows another tick. The wheel is not at rest any more."""
+    """A wheel was found to be at rest. Then its reported speed changes, which shows a new tick.
+
+    The wheel is not at rest any more.
+    """
     assert told(31, 28, 12, 12, 12, 2).chance == 0.0
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels are equally fast, the board reports no speed.
+    """While both wheels have the same speed, the board reports no speed. Then one wheel is slower.
 
-    The estimated speed before shows that the next reported speed is a fall.
+    The speed estimated before shows that the reported speed has fallen.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):

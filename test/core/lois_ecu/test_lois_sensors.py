@@ -22,9 +22,9 @@ from omnibot_driver.simulator.lois_ecu import DOCUMENTED, LoisSettings
 
 
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
-    """The readings are in SI units, and yaw 0 is east.
+    """The readings are in SI units, and a yaw of 0 points east.
 
-    A GPS time needs a date. The position 0/0 is not a fix.
+    The time of the GPS is unknown without a date. A position of 0/0 is not a fix.
     """
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
@@ -82,7 +82,7 @@ def test_past_midnight_the_time_is_unknown_until_a_new_date_comes() -> None:
 
 
 def test_declination_turns_the_heading() -> None:
-    """The declination is positive to the east: yaw = pi/2 − (heading + declination)."""
+    """A declination is set, positive to the east. The yaw is pi/2 − (heading + declination)."""
     ecu = LoisConversation(LoisEcuSettings(declination_rad=0.1))
     found = ecu.receive(encode_report(Heading(90)) * 3, 0.0)
     assert found[-1] == HeadingReading(pytest.approx(-0.1))
@@ -110,9 +110,9 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """Yaw is reset to 0 while the robot's heading is 120°, the same as a false heading near north.
+    """The yaw is reset at a compass heading of 120°, which is also the usual false heading.
 
-    Later headings of 120° are still accepted.
+    Later headings of 120° are still accepted. (False headings come near north.)
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

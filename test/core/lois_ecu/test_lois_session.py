@@ -152,7 +152,10 @@ def test_a_long_record_is_heard_while_it_comes(firmware: str) -> None:
 
 
 def test_a_long_record_is_not_taken_for_damage() -> None:
-    """The lines of a record are not reports, but they are valid. No notice about damage appears."""
+    """The board sends the lines of a record, which are valid although they form no report.
+
+    No notice about damage appears.
+    """
     bench = Bench("firmware")
     board = bench.session.board
     assert isinstance(board, LoisEcuBoard)
@@ -166,9 +169,9 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 
 
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
-    """The board loses power within a line. The notice reports that no data arrives.
+    """The board loses power within a line. The notice says that no data arrives.
 
-    It does not name the baud rate as the cause.
+    It does not say that the baud rate may be wrong.
     """
     bench = Bench("firmware")
     while not bench.board._uart.sending:
@@ -183,10 +186,10 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
-    """The board receives nothing for a moment in each group that it sends.
+    """Whenever the board sends a report, it receives nothing for a moment.
 
-    The driver writes the settings in five rounds, each in another order. In a fixed order, the same
-    setting could be lost every time.
+    The driver therefore writes the settings in five rounds, each in another order, and all arrive.
+    In a fixed order, the same setting could be lost every time.
     """
     names = [setting for setting in Setting if setting != Setting.RPM_LOW_PASS][:count]
     quiet = {Stream.TICKS: 200, Stream.ODOMETRY: 200, **OFF}
@@ -200,7 +203,7 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
 
 @FIRMWARE
 def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
-    """All groups of 0.6 s arrive in one read. Odometry stays within 0.15 m of the truth."""
+    """All reports of 0.6 s arrive in one read. Odometry stays within 0.15 m of the truth."""
     bench = Bench(firmware, HOST_GAINS)
     for _ in range(8):
         late: list[bytes] = []

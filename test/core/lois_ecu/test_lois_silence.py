@@ -14,7 +14,7 @@ FIRMWARES = ("lois_ecu", "lois_ecu as documented")
 
 
 def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> AnyBench:
-    """Return a bench at rest, after a drive with ``seconds`` of lost connection in both directions.
+    """Return a bench at rest, after a drive in which the connection was lost for ``seconds``.
 
     ``reopened``: whether the port was closed and opened again.
     """
@@ -49,7 +49,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 ) -> None:
     """The connection is lost, so no Stop arrives, and the robot drives on for metres.
 
-    The error stays within 3 sigma.
+    When the connection is back, the error of the position is within 3 sigma.
     """
     error_m, sigma_m = off_by(lost_line(firmware, vx, seconds, reopened=reopened))
     assert error_m <= 3.0 * sigma_m

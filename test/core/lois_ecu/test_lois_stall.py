@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a commanded wheel that is at rest. The public firmware may fail to start a wheel."""
+"""Detection of a wheel that is commanded to turn but at rest.
+
+The public firmware may fail to start a wheel.
+"""
 
 import math
 
@@ -28,9 +31,10 @@ def pose(x_m: float) -> BoardOdometry:
 
 
 def watched(command: SetRpm | SetDuty, *, ticks: tuple[int, int], ways_m: float) -> list[float]:
-    """Return the times in s, within six seconds, at which a wheel looked stalled.
+    """Return the times in s, within six seconds, at which a wheel is reported as stalled.
 
-    ``ticks``, ``ways_m``: growth of ticks and of report 0x20 in 0.2 s.
+    ``ticks``: new ticks of both wheels in each 0.2 s. ``ways_m``: distance in m that the board's
+    odometry (0x20) adds in each 0.2 s.
     """
     watch = StallWatch(LoisEcuSettings())
     watch.wrote(command, 0.0)
@@ -90,7 +94,8 @@ def looks_stalled(
 def test_a_wheel_that_keeps_its_speed_beside_one_that_ticks_looks_stalled() -> None:
     """The left wheel's reported speed never changes while the right wheel ticks.
 
-    The left wheel looks stalled, although the firmware's pose changes: it follows from old speeds.
+    The left wheel looks stalled. The firmware's pose changes nevertheless, because it is computed
+    from the old speed.
     """
     assert looks_stalled([(-10, 8 + step % 3) for step in range(14)])
     assert not looks_stalled([(-9 - step % 2, 8 + step % 3) for step in range(14)])
@@ -125,16 +130,16 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """Both wheels roll backward steadily at 1.3 times their set-points.
+    """Both wheels roll backward steadily at 1.3 times their set-points, and neither looks stalled.
 
-    A wheel looks stalled if only one of the two is so fast.
+    If only one wheel is so fast, this wheel looks stalled.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
 
 
 def test_a_wheel_that_odometry_takes_to_be_at_rest_looks_stalled() -> None:
-    """A wheel's reported speed is near its set-point, but the odometry finds it at rest.
+    """A wheel's reported speed is near its set-point, but the odometry assumes it at rest.
 
     The wheel gets no power, so it looks stalled.
     """
@@ -153,7 +158,10 @@ def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> Non
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    """Return the earth-frame velocity in m/s. ``left``, ``right``: speeds of the rims in m/s."""
+    """Return the velocity of the robot in the earth frame in m/s, at its present yaw.
+
+    ``left``, ``right``: speeds of the rims in m/s.
+    """
     speed = (left + right) / 2
     return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)
 
@@ -170,7 +178,7 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
     """A saturated controller keeps a wheel at −68 RPM instead of −31. The driver sends RPM 0/0.
 
-    The odometry keeps the distance rolled before.
+    The odometry keeps the distance that the wheel has rolled.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
@@ -197,9 +205,9 @@ def test_a_wheel_at_full_power_is_started_anew_and_has_rolled() -> None:
 
 @pytest.mark.parametrize("reset", [False, True])
 def test_wheels_that_do_not_start_backward_take_no_earlier_way_back(reset: bool) -> None:
-    """The wheels are blocked after a forward drive and commanded backward. The pose stays.
+    """After a forward drive, the wheels are blocked and commanded backward. The pose stays.
 
-    ``reset``: whether the odometry is reset before this command.
+    ``reset``: whether the odometry is reset before the backward command.
     """
     driver, ticks, places = LoisConversation(LoisEcuSettings()), 0, []
     for step in range(50):

@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Terminal modes and drive modes of a LOIS ECU. They stop the robot first and refuse motion."""
+"""Changes of the terminal mode and of the drive mode of a LOIS ECU.
+
+Before such a change, the driver stops the robot and refuses motion. In a terminal mode, the board
+passes on the lines of a sensor.
+"""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure, told
@@ -46,10 +50,10 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(
     firmware: str, hears: bool
 ) -> None:
-    """The user ends a terminal mode. The first lines that end the mode may be lost.
+    """The user ends a terminal mode. The first lines of the driver that end the mode may be lost.
 
-    The driver reports the end only once. It restores the "short correction", which the mode
-    overwrote.
+    The driver reports the end only once. It restores the "short correction", a setting of the board
+    that the mode overwrote.
     """
     bench = Bench(firmware)
     configure(bench, GPS)
@@ -70,7 +74,7 @@ def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown
 
 
 def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
-    """The board restarts in a terminal mode, and is then not in this mode.
+    """The board restarts while it is in a terminal mode. After the boot, it is in its normal mode.
 
     The driver writes the settings, and then the terminal mode again.
     """
@@ -156,9 +160,10 @@ def test_another_duty_scale_stops_a_robot_that_is_driven_by_duties() -> None:
 
 
 def test_a_latched_estop_does_not_jam_a_board_that_passes_it_on_to_the_compass() -> None:
-    """In compass mode the public firmware reads only 480 characters a second.
+    """In compass mode, the public firmware reads only 480 characters a second.
 
-    So a latched e-stop sends only Stop. Later lines still arrive.
+    So while the e-stop is latched, the driver sends only Stop. Lines that it sends later still
+    arrive.
     """
     bench = Bench("firmware")
     configure(bench, COMPASS)

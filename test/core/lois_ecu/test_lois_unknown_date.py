@@ -31,9 +31,9 @@ WORKS = pytest.mark.parametrize(
 class GpsRig(Rig):
     """A robot whose GPS has no date at first.
 
-    ``unknown``: what the GPS sends instead of a date.
+    ``unknown``: date that the GPS sends while it has none.
 
-    ``requests``: times of the requests for a date, in s.
+    ``requests``: times at which the driver requested a date, in s.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 ) -> None:
     """A position is a fix only if the GPS also reports a date.
 
-    Zeros and the first days of the GPS calendar are not dates.
+    Without a date, it sends zeros or one of the first days of the GPS calendar.
     """
     rig = GpsRig(quirks, unknown=unknown)
     rig.run(8.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Lines to a LOIS ECU while the robot drives. Settings wait, but the LED's line does not."""
+"""Lines to a LOIS ECU while the robot drives: settings wait, but the LED's line is sent."""
 
 import pytest
 from lois_bench import FIRMWARE, Bench, configure
@@ -71,10 +71,11 @@ def test_a_change_of_settings_keeps_the_led_line_that_waits(firmware: str) -> No
 
 
 def test_an_led_line_keeps_its_distance_from_the_motion_before_it() -> None:
-    """The LED's line follows a motion line after at least 14.5 ms.
+    """The LED is switched while the robot drives.
 
-    The board can lose 13 ms of bytes: the end of the motion line and the beginning of the LED's
-    line. The rest of both lines could then be a wrong motion line.
+    Its line follows a motion line after at least 14.5 ms. The board can lose 13 ms of bytes. With a
+    shorter distance, it could lose the end of the motion line and the beginning of the LED's line.
+    The rest could be a wrong motion line.
     """
     bench = Bench("firmware")
     bench.drive_on(0.3, 1.0)

@@ -24,14 +24,12 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""Kind of frame, byte of its payload, bit of that byte, and ticks to drive before the change."""
+"""The bit to change: kind of frame, byte of its payload, and bit of that byte. Last, the number of
+ticks to drive before the change."""
 
 
 class Drive:
-    """A drive in curves in which one bit of one frame is changed.
-
-    The drive begins away from the origin.
-    """
+    """A drive in curves, away from the origin, in which one bit of one frame is changed."""
 
     def __init__(self, frame: str = "earth") -> None:
         start = BoardPose(3000.0, -2000.0, 700.0)
@@ -172,7 +170,10 @@ def test_what_is_refused_is_counted_and_told() -> None:
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
-    """The board's first pose has a wrong heading. The next two poses agree, so odom is right."""
+    """The first pose of the board has a wrong heading. The next two poses agree with each other.
+
+    The odometry uses their heading, so odom is right.
+    """
     start = BoardPose(3000.0, -2000.0, 700.0)
     drive = Drive.__new__(Drive)
     drive.bench = Bench(BoardSettings(running=True, initial_pose=start))

@@ -34,7 +34,8 @@ def test_imu_estimates_come_every_tick_and_in_si_units(bench: Bench) -> None:
 def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
     """Each odometry estimate has the stamp of the IMU sample of its tick.
 
-    This also holds for displacements that waited for the board's first pose.
+    This is also true for displacements that are published later, because they wait for the board's
+    first pose.
     """
     stamps = {event.stamp_s for event in bench.events if isinstance(event, ImuEstimate)}
     assert len(bench.odometry) > 30
@@ -42,9 +43,9 @@ def test_odometry_has_the_stamps_of_its_own_ticks_samples(bench: Bench) -> None:
 
 
 def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
-    """The board restarts, and later the port is opened again. The stamps still increase.
+    """The board restarts, and later the port is opened again. The stamps increase all the time.
 
-    At the end they are 10 ms apart again.
+    In the end, they are 10 ms apart again.
     """
     bench.board.reboot()
     bench.run_until_state("paused")
@@ -62,9 +63,10 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 
 
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
-    """The odometry is reset during a drive. Afterwards odom has the distance since the reset.
+    """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
 
-    Up to 20 mm may be missing: the motion that the board had not yet reported at the reset.
+    Up to 20 mm of it may be missing, because the board had not reported the last motion before the
+    reset.
     """
     for _ in range(10):
         bench.drive(0.5)
@@ -81,7 +83,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
 
 
 def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
-    """Frames are lost thirty times. The driver writes only one or two notices."""
+    """Frames are lost thirty times. The driver combines the losses in only one or two notices."""
     for _ in range(30):
         bench.speaks = False
         bench.run(0.08)

@@ -56,7 +56,8 @@ def trembling(random: Random) -> list[float]:
 def row(count: int, leaps: dict[int, dict[int, float]], seed: int = 1) -> list[Reading]:
     """Return ``count`` noisy readings of an IMU at rest, with 1 g upward.
 
-    ``leaps``: for the number of a reading and of its word, a value that is added to the word.
+    ``leaps``: jumps to add. Keys: number of the reading, then number of the word in it. Value: the
+    jump.
     """
     random, found = Random(seed), list[Reading]()
     for number in range(count):
@@ -103,7 +104,7 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, words of another frame replace the gyro's words. The reading is rejected."""
+    """In one reading, values of another frame replace the gyro's values. It is rejected."""
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
     came = admitted(readings, through)
@@ -127,7 +128,7 @@ def test_a_knock_of_one_reading_that_is_not_a_bit_comes_out_at_once(
 def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
     """A knock saturates the sensor, so a reading is at the end of the 2 g scale.
 
-    No changed bit of a usual reading gives this value, so the reading is released.
+    One changed bit in a usual reading cannot give this value. So the reading is released.
     """
     readings, through = row(60, {}), gate()
     readings[50] = imu(0.0, 0.0, 2 * G)
@@ -138,7 +139,7 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
     """A reading jumps by the value of a high bit, and is rejected.
 
-    This value is larger if ``full_scale_mps2``, the end of the sensor's scale, is larger.
+    With a larger scale of the sensor (``full_scale_mps2``), this bit has a larger value.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -174,9 +175,9 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
     "fast", [ahead(0.081), ahead(-3.2), ahead(0.0, 0.33), ahead(math.nan), ahead(0.0, -3.2)]
 )
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
-    """A displacement is faster than 2 m/s or 8 rad/s.
+    """A displacement is faster than 2 m/s or 8 rad/s, so it is rejected.
 
-    It is rejected. The next displacement reports it as lost.
+    It counts as lost: the next displacement contains one more lost displacement.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -185,9 +186,9 @@ def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReadin
 
 
 def test_a_pose_tells_first_of_what_was_refused_before_it() -> None:
-    """A displacement is rejected, and a pose comes next. The pose counts the displacement as lost.
+    """A displacement is rejected, and a pose comes next. The pose reports the rejected one as lost.
 
-    The next displacement does not count it again.
+    The next displacement does not report it again.
     """
     pose = PoseReading(0.0, 0.0, 0.0)
     came = admitted([ahead(), ahead(1.0), pose, ahead()], gate())
@@ -217,9 +218,9 @@ def test_a_displacement_that_leaps_and_stays_there_is_late_and_complete() -> Non
 
 
 def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
-    """A displacement jumps, so it waits for the next displacement, and so do the poses after it.
+    """A displacement jumps. It waits for the next displacement, and the poses after it also wait.
 
-    When ten poses wait, all are released.
+    When ten poses wait, all of them are released.
     """
     pose, through = PoseReading(0.0, 0.0, 0.0), gate()
     came = admitted([*[ahead()] * 3, ahead(0.06), *[pose] * 12, ahead(0.01)], through)
@@ -228,7 +229,7 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """A displacement with a restart or an unknown duration is rejected.
+    """A displacement is rejected that reports a restart of the board, or has an unknown duration.
 
     The next displacement is released with this restart or this unknown duration.
     """
@@ -271,7 +272,8 @@ readings = st.one_of(
 def test_what_is_not_refused_comes_out_once_in_order_and_unchanged(given: list[Reading]) -> None:
     """Accepted readings keep their order and values.
 
-    Only the losses, restarts and durations of rejected readings are added to later ones.
+    A rejected reading is removed. Only its losses, its restart and its unknown duration are added
+    to a later reading.
     """
     through = gate()
     came = list(chain(*admitted(given, through)))
@@ -297,7 +299,7 @@ def bare(reading: Reading) -> Reading:
 
 
 def test_two_displacements_that_came_with_one_read_are_believed() -> None:
-    """Two displacements from one read are zero seconds apart. This causes no division by zero."""
+    """Two displacements from one read have the same time. This causes no division by zero."""
     through = gate()
     assert through.admit(ahead(), 1.0) == [(ahead(), 1.0)]
     at_once = replace(ahead(), duration_s=0.0)
@@ -306,9 +308,10 @@ def test_two_displacements_that_came_with_one_read_are_believed() -> None:
 
 
 def test_a_knock_comes_out_at_once_where_no_bits_are_sent() -> None:
-    """A sensor sends text, so damage does not change single bits, and its full scale is infinity.
+    """A sensor sends text instead of binary words, so its full scale is set to infinity.
 
-    A knock that changes one reading is released at once.
+    Damage cannot change single bits of a value. A knock that changes one reading is released at
+    once.
     """
     through = OutlierFilter(replace(MotionLimits(), full_scale_mps2=math.inf), TICK_S)
     given = [imu(), imu(), imu(8.0), imu(), imu()]
@@ -333,9 +336,9 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 
 
 def test_an_estimate_that_is_put_right_may_leap() -> None:
-    """A board's own odometry jumps because it corrects its own error.
+    """A board's own odometry jumps, because the board corrects an earlier error.
 
-    A filter with ``corrected=True`` releases the jump, but a usual filter rejects it.
+    A filter for such odometry (``corrected=True``) releases the jump. A usual filter rejects it.
     """
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []

@@ -34,9 +34,10 @@ def test_without_the_motion_monitor_it_drives_on_until_that_is_back() -> None:
 
 
 def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_later() -> None:
-    """The motion monitor is off, and a motion limit is too low, so displacements are rejected.
+    """The motion monitor is off, and a motion limit is set too low, so displacements are rejected.
 
-    The limit is corrected, and then the monitor is switched on again. It does not trip.
+    The limit is corrected, and the monitor is switched on again. The monitor does not stop the
+    robot.
     """
     bench = started(BoardSettings(running=True))
     for limits in (MotionLimits(fastest_mps=0.01), MotionLimits()):
@@ -49,9 +50,9 @@ def test_displacements_rejected_while_the_motion_monitor_is_off_stop_no_robot_la
 
 
 def test_displacements_rejected_after_the_motion_monitor_is_on_again_are_a_fault() -> None:
-    """A motion limit is still too low when the motion monitor is on again.
+    """A motion limit is too low, so displacements are rejected. The motion monitor is switched on.
 
-    Four more rejected displacements trip the monitor.
+    When four more displacements have been rejected, the monitor stops the robot.
     """
     bench = started(BoardSettings(running=True))
     too_low = MotionLimits(fastest_mps=0.01)

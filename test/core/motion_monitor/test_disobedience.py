@@ -93,9 +93,9 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """Displacements come every 0.1 s. The robot reverses within one, whose sum is about zero.
+    """Displacements come every 0.1 s. The robot reverses within one of them, which is near zero.
 
-    The monitor does not mistake this for a robot at rest, and stops the robot within 0.3 s.
+    The monitor does not mistake this for a robot that is held. It stops the robot within 0.3 s.
     """
     bench = started(BoardSettings(running=True, delta_period_s=0.1))
     for _ in range(10):
@@ -112,9 +112,9 @@ def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
 
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) -> None:
-    """The board's switch is on position, so the robot drives towards the board's origin, 3 m away.
+    """The board's switch is set to position control, so it takes velocities for goals.
 
-    The driver stops it within 5 cm.
+    The robot drives towards the board's origin, 3 m away. The driver stops it within 5 cm.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
@@ -192,7 +192,10 @@ def test_a_setting_that_the_boards_own_frames_contradict_is_what_to_check() -> N
 
 
 def test_what_board_and_driver_agree_on_is_not_noticed() -> None:
-    """Signs are wrong both for commands and for displacements. The monitor cannot notice this."""
+    """The axis signs are wrong both for commands and for displacements.
+
+    Commanded and measured motion agree, so the monitor cannot notice the fault.
+    """
     bench = started(BoardSettings(running=True, axis_signs=(-1, 1, 1)))
     for _ in range(10):
         bench.drive(0.3)

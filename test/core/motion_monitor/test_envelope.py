@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the envelope: the velocities that a robot may have under its recent set-points.
+"""Tests of the envelope: the set of velocities that a robot may have after its recent set-points.
 
-A replaced set-point has less and less effect on the envelope.
+A set-point that was replaced has less and less effect on the envelope.
 """
 
 import math
@@ -33,7 +33,7 @@ def plain(twist: BodyTwist) -> tuple[float, float, float]:
 def test_what_lies_between_rest_and_the_set_points_is_inside(
     setpoints: list[tuple[BodyTwist, float]],
 ) -> None:
-    """Any weighted mean of the set-points and rest is inside the envelope."""
+    """Any weighted mean of the recent set-points and rest is inside the envelope."""
     weight = max(1.0, sum(part for _, part in setpoints))
     motion = BodyTwist(
         sum(part * each.vx_mps for each, part in setpoints) / weight,
@@ -54,7 +54,7 @@ near_by = st.tuples(*[st.floats(-0.03, 0.03)] * 3)
 def test_what_is_on_the_way_is_inside(
     setpoints: list[BodyTwist], part: float, off: tuple[float, float, float]
 ) -> None:
-    """A twist that the shortcut ``on_the_way`` accepts is also inside by the full computation."""
+    """The shortcut ``on_the_way`` accepts a twist. The full computation accepts it, too."""
     one, other = setpoints[0], setpoints[-1]
     x, y, yaw = off
     motion = BodyTwist(
@@ -70,7 +70,10 @@ def test_what_is_on_the_way_is_inside(
 
 @pytest.mark.parametrize("angle", [0.0, 0.1, 1.0, math.pi, -2.0])
 def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> None:
-    """The excess of a twist is its distance from the hull of the set-points, minus the margin."""
+    """A twist is outside the envelope.
+
+    Its excess is its distance from the convex hull of the set-points, less a margin.
+    """
     away = BodyTwist(-0.3 * math.cos(angle), -0.3 * math.sin(angle), 0.0)
     way_mps, turn_radps = outside(
         away, [(0.1 * math.cos(angle), 0.1 * math.sin(angle), 0.0)], heading_known=True
@@ -80,7 +83,7 @@ def test_what_is_outside_is_so_by_its_distance_from_the_hull(angle: float) -> No
 
 
 def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
-    """A replaced set-point has its full weight in the envelope for 0.3 s, and none after 1.1 s."""
+    """A set-point is replaced. In the envelope, it loses weight from 0.3 s to 1.1 s afterwards."""
     history = SetpointHistory()
     history.add(AT_REST, 0.0)
     history.add(FORWARD, 10.0)
@@ -94,7 +97,7 @@ def test_a_set_point_that_was_replaced_explains_less_and_less() -> None:
 
 
 def test_a_set_point_that_was_short_counts_as_well() -> None:
-    """A set-point lasts for a single tick between two displacements.
+    """A set-point is valid only for a single tick between two displacements.
 
     The envelope still contains it.
     """
@@ -108,9 +111,9 @@ def test_a_set_point_that_was_short_counts_as_well() -> None:
 
 
 def test_nothing_is_known_before_the_first_set_point() -> None:
-    """The envelope is unknown before the first set-point, and shortly after it.
+    """Before the first set-point and shortly after it, the envelope is unknown: nothing is judged.
 
-    It is also unknown shortly after a goal.
+    It is also unknown shortly after a goal pose.
     """
     history = SetpointHistory()
     assert not history.known(0.0)
@@ -124,7 +127,7 @@ def test_nothing_is_known_before_the_first_set_point() -> None:
 
 
 def test_the_history_does_not_grow_without_end() -> None:
-    """A long ramp has a new set-point in each tick. The history stays short."""
+    """A long ramp has a new set-point in each tick. The history of set-points stays short."""
     history = SetpointHistory()
     for tick in range(10_000):
         history.add(BodyTwist(1e-6 * tick, 0.0, 0.0), 0.01 * tick)
@@ -160,9 +163,9 @@ def test_a_robot_that_speeds_up_is_not_held() -> None:
 
 
 def test_one_long_displacement_does_not_prove_that_a_robot_is_held() -> None:
-    """Displacements of 0.1 s are zero, although motion is commanded. One may be due to a reversal.
+    """Motion is commanded, but a displacement over 0.1 s is zero. A reversal may be the cause.
 
-    Only a second one directly after it proves that the robot is held.
+    So only a second displacement of zero, directly after the first, proves that the robot is held.
     """
     wind_up = WindUp()
     wind_up.follow(AT_REST, 0.1, [FORWARD], heading_known=True)

@@ -18,7 +18,7 @@ Triple = tuple[float, float, float]
 
 
 class Drive:
-    """A motion monitor whose robot has been at rest for two seconds."""
+    """A motion monitor. Its robot has been at rest for two seconds."""
 
     def __init__(self) -> None:
         self.monitor, self.now = MotionMonitor(), 100.0
@@ -121,9 +121,9 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot that is 25 % too fast causes no fault.
+    """A robot is 25 % too fast or too slow. If it is too fast, the monitor finds no fault.
 
-    One that is too slow causes at most "blocked".
+    If it is too slow, the only possible fault is "blocked".
     """
     drive = Drive()
     drive.command(*commanded)
@@ -219,7 +219,8 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second()
 def test_what_a_held_robot_has_lost_it_may_catch_up() -> None:
     """A robot that should drive at 0.4 m/s is held for 1 s, so it falls 0.4 m behind.
 
-    Afterwards it may move too fast until it has made up for this distance. Then this is a fault.
+    When it is released, it may be too fast until it has made up for this distance. After that, too
+    high a speed is a fault.
     """
     drive = Drive()
     drive.command(0.4, 0.0, 0.0)
@@ -243,9 +244,9 @@ def test_what_was_pushed_while_it_stood_may_come_back() -> None:
 
 
 def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
-    """A robot at rest, which has obeyed Stop, is pushed for a long time.
+    """A robot that has obeyed Stop is pushed for a long time. The monitor reports repeated faults.
 
-    The monitor reports faults at growing intervals. Each fault makes the driver send Stop.
+    The intervals between the faults grow. Each fault makes the driver send Stop.
     """
     times = [found_s for found_s, _ in Drive().move((0.3, 0.0, 0.0), 80.0)]
     assert times[0] <= 0.2
@@ -253,7 +254,7 @@ def test_the_stops_for_a_robot_that_is_pushed_get_rarer() -> None:
 
 
 def test_the_stops_for_a_robot_that_was_driven_and_goes_on_do_not_get_rarer() -> None:
-    """A driven robot misses Stop and drives on, but may receive a later Stop.
+    """A driven robot does not receive Stop and drives on. It may receive a later Stop.
 
     The monitor therefore reports a fault every 5 s. Each fault makes the driver send Stop.
     """
@@ -280,7 +281,10 @@ def test_how_a_stopped_robot_rolls_out_is_not_a_second_fault() -> None:
 
 
 def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -> None:
-    """Four rejected displacements in a row are a fault. A plausible one in between ends the row."""
+    """Four displacements in a row are rejected as impossible. This is a fault.
+
+    If a plausible displacement comes between them, there is no fault.
+    """
     drive = Drive()
     assert [drive.monitor.count_refused(count, drive.now) for count in range(4)] == [None] * 4
     drive.move(REST, PERIOD_S)
@@ -291,7 +295,10 @@ def test_four_displacements_in_a_row_that_no_robot_can_have_made_are_a_fault() -
 
 
 def test_a_fault_is_news_until_the_robot_has_obeyed() -> None:
-    """A fault is new only once, until the robot has obeyed a command. Then it is new again."""
+    """The same fault occurs repeatedly. It is new only the first time.
+
+    When the robot has obeyed a command in between, it is new again.
+    """
     drive = Drive()
     assert drive.monitor.is_news(Fault.BLOCKED)
     assert not drive.monitor.is_news(Fault.BLOCKED)
@@ -317,9 +324,9 @@ orders = st.lists(
 def test_a_robot_that_obeys_late_and_with_slip_never_trips(
     given_orders: list[tuple[Triple, int]], late_ticks: int, constant_s: float, scale: Triple
 ) -> None:
-    """Commands are random. The robot is up to 0.1 s late and has a time constant of up to 0.2 s.
+    """Commands are random. The robot obeys up to 0.1 s late, with a time constant of up to 0.2 s.
 
-    The monitor never trips.
+    The monitor finds no fault.
     """
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0

@@ -37,10 +37,10 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """Odometry sums all displacements along the robot's axes in ``rolled``.
+    """Odometry sums all displacements along the robot's axes (``rolled``), to compute wheel angles.
 
-    Each is taken as a constant twist, multiplied by its period. The wheel angles of the sum are
-    converted back to the same turn of the body.
+    Each displacement is the motion of a constant twist over its period. The wheel angles, converted
+    back, give the same turn of the body.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
@@ -92,10 +92,10 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
 def test_over_a_gap_the_angles_are_those_of_the_encoders(
     lost_s: float, off_rad: float, frame: str
 ) -> None:
-    """Displacements are lost in a drive. Odometry's wheel angles agree with the encoders again.
+    """Displacements are lost in a drive. Afterwards, the wheel angles of odometry are right again.
 
-    After a gap of up to 0.4 s, they are right within 0.12 rad. After 2 s in curves, the error is
-    larger, because the driver assumes the shortest path.
+    After a gap of up to 0.4 s, they agree with the encoders within 0.12 rad. After a gap of 2 s in
+    curves, the error is larger, because the driver assumes the shortest path.
     """
     for seed in range(3):
         line = Line(BoardSettings(seed=seed, frame=frame, running=True), seed=seed)

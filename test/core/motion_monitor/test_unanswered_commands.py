@@ -20,9 +20,9 @@ def bench() -> Bench:
 
 
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
-    """The board's switch is on position, so the robot does not obey velocities and does not move.
+    """The board's switch is set to position control, so the robot does not obey velocities.
 
-    The driver reports this once.
+    It does not move. The driver reports this once.
     """
     bench = started(BoardSettings(running=True, control="position"), control="velocity")
     for _ in range(10):
@@ -55,7 +55,10 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
 
 
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
-    """The line to the board is cut twice, and the robot obeys in between. Two notices appear."""
+    """The line to the board is cut twice, so the robot does not obey. In between, it obeys.
+
+    A notice appears each time.
+    """
     bench = standing()
     for hears in (False, True, False):
         bench.hears = hears
@@ -122,7 +125,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
 
 
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
-    """A robot is pushed for long. The driver sends Stop at once, and then ever more rarely.
+    """A robot is pushed for a long time. The driver sends Stop at once, and then ever more rarely.
 
     After the push, the robot obeys commands.
     """

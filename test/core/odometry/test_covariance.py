@@ -41,7 +41,7 @@ def minors(c: Covariance) -> Triple:
 
 @given(st.lists(displacements("body"), max_size=60))
 def test_the_covariance_is_positive_definite_and_grows(readings: list[DisplacementReading]) -> None:
-    """The determinant of the covariance and the variance of yaw never decrease."""
+    """With each displacement, the covariance's determinant and the variance of yaw grow or stay."""
     odometry = Odometry(OdometrySettings(noise=OdometryNoise(wheel_scale=0.0, wheel_slip=0.0)))
     before = Covariance()
     for reading in readings:
@@ -148,8 +148,8 @@ def test_an_error_of_a_wheels_size_grows_with_the_way_and_a_way_back_undoes_it()
 def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None:
     """Forty simulated robots drive with wheel sizes wrong by 1 % and slip of 2 %.
 
-    The mean of the normalised squared errors is about 3, so the covariance is right. For 40 drives,
-    95 % of the means are from 2.29 to 3.80.
+    The mean of their normalised squared errors (NEES) is about 3, so the covariance is right. The
+    test allows 2.29 to 3.80, the range of 95 % of such means.
     """
     total = 0.0
     for seed in range(40):
@@ -165,7 +165,7 @@ def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None
 
 
 def squared(off: Pose, estimate: OdometryEstimate) -> float:
-    """Return the normalised squared error (NEES) of a pose that is wrong by ``off``."""
+    """Return the normalised squared error (NEES) of an estimate whose error is ``off``."""
     c = estimate.covariance
     rows = [
         [c.xx, c.xy, c.x_yaw, off.x_m],
@@ -183,9 +183,9 @@ def squared(off: Pose, estimate: OdometryEstimate) -> float:
 
 
 def test_settling_removes_nothing_but_the_gap() -> None:
-    """The board computes its pose from the wheels, so this pose has the wheels' drift, too.
+    """The board computes its pose from the wheels, so this pose contains the errors of the wheels.
 
-    A pose that ends no gap therefore does not lower the covariance.
+    A pose that does not end a gap therefore does not reduce the covariance.
     """
     odometry = attached(OdometrySettings(noise=OdometryNoise(wheel_drift=0.01)))
     ahead = DisplacementReading(0.02, 0.0, 0.0, "earth", PERIOD_S, 0)

@@ -75,9 +75,9 @@ def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(
 
 @given(st.lists(small_moves, min_size=1, max_size=40), axis_signs)
 def test_body_deltas_need_no_pose(moves: list[Pose], signs: tuple[int, int, int]) -> None:
-    """The board sends deltas in the body's axes.
+    """The board sends deltas in the body's axes. They are added up without a pose of the board.
 
-    Such deltas need no pose, so each is published at once.
+    Each delta is published at once.
     """
     odometry, trip = Odometry(SETTINGS, signs), Trip(1.0, signs)
     for move in moves:
@@ -114,7 +114,7 @@ def test_every_delta_gives_one_estimate_with_its_own_stamp() -> None:
 
 
 def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odometry]:
-    """Drive curves for 12 s through the protocol, then stop. Return estimates and odometry."""
+    """Drive the board in curves for 12 s, then stop. Return all estimates and the odometry."""
     settings_ = board.settings
     bot = OmniBot(OmniBotSettings(delta_frame=settings_.frame))
     odometry, estimates, random = Odometry(SETTINGS), [], Random(seed)

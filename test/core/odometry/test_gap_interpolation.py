@@ -11,7 +11,7 @@ from omnibot_driver.core.readings import DisplacementReading
 
 
 def after(lost: int, dx_m: float, duration_s: float | None = PERIOD_S) -> DisplacementReading:
-    """Return a displacement straight ahead that comes after ``lost`` missing ones."""
+    """Return a displacement straight ahead, before which ``lost`` displacements are missing."""
     return DisplacementReading(dx_m, 0.0, 0.0, "body", duration_s, lost)
 
 
@@ -28,7 +28,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 
 
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
-    """Displacements of ten seconds are missing. Only the motion of two seconds is estimated.
+    """Displacements of ten seconds are missing. Only two seconds of motion are estimated for them.
 
     A robot that is silent for longer is stopped by the driver.
     """
@@ -42,7 +42,7 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
     """The robot drives an even curve, and displacements in the earth's axes are missing.
 
-    The gap is filled exactly.
+    The estimated motion of the gap is exact.
     """
     bridge, trip = GapInterpolation(), Trip(0.7)
     bridge.tangents(trip.move(0.02, 0.01, 0.1), 0.7)
@@ -59,9 +59,9 @@ def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
 
 
 def test_what_took_an_unknown_time_is_not_a_side_of_a_gap() -> None:
-    """A displacement has an unknown duration, as after a pause.
+    """A displacement has an unknown duration, as after a pause, so its speed is unknown.
 
-    It is not used to fill the next gap.
+    It is not used to estimate the motion in a gap.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that an IMU frame is returned with the packet that completes it, with any adapter.
+"""Tests that an IMU frame is returned as soon as the packet arrives that completes it.
 
-If an IMU frame ends like a header, the arrival times show whether another frame is due.
+The tests use adapters that send in different packets. If an IMU frame ends like a header, the
+arrival times show whether another frame is due.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,7 +24,7 @@ IMU_LENGTH = 14
 DRIFT = 1.0002
 """Rate of the adapter's clock, relative to the board's clock.
 
-The rates differ, so the adapter's packets end at all phases of a tick, one after the other.
+Because of the difference, the adapter's packets end in turn at all phases of a tick.
 """
 
 Handed = Iterator[tuple[float, bytes]]
@@ -71,7 +72,10 @@ def behind_timer(timer_s: float) -> Handed:
 def test_hardly_a_frame_waits_for_the_next_packet(
     adapter: Callable[[], Handed], waits: float
 ) -> None:
-    """An IMU frame waits only if a delta may follow it, or if the adapter splits the frame."""
+    """Hardly any IMU frame waits for the next packet of an adapter.
+
+    It waits only if a delta may follow it, or if the adapter splits the frame.
+    """
     board = OmniBot(OmniBotSettings())
     ends: list[int] = []
     sent = 0
@@ -91,9 +95,9 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
-    """The line loses a byte. The decoder does not trust the line for the next ten seconds.
+    """The line loses a byte. In the next ten seconds, the decoder does not regard the line as calm.
 
-    Its attribute ``calm`` is false in this time.
+    So it needs more evidence before it accepts a frame.
     """
     decoder = FrameDecoder()
     lost_s, calm = 1.0, {}

@@ -101,15 +101,15 @@ def test_imu_counts_are_scaled_by_the_ranges_of_the_settings() -> None:
 
 
 def test_a_text_says_that_the_board_is_paused() -> None:
-    """A paused text becomes a paused reading, without the number that is in the text."""
+    """The board sends the text «Paused: i». It becomes a paused reading without the number i."""
     assert readings(bot(), PausedFrame(3)) == [PausedReading()]
 
 
 @pytest.mark.parametrize("data", [REST, moved(0), PoseFrame(0.0, 0.0, 0.0, 0)], ids=str)
 def test_a_text_goes_on_from_one_right_before_it_alone(data: Frame) -> None:
-    """A paused text directly after another one shows that the board stayed paused.
+    """Two «Paused» texts come directly one after the other, so the board stayed paused.
 
-    If data comes between the two texts, the board ran, and may have restarted.
+    If data comes between them, the board has run in between, and may have restarted.
     """
     texts = readings(bot(), *map(PausedFrame, (255, 0, 2)))
     assert texts == [PausedReading(), PausedReading(continues=True), PausedReading()]
@@ -150,9 +150,9 @@ def lost(board: OmniBot, *sent: Frame) -> list[int]:
 
 @given(st.integers(0, 255), st.integers(0, 2000))
 def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, gap: int) -> None:
-    """Deltas are lost, and their counter SEQ, which is one byte, may wrap several times.
+    """Deltas are lost. Their counter SEQ has one byte, and may wrap several times in the gap.
 
-    The arrival times show how often. All lost deltas are counted.
+    The arrival times show how often it has wrapped. All lost deltas are counted.
     """
     board = bot()
     readings(board, moved(start))
@@ -162,7 +162,7 @@ def test_missing_counts_are_lost_frames_across_any_number_of_wraps(start: int, g
 
 
 def test_seconds_of_the_line_in_one_read_are_neither_a_restart_nor_a_wrap() -> None:
-    """Each of two reads has seconds of data, in which SEQ wraps. Three deltas between are lost.
+    """Two reads have seconds of data each, in which SEQ wraps. Three deltas between them are lost.
 
     Exactly three deltas are counted as lost, and no restart is reported.
     """
@@ -181,7 +181,7 @@ def test_a_regular_sequence_has_no_losses() -> None:
 
 
 def test_the_first_delta_has_lost_nothing() -> None:
-    """The first delta of a connection, or after a pause, has any count.
+    """A delta is the first one of a connection or after a pause. It may have any count.
 
     No delta is counted as lost.
     """
@@ -220,9 +220,10 @@ def test_stop_and_emergency_stop_are_the_manuals() -> None:
 
 
 def test_waking_is_eight_zeros_and_stop() -> None:
-    """To wake the board, the driver sends zeros and Stop.
+    """To wake the board, the driver sends eight zeros and Stop.
 
-    The zeros complete a command that was cut, and have no meaning as letters.
+    The zeros complete a command that was cut off. They are not letters (S, P, R), so they have no
+    other effect.
     """
     assert joined(bot().wake()) == STOP
 
@@ -240,7 +241,7 @@ def test_start_is_s_in_every_mode(mode: Mode) -> None:
 
 @pytest.mark.parametrize("mode", Mode)
 def test_pause_is_stop_and_p_where_the_board_runs_and_else_refused(mode: Mode) -> None:
-    """To pause a running board, the driver sends Stop and P. In any other mode, it refuses.
+    """To pause a running board, the driver sends Stop and P. In any other mode, it refuses this.
 
     P is a toggle, so it would start a board that does not run.
     """
@@ -285,9 +286,9 @@ def test_a_new_line_does_not_finish_what_the_old_one_began() -> None:
 
 
 def test_a_frame_that_waited_comes_out_at_the_end() -> None:
-    """A frame that ends in FF is held until the next byte comes.
+    """A frame ends in FF, which may begin a header. It is held until the next byte comes.
 
-    At the end of the connection it is returned.
+    If the connection ends before, the frame is returned.
     """
     board = bot()
     board.receive(encode(REST) * 2, 0.0)

@@ -56,7 +56,7 @@ def test_the_scales_are_those_of_the_settings() -> None:
 def test_wheel_rates_are_rim_speeds_in_the_linear_unit() -> None:
     """A wheel is commanded to turn at 10 rad/s. With a radius of 29 mm, its rim moves at 0.29 m/s.
 
-    The frame has mode 2 and this rim speed in LSB, 20.
+    The frame has mode 2. It contains the speed of the rim, which is 20 LSB.
     """
     assert bare(encoder().wheels((10.0, -10.0, 1.0))) == bytes.fromhex("FF FE 02 00 14 FF EC 00 02")
     wide = encoder(wheel_radius_m=0.058)
@@ -72,9 +72,9 @@ def test_commands_are_rounded_to_the_nearest() -> None:
 
 @given(twists)
 def test_a_velocity_that_rounds_to_nothing_is_the_stop_frame(twist: BodyTwist) -> None:
-    """A velocity is so small that all its words round to zero. The driver sends Stop.
+    """A velocity is so small that all its words round to zero. The driver sends Stop instead.
 
-    If the board's switch is on "position", zeros in mode 1 would send the robot to the origin.
+    Zeros in mode 1 would be a goal pose, the origin, if the board's switch is on "position".
     """
     command = bare(encoder().velocity(twist))
     assert command != bytes.fromhex("FF FE 01 00 00 00 00 00 00")
@@ -140,7 +140,7 @@ def test_a_pose_that_does_not_fit_the_line_is_refused_and_not_another_place(
 ) -> None:
     """A goal is farther than 32.77 m or rad, the limit of a 16-bit word. The driver refuses it.
 
-    A limited goal would be another place.
+    If the driver limited the values, the robot would drive to another place.
     """
     values = [0.0, 0.0, 0.0]
     values[place] = far

@@ -12,9 +12,10 @@ IMU = ImuFrame((250, -130, -16380), (1, 2, 3))
 
 
 def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
-    """Return the decoder's state after a pose with a heading of 100 mrad and then these deltas.
+    """Return what the decoder knows after a pose with a heading of 100 mrad, and deltas after it.
 
     ``turns``: turns of the deltas, in 0.1 mrad.
+
     ``seqs``: counters of the deltas.
     """
     context = NOTHING_KNOWN
@@ -32,9 +33,9 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five deltas turn by 5 mrad in all. The next pose may differ from this by a rounding error.
+    """Five deltas turn by 5 mrad in all. The heading of the next pose differs from the sum.
 
-    A larger difference has a cost.
+    A difference that rounding explains has no cost. A larger difference has a cost.
     """
     context = after_a_cycle([10] * 5, [10, 11, 12, 13, 14])
     cost, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, theta_mrad, 2), context)
@@ -44,7 +45,7 @@ def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
 def test_a_pose_after_a_lost_delta_contradicts_nothing() -> None:
     """A delta is lost before a pose, so it is unknown how far the robot has turned.
 
-    The heading of the pose does not change the cost.
+    No heading of the pose can contradict the deltas, so all headings have the same cost.
     """
     context = after_a_cycle([10] * 5, [10, 11, 13, 14, 15])
     near, _ = EXPECTATION.weigh(PoseFrame(0.0, 0.0, 105.0, 2), context)

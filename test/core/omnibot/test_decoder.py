@@ -77,9 +77,9 @@ def test_in_step_any_content_is_delivered_in_any_chunks(
 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
-    """A frame of an undamaged stream is returned with its last byte.
+    """A frame of an undamaged stream is returned as soon as its last byte arrives.
 
-    It waits only if its values jump, or if its last byte may begin a header.
+    There are two exceptions: its values jump, or its last byte may begin a header.
     """
     made, found, complete = FrameDecoder(), 0, 0
     last = REST
@@ -103,7 +103,7 @@ def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
 def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataObject) -> None:
     """The content of a frame looks like damage.
 
-    The frame is returned when two good frames follow it.
+    The frame is returned at the latest when two good frames have followed it.
     """
     made, content = FrameDecoder(), encode(odd) + LEAD_IN + encode(REST)[:2]
     assert made.feed(LEAD_IN, 0.0) == [REST, REST]
@@ -135,7 +135,10 @@ def test_a_knock_right_before_a_silence_is_delivered() -> None:
 
 
 def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
-    """A doubtful frame waits only for the first byte of the next frame, not for the rest of it."""
+    """A frame is doubtful, because its last byte may begin a header.
+
+    It is returned with the first byte of the next frame, not only with the rest of that frame.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -146,8 +149,8 @@ def test_a_doubtful_frame_comes_out_with_the_first_byte_of_the_next() -> None:
 def test_where_pauses_tell_only_a_frame_that_another_may_follow_waits() -> None:
     """An IMU frame ends with FF FB or FF FC, which could also be the header of the next frame.
 
-    The pauses between ticks show which frames are due. The IMU frame waits only in ticks with a
-    delta.
+    The pauses between ticks (10 ms) show which frames are due. So the IMU frame waits only in ticks
+    in which a delta is due.
     """
     made, waited = FrameDecoder(), []
     for tick in range(60):
@@ -214,7 +217,10 @@ def test_a_robot_on_a_slope_is_not_misread_for_ever(
 
 
 def test_one_whole_text_is_enough_to_believe() -> None:
-    """Paused texts come only once a second, so the decoder accepts the first complete one."""
+    """At the beginning of a stream, a complete «Paused» text comes. The decoder accepts it at once.
+
+    It does not wait for a second text, which would come only a second later.
+    """
     assert FrameDecoder().feed(b"used: 3 \nPaused: 4 \n", 0.0) == [PausedFrame(4)]
 
 
@@ -229,7 +235,7 @@ def test_two_frames_with_nonsense_behind_them_are_not_believed() -> None:
 
 @pytest.mark.parametrize("start", range(12))
 def test_a_paused_board_is_understood_from_the_first_whole_text(start: int) -> None:
-    """Decoding starts anywhere within a paused text. All complete texts are returned."""
+    """Decoding starts within a «Paused» text. All later texts, which are complete, are returned."""
     texts = [b"Paused: 7 \n", b"Paused: 8 \n", b"Paused: 9 \n"]
     found = decoded([texts[0][start:], *texts[1:]], step_s=1.0)
     assert found == [PausedFrame(n) for n in (7, 8, 9)][start > 0 :]
@@ -266,9 +272,9 @@ def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> 
 
 
 def test_a_pose_is_read_in_the_byte_order_asked_for() -> None:
-    """The manual does not make the byte order of poses clear, so it is a setting.
+    """The byte order of poses is a setting, because the manual does not make it clear.
 
-    The decoder uses it.
+    The decoder uses the setting.
     """
     pose = PoseFrame(1000.0, -2.5, 1.0, 9)
     for order in ("big", "little"):

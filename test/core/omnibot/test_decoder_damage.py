@@ -39,7 +39,9 @@ def assert_back_in_step(
 ) -> None:
     """Check that no frame is false, and that only frames near the damage are missing.
 
-    ``hurt``: numbers of the frames that the damage changed or split.
+    ``hurt``: numbers of the frames that the damage has changed or split.
+
+    ``place``: position of the damage, for the message.
     """
     truth = [frame for _, frame in sent]
     assert is_subsequence(found, truth), f"a false frame came out: damage at {place}"
@@ -65,9 +67,9 @@ def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
-    """A frame has lost one byte.
+    """A frame has lost one byte, and is not returned.
 
-    It is not returned, and the decoder is in step again within two frames.
+    The decoder finds the true frames again within two frames.
     """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
@@ -85,9 +87,9 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("extra", [0x00, 0x50, 0x7E, 0xFA, 0xFB, 0xFC, 0xFF])
 def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: int) -> None:
-    """A byte is inserted into a stream.
+    """A byte is inserted into a stream. At most one false frame is returned.
 
-    Then the decoder is in step again, after at most one false frame.
+    Afterwards, the decoder is in step again: it finds the true frames.
     """
     stream = b"".join(ticks_of(name)[:80])
     sent = frames_of(stream)
@@ -134,9 +136,10 @@ def test_bytes_between_two_frames_cost_at_most_the_one_before_them(extra: bytes)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(name: str) -> None:
-    """A frame has lost a byte, and the first byte of the next header seems to complete it.
+    """A frame has lost a byte. The first byte of the next header seems to complete it.
 
-    The second byte of the header shows the error. The frame is not returned.
+    The second byte of the header then does not fit, which shows the error. The frame is not
+    returned.
     """
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
@@ -158,7 +161,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
 def test_rubbish_between_frames_costs_a_few_frames_only(
     pieces: list[Frame | bytes], data: st.DataObject
 ) -> None:
-    """After any frames and noise, six ordinary frames come. Then the decoder is in step."""
+    """Any frames and noise come, then six ordinary frames. Afterwards, the decoder is in step."""
     stream = b"".join(piece if isinstance(piece, bytes) else encode(piece) for piece in pieces)
     made = FrameDecoder()
     for chunk in data.draw(chunkings(stream)):
@@ -174,7 +177,7 @@ def test_rubbish_between_frames_costs_a_few_frames_only(
 @pytest.mark.parametrize("count", [0, 42, 255])
 @pytest.mark.parametrize("ends", ["text", "data"])
 def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> None:
-    """A paused text comes after frames, and a read ends anywhere within it.
+    """The board sends the text «Paused: i» after frames, and a read ends anywhere within it.
 
     The text is returned.
     """
@@ -189,9 +192,9 @@ def test_a_text_between_frames_may_be_cut_anywhere(count: int, ends: str) -> Non
 
 @pytest.mark.parametrize("place", [*range(8), 9, 10])
 def test_a_damaged_text_does_not_come_out(place: int) -> None:
-    """A paused text has lost one character. The text is not returned.
+    """A «Paused: i» text has lost one character. The text is not returned.
 
-    There is one exception: the blank before the line feed may be missing.
+    There is one exception: only the blank before the line feed is missing.
     """
     text = b"Paused: 7 \n"
     hurt = text[:place] + text[place + 1 :]
@@ -220,9 +223,9 @@ def test_a_partial_frame_before_a_silence_swallows_nothing(length: int) -> None:
 
 @pytest.mark.parametrize("length", range(1, 14))
 def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: int) -> None:
-    """The board reboots within a frame.
+    """The board reboots while it sends a frame.
 
-    Its first paused text after the boot is returned at once.
+    The «Paused» text, which it sends first after the boot, is returned at once.
     """
     made = FrameDecoder()
     made.feed(LEAD_IN + encode(REST)[:length], 0.0)
@@ -232,7 +235,10 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
-    """The reader is late, not the line. The bytes that waited complete the frame that was cut."""
+    """The reader is late in the middle of a frame. Bytes wait, but none are lost.
+
+    They complete the frame, so no frame is lost.
+    """
     ticks = ticks_of(name)
     stream = b"".join(ticks[: round(1 + late_s / TICK_S) + 40])
     sent = [frame for _, frame in frames_of(stream)]
@@ -248,7 +254,10 @@ def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:
 
 
 def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> None:
-    """A silence follows a doubtful frame, so nothing contradicts the frame, and it is returned."""
+    """A frame ends in FF, which may begin a header, and waits. After a silence, more bytes come.
+
+    The silence shows that the FF belongs to the frame. The frame is returned before the next one.
+    """
     made = FrameDecoder()
     made.feed(LEAD_IN, 0.0)
     doubtful = DeltaFrame(1, 2, 3, 255)
@@ -257,9 +266,9 @@ def test_a_doubtful_frame_before_a_silence_comes_out_before_what_follows() -> No
 
 
 def test_flush_tells_what_can_still_be_told() -> None:
-    """If the decoder is in step, ``flush`` returns a complete frame that was held.
+    """A complete frame was held. If the decoder is in step, ``flush`` returns this frame.
 
-    A partial frame is never returned.
+    An incomplete frame is never returned.
     """
     doubtful = DeltaFrame(1, 2, 3, 255)
     in_step = FrameDecoder()

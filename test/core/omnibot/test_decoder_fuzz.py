@@ -80,9 +80,9 @@ def test_all_frames_between_silences_come_in_any_chunks(
 
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
-    """A calm frame fits the one before it.
+    """Calm frames come: the content of each fits that of the frame before it.
 
-    Only a last byte that may begin a header makes it wait.
+    Each is returned with its last byte, unless this byte may begin a header.
     """
     made, came = FrameDecoder(), 0
     made.feed(REST * 2, 0.0)
@@ -97,9 +97,9 @@ def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
 
 @pytest.mark.parametrize("word", [-6, -5, -4])
 def test_in_free_fall_only_a_look_alike_of_a_header_is_lost(word: int) -> None:
-    """A robot in free fall sends an IMU frame with an acceleration of -6, -5 or -4.
+    """A robot in free fall sends an IMU frame with an acceleration word of -6, -5 or -4.
 
-    The bytes of -6 look like a header. Below 0.5 g only a frame with -6 is lost.
+    The bytes of -6 look like a header. Only the frame with -6 is lost, and only below 0.5 g.
     """
     made, fall = FrameDecoder(), ImuFrame((word, 3, 900), (1, 2, 3))
     found = made.feed(REST * 2 + encode(fall) + REST * 4, 0.0) + made.flush(1.0)
@@ -130,9 +130,10 @@ ADVERSARIES = {
 def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[list[int], int]:
-    """Return the work up to the end of each chunk, beginning with 0, and the most bytes held.
+    """Return how much work the decoder has done after each chunk, and the most bytes held.
 
-    The unit of the work is one byte or one trellis edge that the decoder examines.
+    The list of work begins with 0. A unit of work is one byte or one edge of the search graph that
+    the decoder examines.
     """
     done, measure, forward = 0, decoder.measure, trellis._Search._forward
 
@@ -165,9 +166,10 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
 ) -> None:
-    """A pattern that is hard to decode is repeated.
+    """A pattern of bytes that is hard to decode is repeated. The work grows only in proportion.
 
-    The last third of the stream costs about as much work as the second third.
+    So the last third of the stream costs about as much work as the second third. The decoder holds
+    fewer bytes than its limit.
     """
     stream = pattern * (THIRD // len(pattern))
     if chunk_length < THIRD:

@@ -101,9 +101,10 @@ def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s
 
 
 def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_10_hz() -> None:
-    """At 10 Hz, frames have no cost if ten IMU frames precede a delta, and two deltas a pose.
+    """Frames come in the order that is usual at the set rate of deltas. This order has no cost.
 
-    At 25 Hz, this is true for four IMU frames and five deltas.
+    At 10 Hz, ten IMU frames come before a delta, and two deltas before a pose. At 25 Hz, it is four
+    IMU frames and five deltas.
     """
     delta, pose = DeltaFrame(0, 0, 0, 8), PoseFrame(0.0, 0.0, 0.0, 5)
     last = PoseFrame(0.0, 0.0, 0.0, 4)
@@ -118,7 +119,7 @@ def test_ten_imu_frames_to_a_delta_and_two_deltas_to_a_pose_are_on_the_beat_at_1
 
 @EVERY_PERIOD
 def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
-    """A delta at 9.9 m/s is possible, and one at 10.1 m/s is not, whatever the delta period."""
+    """At any delta period, a delta at 9.9 m/s is possible, and a delta at 10.1 m/s is not."""
     expectation = Expectation(16384.0, Schedule(period_s))
     for speed_mps, possible in ((9.9, True), (10.1, False)):
         delta = DeltaFrame(round(speed_mps * period_s * 1e4), 0, 0, 8)
@@ -127,9 +128,10 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 
 @EVERY_PERIOD
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
-    """Each delta is rounded by up to 0.05 mrad, all in the same direction.
+    """Each delta is rounded by up to 0.05 mrad in the same direction, so the errors add up.
 
-    The sum of these errors does not contradict the next pose. An error of twice this size does.
+    The next pose differs from the deltas by this sum. The difference has no cost, but one of more
+    than twice this size has.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose
@@ -161,7 +163,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_lost_delta_is_bridged_and_settled() -> None:
-    """Deltas are lost at 10 Hz. A pose follows every second delta, and shows the lost motion.
+    """Deltas are lost at 10 Hz. A pose, which follows every second delta, shows their motion.
 
     Odom is right again.
     """
@@ -176,7 +178,7 @@ def test_a_lost_delta_is_bridged_and_settled() -> None:
 
 @EVERY_PERIOD
 def test_sequence_counts_what_is_lost_in_this_period(period_s: float) -> None:
-    """Deltas are lost, and SEQ may wrap several times in the gap.
+    """Deltas are lost, and their counter SEQ may wrap several times in the gap.
 
     The lost deltas are counted correctly.
     """

@@ -49,9 +49,9 @@ def test_a_damaged_pose_is_not_an_imu_frame() -> None:
 
 
 def test_an_imu_frame_before_a_pose_is_told_with_the_frame_after_it() -> None:
-    """An IMU frame is lost before a pose.
+    """An IMU frame is lost before a pose. The schedule cannot count it when the pose comes.
 
-    The schedule counts it when the frame after the pose comes.
+    It counts the loss when the frame after the pose comes.
     """
     rhythm = nominal(0)
     for _ in range(4):

@@ -102,7 +102,7 @@ def test_each_frame_table_is_laid_out_as_in_the_manual(
 def test_the_pose_may_be_little_endian() -> None:
     """The manual does not make clear in which order the bytes of a pose's floats come.
 
-    A setting selects the order with the least significant byte first.
+    A setting selects that the least significant byte comes first.
     """
     typed = bytes.fromhex("FF FC 00 00 7A 44 00 00 20 C0 00 00 80 3F 09")
     frame = PoseFrame(1000.0, -2.5, 1.0, 9)
@@ -112,7 +112,7 @@ def test_the_pose_may_be_little_endian() -> None:
 
 @pytest.mark.parametrize("count", [0, 7, 42, 255])
 def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
-    """The paused text is «Paused: i», with a space before the line feed.
+    """The board's text is «Paused: i», with a space before the line feed.
 
     The number i is a uint8.
     """
@@ -128,9 +128,9 @@ def test_the_paused_text_is_the_one_of_the_manual(count: int) -> None:
 
 @pytest.mark.parametrize("text", [b"Paused: 3\n", b"Paused: 3 \r\n", b"Paused: 3\r\n"])
 def test_a_paused_text_with_other_blanks_is_understood(text: bytes) -> None:
-    """A paused text may end with other white space than in the manual.
+    """A «Paused: i» text ends with other white space than in the manual. It is still decoded.
 
-    Firmware may differ in this.
+    Another version of the firmware may send it.
     """
     assert decode(text) == PausedFrame(3)
 

@@ -38,9 +38,9 @@ def stopped(
 ) -> Reads:
     """Yield the reads of a reader that stops once, for ``stop_s``, after ``place`` bytes.
 
-    ``most``: maximum bytes in a read.
+    ``most``: largest number of bytes in a read.
 
-    ``piece``: bytes in each read before the stop.
+    ``piece``: number of bytes in each read before the stop.
     """
     data, times = arrivals(ticks)
     at, now = 0, 0.0
@@ -134,7 +134,7 @@ def test_any_content_comes_through_a_reader_that_is_always_late(
 
 @pytest.mark.parametrize("place", range(1, 11))
 def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
-    """A reader stops within the last frame and within the paused text after it.
+    """A reader stops within the last frame, or within the «Paused» text that follows.
 
     The frame and the text are returned.
     """
@@ -152,9 +152,9 @@ def test_a_text_whose_reader_was_stopped_comes_out(place: int) -> None:
 
 
 def test_pieces_that_straddle_a_silence_are_read() -> None:
-    """An adapter delivers pieces of 8 bytes, which may hold parts of two paused texts.
+    """An adapter delivers pieces of 8 bytes. A piece may contain parts of two «Paused» texts.
 
-    The board was silent between these texts. All texts are returned.
+    The board was silent between these texts. All texts are returned nevertheless.
     """
     made, found = FrameDecoder(), []
     texts = b"".join(b"Paused: %d \n" % n for n in range(5))
@@ -210,9 +210,9 @@ LATE_ENDS = {
         ),
     ],
 }  # fmt: skip
-"""For each case, the reads after the first two bytes of a delta.
+"""For each case, the reads that bring the end of a delta, after its first two bytes.
 
-A read is the time in ms since the read before, and the bytes.
+A read is the time in ms since the read before, and its bytes.
 """
 
 

@@ -42,7 +42,10 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
 
 def test_a_short_gap_is_bridged_at_once() -> None:
-    """All frames are lost for 0.12 s. The motion before and after fills the gap, within 2 mm."""
+    """All frames are lost for 0.12 s. The motion of the gap is estimated at once, within 2 mm.
+
+    It is interpolated between the motion before and after.
+    """
     for seed in range(5):
         on = line(seed)
         lose(on, 0.12)
@@ -79,9 +82,10 @@ def test_while_frames_are_lost_at_random_odom_stays_near_and_settles(rate: float
 @pytest.mark.parametrize("lost", [1, 5, 10, 20, 25, 26, 40, 100, 250])
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str) -> None:
-    """Frames are lost. Afterwards no step of odom is faster than 2 m/s or 8 rad/s.
+    """Frames are lost. Afterwards, no step of odom is faster than 2 m/s or 8 rad/s.
 
-    The first step has the motion and the duration of the whole gap.
+    The first step is not faster either: it contains the motion of the whole gap, over its whole
+    duration.
     """
     for seed in range(5):
         on = line(seed, frame=frame)
@@ -204,7 +208,8 @@ def test_without_the_boards_pose_gaps_are_bridged_and_stay_open() -> None:
 def test_a_gap_that_ends_with_a_pose_is_bridged_once(phase: int, use_board_pose: bool) -> None:
     """Deltas are lost, and a pose arrives before the next delta.
 
-    Both show the motion of the lost deltas, which is added only once.
+    The pose shows the motion of the lost deltas, and the next delta shows that they are lost. Their
+    motion is added only once.
     """
     on = line(0, OdometrySettings(use_board_pose=use_board_pose))
     on.run(phase * PERIOD_S)
@@ -241,7 +246,7 @@ def moved(lost: int = 0) -> DisplacementReading:
     "bad", [(math.nan, 0.0, 0.0), (1e9, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.0, 1.0)]
 )
 def test_one_damaged_pose_moves_nothing(bad: tuple[float, float, float]) -> None:
-    """A damaged pose is not finite, is out of reach, or is not confirmed by the next pose.
+    """A pose is damaged: it is not finite, out of reach, or contradicted by the next pose.
 
     The odometry does not move.
     """
@@ -270,7 +275,8 @@ def test_a_reachable_surprise_is_taken_over_once_confirmed() -> None:
 
 
 losses = st.lists(st.tuples(st.integers(0, 60), st.integers(0, 7)), max_size=8)
-"""Patterns of losses: how many frames arrive, then how many are lost, again and again.
+"""Patterns of losses, as pairs that follow one another: how many frames arrive, then how many are
+lost.
 
 Only deltas and poses are counted.
 """
@@ -315,7 +321,10 @@ def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
 def test_any_readings_give_finite_estimates_and_never_a_certain_one(
     readings: list[DisplacementReading | PoseReading], use_board_pose: bool
 ) -> None:
-    """Any readings give finite estimates. The variances of x, y and yaw are at least 1e-6."""
+    """Any displacements and poses come. All estimates are finite.
+
+    The variances of x, y and yaw are at least 1e-6, so no estimate seems to be certain.
+    """
     odometry = Odometry(OdometrySettings(use_board_pose=use_board_pose))
     for number, reading in enumerate(readings):
         if isinstance(reading, PoseReading):

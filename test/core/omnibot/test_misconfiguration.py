@@ -158,7 +158,7 @@ def test_the_user_is_told_once_and_odom_goes_on_by_deltas() -> None:
 
 
 def test_poses_that_never_make_sense_leave_nothing_behind() -> None:
-    """No pose makes sense for a long time. The stored deltas do not grow without limit."""
+    """No pose is plausible for a long time. The list of stored deltas stays short."""
     suspicion = MisconfigurationChecks()
     zero, absurd = PoseFrame(0.0, 0.0, 0.0, 1), PoseFrame(1e-30, 1e-30, 1e-30, 1)
     suspicion.posed(zero, PoseReading(0.0, 0.0, 0.0), "big")

@@ -46,7 +46,7 @@ def test_nothing_is_believed_before_anything_is_heard() -> None:
 
 @pytest.mark.parametrize(("happening", "mode"), list(product(HEARD, Mode)))
 def test_the_table_is_total_over_what_is_heard(happening: Happening, mode: Mode) -> None:
-    """Any data may arrive in any mode, so the table has a result for each combination."""
+    """Any data may arrive in any mode, so the table has an entry for each combination."""
     made = tracker(mode)
     made.apply(happening)
     assert made.mode is TRANSITIONS[happening][mode]
@@ -69,7 +69,7 @@ def test_only_p_is_ever_refused() -> None:
     ids=["text", "delta", "pose"],
 )
 def test_one_frame_that_tells_the_mode_is_enough(mode: Mode, frame: Frame, heard: Mode) -> None:
-    """A single paused text, delta or pose determines the mode, whatever the mode before."""
+    """A single «Paused» text, delta or pose determines the mode, whatever the mode was before."""
     made = tracker(mode)
     made.hear(frame)
     assert made.mode is heard

@@ -28,13 +28,13 @@ def payload(a: int, b: int, c: int) -> bytes:
 
 
 def words_of(counts: list[float]) -> tuple[int, ...]:
-    """Return the words for ``counts``, scaled down by one factor if they do not fit 16 bits."""
+    """Return the 16-bit words for ``counts``. If they do not fit, all are scaled by one factor."""
     return nearest(*slow(counts, MAX_WORD))
 
 
 @given(st.tuples(COUNTS, COUNTS, COUNTS))
 def test_no_payload_holds_a_letter_or_a_header(counts: tuple[float, float, float]) -> None:
-    """No payload contains a letter or a header, whatever the command.
+    """For any command, no payload contains a letter (S, P, R) or a header.
 
     If the board misses a frame's header, it reads the payload as letters or as other frames.
     """

@@ -194,7 +194,7 @@ def test_the_false_frames_lie_at_their_offsets_and_do_not_deceive_the_decoder() 
 
 
 def test_the_parameters_that_carry_a_decision_exist_with_the_stated_defaults() -> None:
-    """The document has a table of parameters and defaults. The driver has the same defaults."""
+    """The document has a table of parameters and their defaults. They are the driver's defaults."""
     rows = re.findall(r"^\| `([a-z]\w+)` \| ([^|]+?) \|", DOCUMENT, re.MULTILINE)
     assert {name for name, _ in rows} == DECISIONS
     for name, value in rows:

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what the board's counters show: losses, wraps, pauses and restarts."""
+"""Tests of what the board's counters show: lost deltas, wraps, pauses and restarts."""
 
 import pytest
 from hypothesis import given
@@ -41,9 +41,9 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 
 @given(counts, st.floats(0.0, 1000.0))
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
-    """The board is paused and continues with the next count. No delta is lost.
+    """The board is paused, and then continues with the next count. No delta is lost.
 
-    The first delta's duration is unknown. A count of 0 after 255 is taken for a restart.
+    The duration of the first delta is unknown. A count of 0 after 255 is regarded as a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -53,9 +53,9 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
 
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
-    """After a pause, the count may show a restart or lost deltas of a board that ran on.
+    """After a pause, a count can mean a restart, or lost deltas of a board that ran on.
 
-    The explanation with fewer lost deltas is accepted. If both have equally many, it is a restart.
+    The explanation with fewer lost deltas is accepted. If the numbers are equal, it is a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -104,7 +104,10 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 
 @pytest.mark.parametrize("wraps", [0, 1, 3])
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
-    """A false delta with a count near zero looks like a restart. The next true delta refutes it."""
+    """A false delta has a count near zero, as after a restart. The next true delta refutes this.
+
+    The supposed restart is withdrawn, also if the counter has wrapped before.
+    """
     sequence = begun(88)
     passed = 1 + 256 * wraps
     assert sequence.delta(1, 100.02 + 10.24 * wraps, imus=1).restarted
@@ -113,7 +116,7 @@ def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
 
 
 def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_with_it() -> None:
-    """A pose comes after every fifth delta, so it shows that three deltas before it are lost.
+    """A pose comes after every fifth delta. The counter of a pose shows that three deltas are lost.
 
     The next delta does not count these losses again.
     """
@@ -129,9 +132,9 @@ def test_a_pose_tells_of_deltas_that_it_includes_once_five_were_seen_to_come_wit
 
 
 def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
-    """Twelve deltas are lost.
+    """Twelve deltas are lost, and two poses come in this gap. Each pose shows five lost deltas.
 
-    Two poses show five of them each, so the next delta counts only two.
+    So the next delta counts only two.
     """
     sequence = Sequence()
     for count in range(10):
@@ -144,9 +147,9 @@ def test_what_several_poses_told_of_one_gap_is_not_lost_again() -> None:
 
 
 def test_where_zero_fits_the_old_count_by_chance_the_pose_counter_tells_of_the_restart() -> None:
-    """The board restarts. By chance, the count 0 fits the last count 205 and 50 lost deltas in 2 s.
+    """The board restarts. By chance, its count 0 also fits the last count and the elapsed time.
 
-    The next pose has the count 0, too, which shows the restart.
+    The next pose also has the count 0, which shows the restart.
     """
     sequence = Sequence()
     for count in range(206):
@@ -173,9 +176,9 @@ def test_a_pose_of_another_rhythm_tells_nothing() -> None:
 
 
 def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
-    """The board's pose counter begins at 0 again. No pose is counted as lost.
+    """The board's pose counter begins at 0 again, after only 1 s. No pose is counted as lost.
 
-    In 1 s, too few poses can be lost for the counter to wrap.
+    For a wrap of the counter, more poses would have to be lost than the board sends in 1 s.
     """
     sequence = Sequence()
     for count in range(25):
@@ -186,9 +189,9 @@ def test_a_pose_counter_that_begins_anew_is_not_a_gap() -> None:
 
 
 def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
-    """After a reconnect, the count fits neither a restart nor a gap, so the board is another one.
+    """After a reconnect, the count fits neither a restart nor lost deltas: it is another board.
 
-    Another board is treated like a restart.
+    The result is the same as for a restart.
     """
     sequence = begun(7)
     sequence.reconnect()
@@ -196,9 +199,9 @@ def test_a_line_opened_again_on_another_board_is_as_good_as_a_restart() -> None:
 
 
 def test_a_count_that_comes_again_is_not_a_wrap() -> None:
-    """A false delta comes too early, and the next, true delta has the same count.
+    """A false delta comes too early. The true delta, with the same count, follows.
 
-    No delta is counted as lost.
+    The same count is not taken for a wrap: no delta is counted as lost.
     """
     sequence = begun(9)
     assert sequence.delta(10, 100.02, imus=2) == Step(0)
@@ -208,9 +211,9 @@ def test_a_count_that_comes_again_is_not_a_wrap() -> None:
 
 
 def test_a_count_far_ahead_of_the_time_is_believed_when_the_next_goes_on_from_it() -> None:
-    """The host's clock stands still while 100 deltas are lost, so the next count is far too high.
+    """The host's clock stops while 100 deltas are lost, so the next count seems far too high.
 
-    The driver counts the losses when the delta after that confirms the count.
+    The driver counts the losses only when the following delta confirms this count.
     """
     sequence = begun(9)
     assert sequence.delta(110, 100.04, imus=4) == Step(0)
@@ -230,9 +233,9 @@ def test_a_delta_that_framing_made_up_does_not_begin_the_count_anew() -> None:
 
 
 def test_a_count_that_a_pose_has_told_of_needs_no_time() -> None:
-    """A pose that the decoder held back shows that a delta was lost. The next delta comes at once.
+    """A delta is lost. The decoder returns the next pose and delta late and almost together.
 
-    The lost delta is not counted again.
+    The pose shows the lost delta, so the next delta does not count it again.
     """
     sequence = Sequence()
     for count in range(11):

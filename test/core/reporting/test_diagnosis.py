@@ -154,7 +154,7 @@ def test_a_board_of_which_a_line_is_missing_is_not_said_to_be_silent() -> None:
 
 
 def test_what_only_a_board_has_to_show_stands_with_its_mode() -> None:
-    """A board has its own diagnostic values, such as a version and the rate of its odometry.
+    """A board has further diagnostic values, for example a version and its own odometry rate.
 
     The diagnostics show these values.
     """
@@ -249,7 +249,7 @@ def test_a_skew_that_no_crystal_has_is_told_once_it_has_lasted() -> None:
     ],
 )
 def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str, Level]) -> None:
-    """The board is in some state other than nominal. Statuses without data are stale.
+    """The board is in some state other than nominal. Statuses without data have the level "stale".
 
     In IMU-only mode, displacements are not expected.
     """
@@ -262,9 +262,9 @@ def test_every_state_of_the_board_has_its_verdicts(state: str, levels: dict[str,
 
 
 def test_a_board_that_has_just_begun_to_send_is_given_time() -> None:
-    """A board has just begun to send data. It is not called too slow.
+    """A board has just begun to send data. The diagnostics do not report too low a rate.
 
-    Rates are counted only within the present state.
+    Only data of the present state is used to compute a rate.
     """
     robot = Robot()
     robot.set(state="paused")

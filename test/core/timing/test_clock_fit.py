@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the fitted clock, with artificial bounds of the ticks' times."""
+"""Tests of the fitted clock, with artificial upper and lower bounds of the ticks' times."""
 
 from collections.abc import Callable
 
@@ -30,9 +30,9 @@ def followed(
 
 @pytest.mark.parametrize("skew", [1e-4, 0.0, -1e-4])
 def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> None:
-    """Only upper bounds of the ticks' times are known.
+    """Only upper bounds of the ticks' true times are known.
 
-    The fitted clock follows the ticks with the least delay, and has the right slope.
+    The fitted clock follows the ticks with the smallest delay, and has the right slope.
     """
     line, late_s = followed(skew, lambda tick: tick % 7 * 1e-3, lambda _: NEVER_BELOW)
     assert late_s == pytest.approx(0.0, abs=1e-6)
@@ -40,9 +40,9 @@ def test_without_bounds_from_below_the_least_delay_is_followed(skew: float) -> N
 
 
 def test_between_near_bounds_the_middle_is_taken() -> None:
-    """A tick is known to be between 0.1 ms before and 0.8 ms after its true time.
+    """The bounds of each tick are 0.1 ms before and 0.8 ms after its true time.
 
-    The fitted clock is near the middle, 0.3 ms after the true time.
+    The fitted clock is near the middle of them, 0.3 ms after the true time.
     """
     _, late_s = followed(0.0, lambda _: 0.8e-3, lambda _: -0.1e-3)
     assert late_s == pytest.approx(0.3e-3, abs=0.05e-3)
@@ -66,9 +66,9 @@ def test_bounds_that_keep_another_pace_do_not_bend_the_line_beyond_themselves() 
 
 
 def test_reads_that_were_late_do_not_lift_the_line() -> None:
-    """One read in twenty is late, so its lower bound is too high.
+    """One read in twenty is late, so the lower bound from it is too high.
 
-    This bound does not lift the line.
+    This bound does not raise the fitted line.
     """
     for read_late_s in (0.9e-3, 5e-3):
         _, late_s = followed(

@@ -79,10 +79,10 @@ surprises = st.tuples(
     edges,
     st.sampled_from([0, 1, 14]),
 )
-"""Unusual reads.
+"""Unusual reads, each followed by normal ones.
 
-Each is (readings, ticks since the reading before, delay in s, ``SampleBoundary``, normal reads that
-follow).
+Each is (readings, ticks since the reading before, delay in s, ``SampleBoundary`` or None, number of
+normal reads that follow).
 """
 
 
@@ -108,7 +108,7 @@ def test_surprises_are_stamped_alike(
 
 
 def test_calm_lines_take_the_short_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A calm line really uses the shortcut. Otherwise the other tests would prove nothing."""
+    """A calm line really uses the shortcut. If it did not, the other tests would prove nothing."""
     compared = 0
     compare = DeviceClock._compare
 

@@ -9,9 +9,9 @@ from omnibot_driver.core.requests import Request
 
 
 def test_a_board_that_was_paused_at_first_leaves_the_delay_a_number() -> None:
-    """The board is paused at first and sends only notices, which have no sampling time.
+    """The board is paused at first, and sends only its «Paused» text, which has no sampling time.
 
-    The notices add no delay.
+    The text adds no delay.
     """
     bench = Bench()
     bench.open()

@@ -31,7 +31,7 @@ COUNTS = 16384 / STANDARD_GRAVITY
 class Stamped:
     """The stamps of a stream's samples and displacements.
 
-    Each entry has the tick, the stamp in s, and the arrival time in s.
+    Each entry has the number of the tick, the stamp in s, and the arrival time in s.
     """
 
     board: Board
@@ -130,7 +130,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 ) -> None:
     """An adapter sends every 16 ms, while the board's tick is 10 ms. The stamps are right.
 
-    The arrival times alone may hide a delay of 0.8 ms for seconds.
+    From the arrival times alone, a delay of 0.8 ms may stay hidden for seconds.
     """
     stamped = run(Board(seconds=120, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
@@ -149,7 +149,7 @@ def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Ch
 
 
 def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
-    """Data arrives in blocks of 240 ticks. From 20 s on, the ticks are stamped evenly."""
+    """Data arrives in blocks of 240 ticks. From 20 s on, the ticks' stamps are evenly spaced."""
     for seed in SEEDS:
         stamped = run(Board(seconds=120, skew=1e-4, imu_only=True), blocks, seed)
         assert stamped.unevenness(since_s=20.0) < 0.2e-3
@@ -237,9 +237,9 @@ def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
 
 @pytest.mark.parametrize("skew", SKEWS)
 def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
-    """The board restarts with a new phase and a new SEQ. The stamps still increase.
+    """The board restarts with another phase of its ticks and another SEQ. The stamps increase.
 
-    Their constant offset from the true times stays the same.
+    Their constant offset from the true times is the same as before.
     """
     clock = DeviceClock(0.01)
     adapter = ftdi(restarted_by_data=True)
@@ -253,7 +253,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
-    """The board is silent for five seconds, and SEQ does not show it.
+    """The board is silent for five seconds, and its counter SEQ does not show this.
 
     The fitted clock begins anew, and the stamps are right.
     """
@@ -277,7 +277,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """Between two true displacements comes a false one, as if the board's counter had restarted.
+    """Between two true displacements comes a false one, whose count looks like a restart.
 
     The stamps of the samples stay 10 ms apart.
     """
@@ -314,7 +314,8 @@ def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
 ) -> None:
     """Reads have any counters and any ``SampleBoundary``, even wrong ones.
 
-    Stamps never decrease and never exceed arrival times.
+    (A ``SampleBoundary`` says where a read ends in the stream of samples.) Stamps never decrease,
+    and never exceed arrival times.
     """
     clock = DeviceClock(0.01)
     now, last_s = 1000.0, -math.inf
