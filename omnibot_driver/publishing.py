@@ -105,9 +105,9 @@ class Publishing:
         self._settings, self._make = settings, self._maker(settings)
 
     def taps(self) -> dict[str, Callable[[Packet], None]]:
-        """Return functions that publish each read and each write of the port.
+        """Return keyword arguments for ``Link``, which make the node publish the port's bytes.
 
-        They are arguments for ``Link``, by the name of the argument.
+        The values are functions that publish each read and each write of the port.
         """
         return {
             "on_read": self._raw_publisher("~/raw_rx"),

@@ -40,7 +40,7 @@ class Shutdown:
 
     @property
     def owed(self) -> bool:
-        """Whether motion was commanded, and no standstill has been shown since then."""
+        """Whether motion was commanded, and a proof that the robot then stopped is missing."""
         return self._policy.proof.owed
 
     @property

@@ -88,8 +88,9 @@ class Drive:
 
     ``way_m``: distance driven. ``laps``: number of driven laps of the square.
     ``pose``, ``true_pose``: the robot's pose at the end, by odometry and as simulated.
-    ``points``: the driven path, as x and y in m. ``page``: path of the document about the board.
-    ``real``: arguments of the driver for the real robot.
+    ``points``: the driven path, as x and y in m.
+    ``page``: path of the document about the board, which the last text of the demo names.
+    ``real``: arguments after ``--ros-args`` with which the driver is started for a real robot.
     """
 
     seconds: float

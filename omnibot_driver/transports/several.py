@@ -125,8 +125,11 @@ class Several:
             return 0, b""
 
     def write(self, packets: Packets) -> None:
-        """Write each packet to its line. Bytes that the line does not accept at once follow
-        later."""
+        """Write each packet to its line. Bytes that a line does not accept at once are sent later.
+
+        If some of them still wait after 0.2 s, they are discarded, and the line is regarded as
+        missing. A line that is missing already gets only the bytes that it accepts at once.
+        """
         now = time.monotonic()
         with self._writing:
             for line, data in self._shared_out(packets):

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Keys: the values of published messages in the units of the board's frames, for comparison."""
+"""Compares published messages with the frames that the board sent.
+
+A message and a frame are both converted to a *key*: their values in the units of the frame.
+"""
 
 import math
 import struct

@@ -70,7 +70,7 @@ class Score:
 class Judge:
     """The judge of one trial. It gets each write, and what the board understands, in time order.
 
-    ``driving``: whether the driver drives.
+    ``driving``: whether the driver's last write with control frames contained a motion frame.
     """
 
     def __init__(self) -> None:

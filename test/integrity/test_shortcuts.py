@@ -246,9 +246,10 @@ def test_most_of_the_trellis_is_left_out(monkeypatch: pytest.MonkeyPatch) -> Non
 @settings(max_examples=200)
 @given(st.lists(pieces, min_size=1, max_size=8).map(b"".join).map(lambda data: data[:170]))
 def test_the_rest_never_costs_less_than_its_bound(data: bytes) -> None:
-    """Each node of the trellis has a lower bound of the remaining cost.
+    """``least_costs`` gives, for each node of the trellis, a lower bound of the cost to the end.
 
-    Along an edge, this bound falls by at most the edge's cost.
+    The bound is 0 at the end, and along an edge it falls by at most the edge's cost. So no path to
+    the end costs less than the bound.
     """
     least = least_costs(data)
     search = trellis._Search(

@@ -97,9 +97,10 @@ def test_a_deleted_parameter_does_not_block_the_others(
 
 
 def test_what_it_has_works(start_board: Start, start_driver: Start, probe_of: Start) -> None:
-    """The plain board drives. The joints have the names of its two wheels.
+    """The board obeys cmd_vel, and joint_states has the names of its two wheels.
 
-    The service that only this board has replies.
+    ``ask``, a service that only this board has, replies. /diagnostics has figures of the odometry
+    and none of an IMU, because the board has no IMU.
     """
     board = start_board()
     probe: Probe = probe_of(start_plain(start_driver, board.path, track_width=0.4))

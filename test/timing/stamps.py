@@ -67,7 +67,10 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
 
 
 def measured(cells: list[Cell], seconds: float, seeds: int) -> dict[Cell, list[Figures]]:
-    """Stamp all streams of all cases, on all processors. Return the results of each case."""
+    """Stamp ``seeds`` streams of ``seconds`` for each case. Return the results by case.
+
+    The streams are generated and stamped on all processors at the same time.
+    """
     jobs = [(cell, seed) for cell in cells for seed in range(seeds)]
     found: dict[Cell, list[Figures]] = {cell: [] for cell in cells}
     with Pool(os.cpu_count()) as pool:

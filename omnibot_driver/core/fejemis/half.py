@@ -54,7 +54,7 @@ _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
 class Half:
-    """State of one half. A *half* is each of the two Teensys (drive or front).
+    """State of one half, as the driver calls each of the robot's two boards (drive or front).
 
     ``identity``: the identity in its heartbeats; None before the first heartbeat.
 
@@ -96,10 +96,10 @@ class Half:
 
     @property
     def unsure(self) -> bool:
-        """Whether the board may have restarted, and so may lack the user's settings.
+        """Whether the board may have restarted, and so may have lost the user's settings.
 
-        True after a pause of the stream that driving requires, until a heartbeat shows that the
-        board's time continues.
+        This is assumed when the stream that driving requires is missing, until a newer heartbeat
+        arrives. The board's time in this heartbeat shows whether the board has restarted.
         """
         return self._unsure_at is not None
 

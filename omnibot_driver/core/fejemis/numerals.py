@@ -2,9 +2,12 @@
 
 """Numbers that can be sent safely: a checksum detects the loss of any two of their characters.
 
-A number must not contain two characters whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``,
-``.`` and ``5``, ``-`` and ``6``. So some values cannot be sent, such as those between .0999 and
-.200.
+The checksum is the sum of a line's character codes, modulo 99. So it does not change if two
+characters are lost whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``,
+``-`` and ``6``. A line should not contain both characters of such a pair.
+
+Each motion line begins with ``rc 2``, so its numbers must not contain ``1``. Values between .0999
+and .200 therefore cannot be sent.
 """
 
 from bisect import bisect_left, bisect_right

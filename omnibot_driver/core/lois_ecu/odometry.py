@@ -2,8 +2,9 @@
 
 """Pose of the robot from the reports of a LOIS ECU and from the commands sent to it.
 
-While the public firmware does not count ticks, ``motion_filter`` predicts the motion.
-``comparison`` corrects the prediction by the board's own odometry (0x20).
+At times, the public firmware does not count a wheel's ticks. ``motion_filter`` then predicts the
+motion from the commands, and ``comparison`` compares the prediction with the board's own odometry
+(0x20) to correct it.
 
 Time is an argument. All times are arrival times in s.
 """

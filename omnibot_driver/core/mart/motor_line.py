@@ -37,9 +37,12 @@ class MotorLine:
         self._ss, self._so, self._oo = SLOPE_SD**2, 0.0, OFFSET_SD**2
 
     def learn(self, units: float, speed: float, doubt: float = 1.0) -> None:
-        """Learn from a measured ``speed`` (in nominal units) at ``units``.
+        """Improve the line by a ``speed`` that was measured while the motor had ``units``.
 
-        ``doubt``: factor for the assumed standard deviation of the speed.
+        ``speed``: in nominal units.
+
+        ``doubt``: factor for the assumed standard deviation of the measured speed. With a larger
+        factor, the measurement changes the line less.
         """
         self._learned = True
         if self._ss < SLOPE_SD**2:

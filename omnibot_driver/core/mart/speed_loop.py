@@ -93,7 +93,8 @@ class SpeedLoop(Motors):
 
     ``trip_s``: average duration of an exchange, in s.
 
-    ``part``: sum of the relative changes of both motors' units by the last change.
+    ``part``: how much the last command changed the motors' units. For each motor, the change
+    without sign is divided by the motor's previous units; the two quotients are added.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -142,7 +143,7 @@ class SpeedLoop(Motors):
 
     @property
     def units(self) -> int:
-        """The larger of the two sides' units."""
+        """Motor units (0 to 127) of the motor that has more of them."""
         return max(self._right.units, self._left.units)
 
     @property

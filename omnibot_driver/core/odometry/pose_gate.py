@@ -63,9 +63,13 @@ class PoseGate:
         return possible
 
     def confirmed(self, told: Pose, gap: Covariance) -> bool:
-        """Return whether a pose confirms ``doubted``, the last unexpected pose.
+        """Return whether the new pose ``told`` agrees with ``doubted``, the last unexpected pose.
 
-        If ``told`` does not confirm ``doubted``, then ``doubted`` counts as refused.
+        If it does not agree, ``doubted`` is counted as refused. In any case, ``doubted`` is then
+        forgotten. Without a ``doubted`` pose, the result is False.
+
+        ``gap``: covariance of the motion of lost displacements that no pose has shown yet. It
+        increases the tolerated difference.
         """
         doubted, self.doubted = self.doubted, None
         confirmed = doubted is not None and expected(doubted.way_to(told), gap)

@@ -66,11 +66,11 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """The motion in one drive, in m or rad, as measured by the tape and by the odometry.
+    """The motion in one drive, in m or rad, as measured by the user and by the odometry.
 
-    ``told``: motion by the odometry.
+    ``told``: motion that the odometry measured.
 
-    ``true``, ``sigma``: motion by the tape, and its standard deviation.
+    ``true``, ``sigma``: motion that the user measured on the floor, and its standard deviation.
     """
 
     drive: Drive
@@ -80,12 +80,12 @@ class Ratio:
 
     @property
     def value(self) -> float:
-        """Ratio of the motion by the tape to the motion by the odometry."""
+        """Motion that the user measured, divided by the motion that the odometry measured."""
         return self.true / self.told
 
     @property
     def value_sigma(self) -> float:
-        """Standard deviation of the ratio of the motion by the tape to that by the odometry."""
+        """Standard deviation of ``value``, the user's measurement divided by the odometry's."""
         return self.sigma / abs(self.told)
 
 
@@ -192,7 +192,7 @@ def result(
 
 
 def draw(figure: "Figure", ratios: Sequence[Ratio]) -> None:
-    """Draw, for each drive, the ratio of the motion by the tape to the motion by the odometry."""
+    """Draw, for each drive, the motion that the user measured, divided by that of the odometry."""
     axes = figure.subplots()
     names = [f"{number}. {one.drive.name}" for number, one in enumerate(ratios, 1)]
     values = [one.value for one in ratios]

@@ -123,7 +123,11 @@ def test_a_board_that_holds_the_estop_itself_is_told_of_with_the_way_out() -> No
 
 
 def test_a_board_that_does_not_hold_the_estop_gives_no_notice(bench: Bench) -> None:
-    """After the release of the e-stop, the robot needs some time to speed up. No notice appears."""
+    """After the release of the e-stop, the robot needs some time to speed up.
+
+    The driver does not mistake this for a board that still holds the e-stop. So no notice advises
+    the user to call ~/reset.
+    """
     for _ in range(3):
         estop(bench, True)
         bench.run(0.5)

@@ -73,9 +73,10 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 
 
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
-    """Every text for −60° to −69° has a minus sign and a 6.
+    """However an angle from −60° to −69° is written, its text contains ``-`` and ``6``.
 
-    No checksum detects the loss of both.
+    Their codes add up to 99, and the checksum is a sum modulo 99. So it does not change if both
+    characters are lost, and another text for the same angle would not help.
     """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):

@@ -39,9 +39,10 @@ def test_a_wheel_that_fell_rests_from_a_higher_speed_after_one_more_repetition()
 
 
 def test_with_gains_that_the_user_set_it_is_never_certain() -> None:
-    """With the user's gains, wheels overshoot and roll steadily. Few stop by themselves.
+    """With the user's gains, a wheel may overshoot: its speed falls, and it then rolls steadily.
 
-    So even twenty repetitions do not prove rest.
+    Its reported speeds are then like those of a wheel that comes to rest. So even twenty reports of
+    the same speed after a fall do not prove that the wheel is at rest.
     """
     assert told(31, 28, 19, *[12] * 20, tuned=True).chance < 0.5
 

@@ -119,7 +119,8 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
 def test_a_turn_on_the_spot_does_not_change_the_balance_of_the_motors(unequal: float) -> None:
     """A turn on the spot shows only the mean speed of the two motors.
 
-    A later straight drive backward is as straight as before.
+    So the driver does not learn the ratio of their speeds from it. This ratio is right at the
+    start (``motor_balance``), and a later drive straight backward is still straight.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench(

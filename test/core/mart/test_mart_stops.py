@@ -106,9 +106,10 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """The server executes a late copy of a controlled move, and does not answer.
+    """The network delivers the command of a controlled move twice. The second copy comes late.
 
-    An e-stop still ends the move within 1 s.
+    After the move, the server executes this copy too, and does not answer it. An e-stop ends this
+    second move within 1 s.
     """
     bench = MartBench().ready()
     bench.go_to(0.6, 0.0, 0.0)

@@ -289,9 +289,9 @@ def test_by_the_source_a_spin_stop_leaves_a_drive_alone() -> None:
 
 @pytest.mark.parametrize("text", ["CS 5", "SFR", "SRR", "MCS 100", "TIME 1"])
 def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> None:
-    """A command has too few numbers. The quirk with which this crashes the server is switched off.
+    """A command has too few numbers. With a quirk, this crashes the server; here the quirk is off.
 
-    The server refuses the command.
+    The server replies that the command's format is wrong, and then answers HELLO.
     """
     rig = Rig(replace(FIRMWARE, crashes_on_missing_numbers=False))
     if text == "CS 5":
