@@ -76,6 +76,8 @@ class Done:
 
     ``completed``: whether the move ended by itself with a success, without a stop.
 
+    ``expected``: distance in m, or turn in rad, of a complete run, as learned from earlier moves.
+
     ``stopped_again``: whether the driver has sent a stop after that, against a possible second run.
     """
 
@@ -86,6 +88,7 @@ class Done:
     quiet_s: float
     completed: bool
     stopped_again: bool
+    expected: float
 
     @property
     def is_straight(self) -> bool:
@@ -122,15 +125,19 @@ class Done:
     @property
     def _is_short(self) -> bool:
         """Whether the encoder count is too small for a complete move."""
-        seen = abs(self.way_m if self.is_straight else self.turned_rad)
-        return seen < LEAST_LIKE * self.asked
+        return self._seen < LEAST_LIKE * min(self.asked, self.expected)
+
+    @property
+    def _seen(self) -> float:
+        return abs(self.way_m if self.is_straight else self.turned_rad)
 
     @property
     def may_have_run_twice(self) -> bool:
         """Whether the server may have run the move twice, from a duplicated datagram."""
         no_time = self.quiet_s < FULL * self.usual_s and not self.ended_late
-        not_cut = not self._is_short or (self.completed and not self.stopped_again)
-        return not (no_time and not_cut)
+        if self.stopped_again:  # the stop may have cut the second run short
+            return not (no_time and self._seen >= self.asked)
+        return not (no_time and (self.completed or not self._is_short))
 
     @property
     def has_run_twice(self) -> bool:
@@ -166,6 +173,7 @@ class Surplus:
     def __init__(self) -> None:
         self._degrees = {True: 0.0, False: 0.0}
         self._stretch = {True: STRETCH, False: STRETCH}
+        self._learned: set[bool] = set()
 
     def learn(self, request: Request, way_m: float, turned_rad: float) -> None:
         """Learn from the measurement of a finished move. The signs of the values do not matter."""
@@ -174,6 +182,7 @@ class Surplus:
         if request.word in (TF, TB):
             seen = min(2.0, max(0.5, abs(way_m) / INCH_M / asked))
             self._stretch[slow] += (seen - self._stretch[slow]) / 2
+            self._learned.add(slow)
             return
         beyond = abs(math.degrees(turned_rad)) - asked
         before = self._degrees[slow]
@@ -187,6 +196,13 @@ class Surplus:
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
+
+    def is_known(self, request: Request) -> bool:
+        """Return whether the size of a complete move is known: a turn's is, by the server's gyro.
+
+        The server drives straight by time, so one such move must have been measured.
+        """
+        return request.word in (MCR, MCL) or (b"SLOW" in request.data.split()) in self._learned
 
     def expected(self, request: Request) -> float:
         """Return the distance in m, or the turn in rad to the left, of a complete move."""

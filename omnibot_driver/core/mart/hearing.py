@@ -15,6 +15,7 @@ from omnibot_driver.core.mart.measuring import Measuring
 from omnibot_driver.core.mart.replies import Fail, Ok, Reply
 from omnibot_driver.core.mart.spot_turns import SETTING_REFUSED
 from omnibot_driver.core.mart.states import ROLLING, Motion, State
+from omnibot_driver.core.mart.switch_off import NO_MCS
 from omnibot_driver.core.mart.words import Form, Kind, Word
 
 BLIND_PART: Final = 0.15
@@ -180,6 +181,9 @@ class Hearing(Measuring):
         elif word.kind is Kind.CHECK:
             self.state = State.STILL
             self.imu.missed(now)
+        elif word in (words.MCS, words.MSM):
+            if self._switch_off.missed(word):
+                self._once(NO_MCS)
         elif word.kind is Kind.SERVICE:
             self.state = State.STILL
             self.jobs.missed(word, now)

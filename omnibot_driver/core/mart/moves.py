@@ -138,7 +138,9 @@ class Moves(Asking):
             return
         done = self._done(move, now, completed=completed)
         stopped = self._may_have_stopped_a_copy(done, now)
-        twice = stopped and done.has_run_twice
+        # of a move from before a reset of the odometry, an unknown part remains
+        whole = self._surplus.is_known(move) and not self.odometry.begins_in_move
+        twice = stopped and whole and done.has_run_twice
         doubtful = (stopped or self.conversation.disturbed(now)) and done.may_have_run_twice
         likely = stopped and not (completed and done.ended_early)
         if doubtful and not twice:
@@ -161,6 +163,7 @@ class Moves(Asking):
             self.odometry.turn.spun_rad,
             lasted_s=self._rested_s - self._started_s,
             quiet_s=free_s - self._rested_s + self._delay_s,
+            expected=abs(self._surplus.expected(move)),
             completed=completed,
             stopped_again=self._copies_stopped_s >= self._rested_s,
         )

@@ -38,10 +38,17 @@ UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
 lost."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
-RUN, END_RUN_RAD = 0.1, math.radians(3.0)
+RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
 """Errors of a controlled move whose size is estimated, not counted, as standard deviations.
 
-``RUN``: relative error of its distance or turn. ``END_RUN_RAD``: additional error of a turn in rad.
+``RUN``: relative error of its distance or turn. ``END_RUN_M``, ``END_RUN_RAD``: additional errors
+of a distance in m, and of a turn in rad.
+"""
+ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
+"""Assumptions for the end of a drive whose heading is unread.
+
+``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate in rad/s.
+``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
 """
 
 
@@ -62,6 +69,8 @@ class Reckoning:
     else None.
 
     ``bend``: standard deviation of that ratio.
+
+    ``begins_in_move``: whether the odometry was reset during the present controlled move.
     """
 
     def __init__(self, settings: MartSettings) -> None:
@@ -94,7 +103,7 @@ class Reckoning:
         """Move the origin of the odometry frame to the robot's present pose."""
         self.pose = Pose()
         self.doubt.reset()
-        self._begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)
+        self.begins_in_move = self.motion in (Motion.STRAIGHT, Motion.TURN)
         self.turn.forget()
 
     def connect(self) -> None:
@@ -147,16 +156,18 @@ class Reckoning:
         if self.motion is Motion.NONE:
             return
         if self.on_the_spot:
-            recorded = self.motion is Motion.TURN and not self._begins_in_move
+            recorded = self.motion is Motion.TURN and not self.begins_in_move
             self._correct_yaw(self.turn.end(may_be_recorded=recorded))
             self.doubt.end_turn(self.turn.spun_rad, self.turn.told_rad)
+        if self.motion is Motion.REFERENCE and self.heading.from_s < self._stood_s:
+            self._doubt_unread_turn()
         self.doubt.end()
         way_m, turn_rad = self.maybe
         if abs(turn_rad if self.on_the_spot else way_m) <= longest:  # else the start was lost
             self.doubt.add(way_m**2, turn_rad**2)
-        if self._begins_in_move:  # the part of the move before the reset is not known
+        if self.begins_in_move:  # the part of the move before the reset is not known
             self.doubt.add(self.moved_m**2, self.turn.spun_rad**2)
-        self._begins_in_move = False
+        self.begins_in_move = False
         self.motion = Motion.NONE
         self.wheel.rest()
         self.slowing_since_s = None
@@ -171,11 +182,21 @@ class Reckoning:
         if is_straight:
             self.pose = self.pose.moved(Pose(amount, 0.0, 0.0))
             self.rolled += Pose(amount, 0.0, 0.0)
-            self.doubt.add((RUN * amount) ** 2, 0.0)
+            self.doubt.add(END_RUN_M**2 + (RUN * amount) ** 2, 0.0)
             self.doubt.end_straight()
         else:
             self._correct_yaw(amount)
             self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
+
+    def _doubt_unread_turn(self) -> None:
+        """Add the error of the turn since the last heading of a drive, if rest ends it unread."""
+        unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
+        most_rad = min(math.pi, MOST_RADPS * unread_s)
+        turn_rad = min(
+            most_rad, abs(self.heading.rate_radps) * unread_s + _turn_error_rad(unread_s)
+        )
+        way_m = (abs(self.speeds.means[0]) + UNREAD_MPS) * unread_s * min(1.0, turn_rad)
+        self.doubt.add(way_m**2, turn_rad**2)
 
     def turned(self, degrees: float, when: Moment) -> bool:
         """Process a reported heading in degrees; return whether it is plausible and has changed."""
@@ -340,4 +361,9 @@ class Reckoning:
         stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
         if self.motion is not Motion.REFERENCE:
             stale_s = 0.0
-        return stale_s, ACCELERATION_RADPS2 * stale_s * stale_s / 2
+        return stale_s, _turn_error_rad(stale_s)
+
+
+def _turn_error_rad(seconds: float) -> float:
+    """Return the standard deviation of the turn in this time, if the turn rate was known before."""
+    return min(math.pi, ACCELERATION_RADPS2 * seconds * seconds / 2)

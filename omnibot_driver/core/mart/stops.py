@@ -231,10 +231,10 @@ class Stops(Ground, ABC):
             lost = self._begun_s < self._started_s and self._seems_present
             if not lost:
                 self._appears(now)  # the server knows of no motion, so maybe it was restarted
+        if result is None:
+            self._switch_off.doubt()
         if motion is Motion.UNKNOWN:
             self._negative_sweep = result is None
-            if self._negative_sweep:
-                self._switch_off.doubt()
             self._swept_s = now
             self.greeted = True
         self._rest(now)

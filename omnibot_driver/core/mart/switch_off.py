@@ -11,12 +11,19 @@ replies; it does not know when the robot is at rest.
 from typing import Final
 
 from omnibot_driver.core.mart.replies import Fail, Ok
-from omnibot_driver.core.mart.words import MCS, MSM, UNSUPPORTED, Request, Word
+from omnibot_driver.core.mart.words import CONFLICT, MCS, MSM, Request, Word
 
 OFF: Final = MCS.request(128, 128)
 """The request that writes "stop" to both motors."""
 RELEASE: Final = MSM.request()
 """The request that ends the direct control of the motors by MCS. Without MCS, it does nothing."""
+
+MOST_MISSES: Final = 4
+"""Number of unanswered requests in a row after which the driver stops trying."""
+NO_MCS: Final = (
+    "the server does not answer MCS, so the driver cannot switch off a motor that the server leaves"
+    " on after a straight move: if the robot creeps, send it a turn, or cut the motor power"
+)
 
 
 class SwitchOff:
@@ -39,6 +46,7 @@ class SwitchOff:
         """
         self.needed = self.underway = False
         self._supported = True
+        self._misses = 0
 
     def doubt(self) -> None:
         """Record that a motor may be on, although the server knows of no motion."""
@@ -53,7 +61,7 @@ class SwitchOff:
 
     def refused(self) -> None:
         """Record that the server has refused a request, perhaps because MCS is in progress."""
-        self.underway = self._supported
+        self.underway = True
 
     def next(self) -> Request:
         """Return the next request: OFF if a motor may be on, else RELEASE.
@@ -71,7 +79,22 @@ class SwitchOff:
 
         A conflict shows that MCS is in progress, because an earlier MCS has arrived.
         """
-        self.needed = False
-        if isinstance(reply, Fail) and reply.reason == UNSUPPORTED:
+        self.needed, self._misses = False, 0
+        if isinstance(reply, Fail) and reply.reason != CONFLICT:
             self._supported = False
         self.underway = word is MCS and self._supported
+
+    def missed(self, word: Word) -> bool:
+        """Record that MCS or MSM was not answered; return whether the driver gives MCS up.
+
+        After MOST_MISSES of them, the driver starts motions again. If MCS is in progress
+        nevertheless, the server refuses the next motion, and MSM follows.
+        """
+        self._misses += 1
+        if self._misses < MOST_MISSES:
+            return False
+        self.needed = self.underway = False
+        self._misses = 0
+        gives_up = word is MCS and self._supported
+        self._supported = self._supported and not gives_up
+        return gives_up

@@ -11,6 +11,8 @@ from mart_bench import MartBench
 from mart_goals import EVERY_FIRMWARE, drops, on, random_goal, reach, yaw_error
 
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.mart import MartSettings as Settings
+from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.simulator.common.network import NetworkFaults
 from omnibot_driver.simulator.mart import Firmware
 
@@ -72,6 +74,91 @@ def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
             assert yaw_error(bench) < 0.2 + 2 * covariance.yaw_yaw**0.5
     assert said.count("delivered a controlled move twice") >= 4
     assert said.count("discarded") <= 4
+
+
+def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
+    """Let the network deliver the next move with this command twice. Return a list of it."""
+    path = bench.robot.network[0].to_board
+    real, moves = path.send, list[bytes]()
+
+    def send(data: bytes, at_s: float) -> None:
+        real(data, at_s)
+        if data.startswith(word) and not data.endswith(b" 0") and not moves:
+            moves.append(data)
+            real(data, at_s + later_s)
+
+    path.send = send  # type: ignore[method-assign]
+    return moves
+
+
+@pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
+@pytest.mark.parametrize("delay_s", [0.05, 0.3])
+@pytest.mark.parametrize("degrees", [12, 15, 18, 25, 60])
+def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
+    degrees: float, delay_s: float, firmware: Firmware
+) -> None:
+    """The server runs a turn twice. The driver stops the second run, or comes too late for it."""
+    settings = Settings(network_delay_s=delay_s)
+    bench = MartBench(firmware, settings=settings).ready()
+    bench.robot._good = False
+    moves = twice_once(bench, b"MC", 0.02)
+    bench.go_to(0.0, 0.0, math.radians(degrees))
+    bench.run_until(lambda: bool(moves) and bench.board._pilot._last_move is None, 20.0)
+    bench.run(0.1)
+    assert yaw_error(bench) < 0.05 + 3 * bench.odometry[-1].covariance.yaw_yaw ** 0.5
+
+
+@pytest.mark.parametrize("word", [b"TF", b"MC"])
+@pytest.mark.parametrize("later_s", [0.1, 0.3])
+def test_a_reset_of_the_odometry_after_a_move_that_runs_twice_adds_nothing_from_before(
+    word: bytes, later_s: float
+) -> None:
+    """A move runs twice. The user resets the odometry before the encoder is read.
+
+    The first run lies before the reset, so the driver does not add it to the pose.
+    """
+    bench = on(NetworkFaults(), "source")
+    reach(bench, Pose(0.6, 0.0, 0.0))
+    moves = twice_once(bench, word, 0.02)
+    bench.go_to(*((1.8, 0.0, 0.0) if word == b"TF" else (0.6, 1.2, math.pi / 2)))
+    pilot = bench.board._pilot
+    bench.run_until(lambda: bool(moves) and pilot.motion is Motion.NONE, 20.0)
+    bench.run(later_s)
+    bench.session.reset_odometry(bench.now)
+    bench.settle()
+    origin = bench.truth
+    bench.run(4.0)
+    pose, covariance = bench.odometry[-1].pose, bench.odometry[-1].covariance
+    moved = origin.way_to(bench.truth)
+    error = Pose(pose.x_m - moved.x_m, pose.y_m - moved.y_m, pose.yaw_rad - moved.yaw_rad)
+    assert error.way_m < 0.05 + 2 * (covariance.xx + covariance.yy) ** 0.5
+    turn_rad = abs(math.remainder(error.yaw_rad, math.tau))
+    assert turn_rad < 0.1 + 2 * covariance.yaw_yaw**0.5
+
+
+def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() -> None:
+    """The robot drives half as far as requested. Queries are lost for 0.7 s after the move.
+
+    The driver stops a possible second run. As it does not know how far the robot drives, it adds
+    nothing to the pose.
+    """
+    bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
+    bench.robot._good = False
+    bench.go_to(1.0, 0.0, 0.0)
+    pilot, network = bench.board._pilot, bench.robot.network[0]
+    quiet = (b"ENC", b"HELLO", b"RMRA")
+
+    def lost(data: bytes) -> bool:
+        rests = pilot.state is State.STILL and pilot._last_move is not None
+        return rests and data in quiet and bench.now < pilot._rested_s + 0.7
+
+    assert drops(network.to_board, lost) == []
+    drops(network.from_board, lambda data: data == b"ok BBB" and pilot._last_move is not None)
+    bench.run_until(lambda: pilot._last_move is not None, 20.0)
+    bench.run_until(lambda: pilot._last_move is None, 25.0)
+    bench.run(1.0)
+    assert b"SL" in bench.said()
+    assert bench.error.way_m < 0.1
 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)

@@ -19,6 +19,7 @@ from omnibot_driver.core.mart.states import Motion, State
 from omnibot_driver.core.mart.stopping import Stopping
 from omnibot_driver.core.mart.words import Form
 from omnibot_driver.simulator.common.network import NetworkFaults
+from omnibot_driver.simulator.mart import Firmware
 
 pytestmark = pytest.mark.slow
 
@@ -147,6 +148,7 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
     goal. If there was one, the driver reports it, and adds the first run to the odometry.
     """
     bench = on(NetworkFaults(), "source")
+    assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""
     network = bench.robot.network[0]
     real = network.from_board.send
     network.from_board.send = lambda data, at_s: real(data, at_s + 0.28)
@@ -154,13 +156,13 @@ def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None
     drops(network.to_board, lambda data: data == b"HELLO" and pilot.state is State.MOVING)
     if copied:
         twice(network.to_board, lambda data: data.startswith(b"TF"), 0.1)
-    said = reach(bench, Pose(1.5, 0.0, 0.0))
+    said = reach(bench, Pose(2.1, 0.0, 0.0))
     assert b"SL" in bench.said()
     assert ("delivered a controlled move twice" in said) is copied
     assert bench.error.way_m < 0.25
     if not copied:
         assert said == ""
-        assert bench.truth.way_to(Pose(1.5, 0.0, 0.0)).way_m < 0.12
+        assert bench.truth.way_to(Pose(2.1, 0.0, 0.0)).way_m < 0.12
 
 
 def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
@@ -232,3 +234,22 @@ def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: byte
     told = [each for each in texts(bench) if "does not report the relative heading" in each]
     assert len(told) >= 2
     assert not any("another server" in each for each in texts(bench))
+
+
+@pytest.mark.parametrize("firmware", ["documented", "source"])
+def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
+    firmware: Firmware,
+) -> None:
+    """The robot drives a curve. From 0.5 s before the stop on, each RMRA is lost.
+
+    The driver ends the drive by the encoder. The covariance includes the turn that is missing.
+    """
+    bench = on(NetworkFaults(), firmware)
+    bench.command(0.3, 0.5, 2.5)
+    drops(bench.robot.network[0].to_board, lambda data: data == b"RMRA")
+    bench.command(0.3, 0.5, 0.5)
+    bench.run(6.0)
+    assert bench.board._pilot.odometry.motion is Motion.NONE
+    error_rad = abs(math.remainder(bench.error.yaw_rad, math.tau))
+    assert error_rad > 0.05
+    assert error_rad < 3 * bench.odometry[-1].covariance.yaw_yaw ** 0.5

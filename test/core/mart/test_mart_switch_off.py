@@ -157,6 +157,70 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
     assert b"MCS 128 128" not in said
 
 
+@pytest.mark.parametrize(
+    ("word", "twist"), [(b"RM ", (0.2, 0.0)), (b"B ", (-0.2, 0.0)), (b"L ", (0.0, 0.6))]
+)
+def test_a_motion_that_never_began_does_not_replace_a_switch_off(
+    word: bytes, twist: tuple[float, float]
+) -> None:
+    """The start of the next motion is lost, so it has written no motor. Then the user stops."""
+    bench = creeping()
+    lost = drops(bench.robot.network[0].to_board, lambda data: data.startswith(word))
+    bench.command(*twist, 1.2)
+    bench.command(0.0, 0.0, 1.0)
+    bench.run(4.0)
+    assert lost
+    assert registers(bench) == OFF
+    assert not bench.server.manual
+
+
+@pytest.mark.parametrize("reply", [b"", b"fail", b"fail improper command format", b"unknown"])
+def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply: bytes) -> None:
+    """A server answers MCS and MSM by a text of its own, or not at all.
+
+    The driver tries a few times, reports it once, and then starts motions.
+    """
+    bench = MartBench("documented")
+    bench.robot._good = False
+    network = bench.robot.network[0]
+    real = network.to_board.send
+
+    def send(data: bytes, at_s: float) -> None:
+        if data not in BOTH:
+            real(data, at_s)
+        elif reply:
+            network.from_board.send(reply, at_s)
+
+    network.to_board.send = send
+    bench.ready()
+    bench.command(0.2, 0.0, 8.0)
+    assert bench.truth.x_m > 0.5
+    assert sum("does not answer MCS" in notice for notice in bench.notices) == 1
+
+
+def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
+    """A late reply to another command seems to say that the server does not know MCS.
+
+    But MCS has arrived, so the server refuses the next motion. The driver then sends MSM.
+    """
+    bench = creeping()
+    network = bench.robot.network[0]
+    real = network.to_board.send
+
+    def send(data: bytes, at_s: float) -> None:
+        real(data, at_s + 0.01)
+        if data == BOTH[0]:
+            network.from_board.send(b"fail command not supported", at_s)
+
+    network.to_board.send = send
+    bench.run(2.0)
+    assert bench.server.manual
+    began_m = bench.server.chassis.way_m
+    bench.command(0.2, 0.0, 6.0)
+    assert not bench.server.manual
+    assert bench.server.chassis.way_m > began_m + 0.2
+
+
 def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
     """The e-stop is latched after a straight move, before the driver has switched the motors off.
 
