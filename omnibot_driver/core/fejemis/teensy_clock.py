@@ -7,6 +7,7 @@ the conversion is a straight line just below all arrival times, fitted by
 ``core/timing/clock_fit.py``. docs/internals/time.md explains why.
 """
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -30,6 +31,10 @@ EARLIES_WITHIN_S: Final = 1.0
 a late line, so it begins again. Other lines may come between the three, because they may be late as
 well, and so seem right."""
 SMALLEST_STEP_S: Final = 1e-6
+"""Smallest step in s between two timestamps of one kind of reading.
+
+A smaller step might disappear when timestamps are rounded to the nanosecond.
+"""
 
 
 class TeensyClock:
@@ -138,7 +143,8 @@ class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
     The class is a ``ReadingClock``, the interface that gives readings their timestamps. Timestamps
-    of one kind of reading increase, and are never later than the call.
+    of one kind of reading increase by ``SMALLEST_STEP_S`` at least. They are later than the call
+    only if this step requires it.
     """
 
     skew_ppm = 0.0
@@ -156,15 +162,12 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``.
 
-        A timestamp later than ``now`` is lowered to ``now``. One that is not after the last
-        timestamp of the same kind of reading is raised.
+        A timestamp later than ``now`` is lowered to ``now``. One that is less than
+        ``SMALLEST_STEP_S`` after the last timestamp of the same kind of reading is raised.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
-        stamp_s = min(stamp_s, now)
-        last_s = self._last.get(kind)
-        if last_s is not None and stamp_s <= last_s:
-            stamp_s = last_s + SMALLEST_STEP_S
-        self._last[kind] = stamp_s
+        least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S
+        stamp_s = self._last[kind] = max(min(stamp_s, now), least_s)
         self.readings.append(reading)
         self._stamps.append(stamp_s)
 
