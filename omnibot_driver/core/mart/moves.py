@@ -13,7 +13,8 @@ from omnibot_driver.core.commands.orders import GoTo
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.asking import Asking
-from omnibot_driver.core.mart.goal import FULL, INCH_M, Done, Move, next_move
+from omnibot_driver.core.mart.finished_move import FULL, Done
+from omnibot_driver.core.mart.goal import INCH_M, Move, next_move
 from omnibot_driver.core.mart.jobs import Job
 from omnibot_driver.core.mart.replies import Fail, Ok
 from omnibot_driver.core.mart.states import NEEDS_IMU, Motion

@@ -1,0 +1,127 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The evaluation of a controlled move that has ended: was it complete, and did it run twice?
+
+This module knows requests, times and measurements; it does not know replies or the odometry.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from omnibot_driver.core.mart.goal import INCH_M
+from omnibot_driver.core.mart.words import TB, TF, Request
+
+LEAST_LIKE: Final = 0.65
+"""A move is regarded as incomplete if its measured part is below this fraction of the request."""
+SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
+"""Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
+
+SLOW doubles the times per degree and inch.
+"""
+FULL, TWO = 0.6, 1.4
+"""Shortest durations of one and of two complete runs of a move, as fractions of the usual one."""
+LEAST_CUT_M, LEAST_CUT_RAD = 0.1, math.radians(15.0)
+"""Smallest request, in m or rad, for which the encoder count shows an incomplete run."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done:
+    """A controlled move that has ended, with its measurements.
+
+    A duplicate of the request may have started a second run of the same move.
+
+    ``way_m``, ``turned_rad``: distance and turn by the encoder; of the second run only, if there
+    was one.
+
+    ``lasted_s``: time in s from the request to the reply.
+
+    ``quiet_s``: longest time in s for which the second run may have lasted.
+
+    ``completed``: whether the move ended by itself with a success, without a stop.
+
+    ``expected``: distance in m, or turn in rad, of a complete run, as learned from earlier moves.
+
+    ``stopped_again``: whether the driver has sent a stop after that, against a possible second run.
+    """
+
+    request: Request
+    way_m: float
+    turned_rad: float
+    lasted_s: float
+    quiet_s: float
+    completed: bool
+    stopped_again: bool
+    expected: float
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the move is straight; else it is a turn on the spot."""
+        return self.request.word in (TF, TB)
+
+    @property
+    def asked(self) -> float:
+        """The requested distance in m, or turn in rad."""
+        number = float(self.request.data.split()[-1])
+        return number * INCH_M if self.is_straight else math.radians(number)
+
+    @property
+    def _least(self) -> float:
+        return LEAST_CUT_M if self.is_straight else LEAST_CUT_RAD
+
+    @property
+    def is_large(self) -> bool:
+        """Whether the encoder count can show that a run was not complete."""
+        return self.asked >= self._least
+
+    @property
+    def longest(self) -> float:
+        """Longest distance in m, or turn in rad, of one complete run."""
+        return 2 * self.asked + self._least
+
+    @property
+    def usual_s(self) -> float:
+        """The usual duration of the move, in s."""
+        number = float(self.request.data.split()[-1])
+        slow = 2 if b"SLOW" in self.request.data.split() else 1
+        return SETTLES_S + slow * number * (S_PER_IN if self.is_straight else S_PER_DEG)
+
+    @property
+    def _is_short(self) -> bool:
+        """Whether the encoder count is too small for a complete move."""
+        return self._seen < LEAST_LIKE * min(self.asked, self.expected)
+
+    @property
+    def _seen(self) -> float:
+        return abs(self.way_m if self.is_straight else self.turned_rad)
+
+    @property
+    def may_have_run_twice(self) -> bool:
+        """Whether the server may have run the move twice, from a duplicated datagram."""
+        no_time = self.quiet_s < FULL * self.usual_s and not self.ended_late
+        if self.stopped_again:  # the stop may have cut the second run short
+            return not (no_time and self._seen >= self.asked)
+        return not (no_time and (self.completed or not self._is_short))
+
+    @property
+    def has_run_twice(self) -> bool:
+        """Whether a complete run came before a second one, which the driver has stopped."""
+        whole = self.completed and not self.ended_early
+        return whole and self.stopped_again and self._is_short and self.is_large
+
+    @property
+    def ended_late(self) -> bool:
+        """Whether the reply came so late that it may be the reply to a second run.
+
+        In that case, the reply to the first run was lost.
+        """
+        return self.lasted_s >= TWO * self.usual_s
+
+    @property
+    def ended_early(self) -> bool:
+        """Whether the reply came before the end of a complete run, so it answers another request.
+
+        If the driver has then sent a stop against a second run, it has stopped the first run
+        itself.
+        """
+        return self.lasted_s < FULL * self.usual_s
