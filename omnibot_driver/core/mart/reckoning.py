@@ -358,7 +358,7 @@ class Reckoning:
         The error is the heading's standard deviation in rad. Both values are 0 except in a forward
         drive (RM).
         """
-        stale_s = max(0.0, now - self.heading.told_s - FRESH_S)
+        stale_s = max(0.0, now - max(self.heading.told_s, self._began_s) - FRESH_S)
         if self.motion is not Motion.REFERENCE:
             stale_s = 0.0
         return stale_s, _turn_error_rad(stale_s)

@@ -3,6 +3,7 @@
 """Tests of odometry when replies are lost, late or doubled, or belong to another query."""
 
 import math
+from dataclasses import astuple
 
 import pytest
 from honesty import nees
@@ -343,3 +344,15 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
     loop.trip_s = 0.05
     loop.begin(20, reverse, 0.0)
     assert loop.change(0.4, 0.0, 1.0) == (most, most)
+
+
+def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
+    """The server has not reported a heading yet, and a drive begins.
+
+    Each covariance is finite, so the driver's checks of the odometry refuse none.
+    """
+    odometry = MartOdometry(MartSettings())
+    odometry.begin(Motion.REFERENCE, 100.0)
+    for ahead_s in (0.0, 0.1, 0.5, 2.0):
+        told = odometry.told(100.0 + ahead_s, blind_since_s=None)
+        assert all(map(math.isfinite, astuple(told.covariance)))
