@@ -177,10 +177,8 @@ class Translation:
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
         began = left + right > 0 and _began_within(duration_s, ticks)
-        if began and not contradicted and self._unit == "ns":
-            began = self._restart_is_shown(ticks, duration_s, now)
-        else:
-            began = began and contradicted
+        if began and not contradicted:
+            began = self._unit == "ns" and self._restart_is_shown(ticks, duration_s, now)
         if late or began or fewer > RESTARTED_TICKS:
             self.restarts += 1
             self.odometry.restarted(now, age_s)

@@ -258,9 +258,8 @@ class Ground:
         odometry = self.odometry
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 
-    @property
-    def _heading_first(self) -> bool:
-        """Whether the driver must read the heading before it reads the encoder.
+    def _waits_for_heading(self) -> bool:
+        """Return whether to read the heading before the encoder. Report it if no heading comes.
 
         After a forward drive (RM), the last heading must come before the encoder count that ends
         the motion. The driver waits for this heading for at most HEADING_S, plus HEADING_TRIPS

@@ -254,7 +254,7 @@ class Pilot(Hearing):
         if self.state is State.STILL and self._suspects_copy:
             due.sort(key=lambda word: word is not words.ENC)
         for word in due:
-            if word is words.ENC and self._heading_first:
+            if word is words.ENC and self._waits_for_heading():
                 continue
             if word is words.VOLTS and not self._may_ask_volts(now):
                 continue
