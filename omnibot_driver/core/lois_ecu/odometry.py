@@ -55,6 +55,9 @@ class LoisOdometry:
         self._kind = BoardKind(self._motion)
         self._ticks: Ticks | None = None
         self._begun = False
+        self._estimated = False
+        """Whether no time has passed since the last estimate. Reports that were read together with
+        its ticks may still show the motion before it."""
         self._may_roll_mps = [0.0, 0.0]
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -295,6 +298,10 @@ class LoisOdometry:
 
     def _advance(self, now: float) -> None:
         since_s = max(now - 0.5, self._advanced_s) if self._at_s == -math.inf else self._at_s
+        if self._estimated and now > since_s:
+            self._estimated = False
+            for wheel in self._motion.wheels:
+                wheel.blind = False
         self._motion.advance(since_s, now)
         self._at_s = self._advanced_s = max(now, self._at_s)
 
@@ -315,8 +322,7 @@ class LoisOdometry:
         elif self._source in ("standing", "ticks"):
             self._source = "commands"
         self._heading_compared = False
-        for wheel in motion.wheels:
-            wheel.blind = False
+        self._estimated = True
         fused = self._fused(self._at_s)
         self._uncertainty.move(self._pose.yaw_rad, self._tangent(fused.wheel_ways_m))
         self._sizes.move(*fused.wheel_ways_m, motion.turn_sign * motion.track_m)

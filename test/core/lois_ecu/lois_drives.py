@@ -35,6 +35,8 @@ HOST_GAINS = LoisEcuSettings(
 With the board's own gains (public firmware), the right wheel's speed would oscillate.
 """
 REPEAT_S = 0.05
+LATE_READS_S = (0.05, 0.35)
+"""Least and greatest time between two reads of a very busy computer, in s."""
 
 Program = list[tuple[float, tuple[float, float]]]
 """Steps of a drive. Each has a duration in s and the set-points of left and right wheel in RPM."""
@@ -176,12 +178,20 @@ class Rig:
     ``estimates``: all estimates of the odometry, each with the true pose.
 
     ``loss``: probability that a byte is lost.
+
+    ``reads_s``: least and greatest time between two reads of the driver, in s.
     """
 
     def __init__(
-        self, settings: LoisSettings, ours: LoisEcuSettings | None = None, *, loss: float = 0.0
+        self,
+        settings: LoisSettings,
+        ours: LoisEcuSettings | None = None,
+        *,
+        loss: float = 0.0,
+        reads_s: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self._loss, self._random = loss, Random(f"line {settings.seed}")
+        self._reads_s, self._unread, self._read_at_s = reads_s, b"", 0.0
         self.board = SimulatedLois(settings)
         self.driver = LoisConversation(HOST_GAINS if ours is None else ours)
         self.estimates: list[tuple[FusedOdometry, Pose]] = []
@@ -214,8 +224,8 @@ class Rig:
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))
             before = self.place
-            found = self.driver.receive(self._arrived(self.board.step()), self.now)
-            found += self.driver.receive(b"", self.now)
+            self._unread += self._arrived(self.board.step())
+            found = self._read()
             way = before.way_to(self.place)
             self.way_m += way.way_m
             self.turned_rad += abs(way.yaw_rad)
@@ -223,6 +233,13 @@ class Rig:
             for reading in found:
                 if isinstance(reading, FusedOdometry):
                     self.estimates.append((reading, self.place))
+
+    def _read(self) -> list[LoisReading]:
+        if self.now < self._read_at_s:
+            return self.driver.receive(b"", self.now) if self.now >= self.driver.held_until else []
+        self._read_at_s = self.now + self._random.uniform(*self._reads_s)
+        data, self._unread = self._unread, b""
+        return self.driver.receive(data, self.now) + self.driver.receive(b"", self.now)
 
     def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
         """Send the set-points every ``REPEAT_S`` for ``seconds``. Two zeros are sent as Stop."""
@@ -268,13 +285,19 @@ class Rig:
 
 
 def motion(
-    settings: LoisSettings, name: str, ours: LoisEcuSettings | None = None, *, side_m: float = 5.0
+    settings: LoisSettings,
+    name: str,
+    ours: LoisEcuSettings | None = None,
+    *,
+    side_m: float = 5.0,
+    reads_s: tuple[float, float] = (0.0, 0.0),
 ) -> Drive:
     """Drive one of the motions ``MOTIONS`` or ``VARIED``, and return the outcome.
 
-    The encoders begin at random positions between two ticks.
+    The encoders begin at random positions between two ticks. ``reads_s``: least and greatest time
+    between two reads of the driver, in s.
     """
-    rig = Rig(settings, ours)
+    rig = Rig(settings, ours, reads_s=reads_s)
     random = Random(f"encoders {settings.seed}")
     for encoder in rig.board._vehicle.encoders:
         encoder._periods = random.random()

@@ -7,7 +7,7 @@ from dataclasses import replace
 from statistics import mean, median
 
 import pytest
-from lois_drives import HOST_GAINS, drive, driven, motion, nominal, off_m, wrong
+from lois_drives import HOST_GAINS, LATE_READS_S, drive, driven, motion, nominal, off_m, wrong
 
 from omnibot_driver.core.lois_ecu import measured_speed
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
@@ -68,6 +68,28 @@ def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)
+    assert one.sigmas < 3.5
+
+
+@pytest.mark.parametrize("seed", [1003, 1026, 1054])
+def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them(seed: int) -> None:
+    """The driver reads once in 0.05 to 0.35 s. Ticks and odometry then come in the same read.
+
+    Each wheel that stops is detected. If it were not, the position would be wrong by 4 m.
+    """
+    one = motion(wrong("firmware", seed), "straight back", LoisEcuSettings(), reads_s=LATE_READS_S)
+    assert off_m(one) < 0.5 * one.way_m
+    assert one.sigmas < 3.5
+
+
+def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
+    """In a turn, the backward wheel stops and is detected. The board's heading differs by far.
+
+    The heading is wrong, because the board computes it from the wheel's old speed. The wheel's
+    estimated speed stays zero.
+    """
+    one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
+    assert abs(one.error.yaw_rad) < math.radians(40)
     assert one.sigmas < 3.5
 
 
