@@ -201,7 +201,9 @@ class MotionFilter:
         Each state comes with the size of its error.
         """
         wheel, base = self.wheels[index], PER_WHEEL * index
-        terms = [*self._way_terms(index), (base + SPEED, 2.0)]
+        terms = self._way_terms(index)
+        if not wheel.rests:
+            terms = [*terms, (base + SPEED, 2.0)]
         counts = wheel.counts(self.speed_mps(index), signed=self.signed)
         if not counts and wheel.course.measured_sign:
             terms += [(TURN, 2.0 * index - 1), (ALONG, 0.5)]
