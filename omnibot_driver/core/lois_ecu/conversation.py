@@ -116,7 +116,7 @@ class LoisConversation:
                 self._stall.heard(report, at, self._translation.odometry.resting)
         stalled = self._stall.stalled(now)
         if self._translation.odometry.appends and any(stalled):
-            rolls_left, rolls_right = self._stall.saturated
+            rolls_left, rolls_right = self._stall.may_roll
             self._translation.odometry.stalled(
                 (stalled[0] and not rolls_left, stalled[1] and not rolls_right)
             )

@@ -14,9 +14,9 @@ from typing import Final
 SAME_RPM: Final = 0.1
 SLOWEST_RPM: Final = 4.5
 FASTEST_RPM: Final = 23.5
-"""``SLOWEST_RPM``, ``FASTEST_RPM``: range of the last speed that the board measures before a wheel
-stops. A lower speed is that of a wheel that starts. At a higher speed, at least one more tick
-follows."""
+"""``SLOWEST_RPM``, ``FASTEST_RPM``: usual range of the last speed that the board measures before a
+wheel stops. A lower speed is that of a wheel that starts. At a higher speed, at least one more tick
+follows, unless the speed was measured wrong."""
 FAST_RPM: Final = 19.5
 FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
@@ -29,6 +29,7 @@ FAST: Final[tuple[float, ...]] = (0.0, 0.1, 0.5, 1.0)
 FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
+FASTER: Final[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 1.0)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that a wheel is at rest. Index: how often the reported speed has been repeated. The
 values were counted on the public firmware:
@@ -40,6 +41,9 @@ values were counted on the public firmware:
 ``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
 
 ``NEAR``: after a smaller fall.
+
+``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. These values were
+not counted, but assumed. Such a speed is wrong if the board noticed the last tick but one late.
 
 ``TUNED``: after any fall, if the user set the gains.
 """
@@ -97,7 +101,7 @@ class RestingWheel:
         self._lately.append((self._clock_s, rpm))
         chances = self._chances(rpm)
         if chances and tuned:
-            chances = TUNED
+            chances = TUNED if rpm < FASTEST_RPM else ()
         self.chance = chances[min(self._repeats, len(chances) - 1)] if chances else 0.0
 
     def _chances(self, rpm: float) -> tuple[float, ...]:
@@ -105,7 +109,9 @@ class RestingWheel:
 
         Empty if the wheel surely rolls.
         """
-        if not SLOWEST_RPM < rpm < FASTEST_RPM:
+        if rpm >= FASTEST_RPM:
+            return FASTER if self._fell_rpm >= FELL_FAR_RPM else ()
+        if rpm <= SLOWEST_RPM:
             return ()
         if rpm > FAST_RPM:
             return FAST if self._fell_rpm >= FELL_RPM else ()

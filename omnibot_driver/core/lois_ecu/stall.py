@@ -40,14 +40,15 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``saturated``: for each wheel, whether full power may keep it rolling at a constant speed.
+    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. The reason
+    is that its speed is too high for a wheel that has stopped.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self.settings = settings
         self._targets = [0, 0]
         self._seen_at = [math.inf, math.inf]
-        self.saturated = [False, False]
+        self.may_roll = [False, False]
         self._quiet = [0, 0]
         """For each wheel: number of reports without motion, since the wheel last turned or was
         started. Only reports that could have shown its motion are counted."""
@@ -65,7 +66,7 @@ class StallWatch:
                 self._seen_at[wheel] = math.inf
             elif self._seen_at[wheel] == math.inf or target * self._targets[wheel] < 0:
                 self._seen_at[wheel], self._quiet[wheel] = now, 0
-                self.saturated[wheel] = False
+                self.may_roll[wheel] = False
         self._targets = targets
 
     def heard(
@@ -126,10 +127,10 @@ class StallWatch:
         # down, and a repeated speed is that of a wheel at rest. Exceptions: a feed-forward gives
         # power at any speed, and a saturated controller may keep full power until RPM 0/0 restarts
         # it.
-        too_fast = self._too_fast(wheel, told)
+        repeats = self._too_fast(wheel, told) or not same[1 - wheel]
         fastest_mps = FASTEST_RPM * self.settings.rim_mps_per_rpm
-        self.saturated[wheel] |= too_fast and abs(told[wheel]) > fastest_mps
-        return too_fast or not same[1 - wheel]
+        self.may_roll[wheel] |= repeats and abs(told[wheel]) > fastest_mps
+        return repeats
 
     def _too_fast(self, wheel: int, told: tuple[float, float]) -> bool:
         """Return whether the reported speed is too high for a wheel that rolls steadily."""
@@ -151,4 +152,4 @@ class StallWatch:
         self._quiet[wheel] += 1
         if turns and self._seen_at[wheel] != math.inf:
             self._seen_at[wheel], self._quiet[wheel] = now, 0
-            self.saturated[wheel] = False
+            self.may_roll[wheel] = False
