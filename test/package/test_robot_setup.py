@@ -1,17 +1,21 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the udev rules and the systemd unit: they are well formed, and as documented."""
+"""Tests of the udev rules, the systemd unit and the container: well formed, and as documented."""
 
 import re
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from omnibot_driver import guard
+
 ROOT = Path(__file__).parents[2]
 RULES = ROOT / "udev/99-omnibot.rules"
 UNIT = ROOT / "systemd/omnibot-driver.service"
+OUTLIVE = ROOT / "docker/outlive"
 
 TOKEN = re.compile(r'([A-Z]+(?:\{[\w/]+\})?)(==|!=|\+=|:=|=)"([^"]*)"')
 MATCHES = {"ACTION", "SUBSYSTEM", "DRIVER", "ATTRS{idVendor}", "ATTRS{idProduct}"}
@@ -118,3 +122,28 @@ def test_systemd_accepts_the_unit() -> None:
         check=False,
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_the_first_process_of_a_container_outlives_the_guard() -> None:
+    """The driver in a container crashes. Its guard repeats Stop for a second.
+
+    The container's first process lives longer than this, because its end kills the guard.
+    """
+    (pause_s,) = re.findall(r"^sleep ([\d.]+)$", OUTLIVE.read_text(), re.MULTILINE)
+    assert float(pause_s) > guard.TIMES * guard.PACE_S
+    assert str(OUTLIVE.relative_to(ROOT)) in (ROOT / "docker/Dockerfile").read_text()
+
+
+def test_the_first_process_of_a_container_passes_a_stop_on() -> None:
+    """``docker stop`` sends SIGTERM to the first process, and the driver receives it.
+
+    The exit code is that of the driver.
+    """
+    driver = "trap 'exit 7' TERM; echo ready; while :; do sleep 0.1; done"
+    with subprocess.Popen(
+        [OUTLIVE, "bash", "-c", driver], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait() == 7
