@@ -5,6 +5,7 @@
 This module knows signals and the executor; it does not know what the node does.
 """
 
+import contextlib
 import os
 import re
 import select
@@ -15,10 +16,12 @@ import time
 from typing import Final
 
 from omnibot_driver.core.errors import ParameterError
-from omnibot_driver.output import UnblockedOutput
+from omnibot_driver.output import UnblockedOutput, fill_gaps
 
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 4.0
+LARGEST_DOMAIN: Final = 232
+"""Largest ROS_DOMAIN_ID of Fast DDS: that of the last UDP ports."""
 USAGE: Final = "give parameters like this: --ros-args -p port:=/dev/ttyUSB0"
 HELP: Final = f"""\
 usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]
@@ -84,12 +87,20 @@ def main(args: list[str] | None = None) -> int:
     The main thread must only wait: a second signal must not interrupt the shutdown.
     """
     args = sys.argv if args is None else args
-    with UnblockedOutput():
-        if {"-h", "--help"}.intersection(args[1:]):
+    fill_gaps()
+    if {"-h", "--help"}.intersection(args[1:]):
+        with UnblockedOutput():
             print(HELP)
-            return 0
+        return 0
+    # The import takes half a second. Ending is ready before it, so a signal during the import ends
+    # the driver. If RMW_IMPLEMENTATION is wrong, ROS says so and ends the process in the import.
+    # The pipe of UnblockedOutput would lose this text.
+    ending = Ending()
+    with contextlib.suppress(ImportError):
+        import rclpy._rclpy_pybind11  # noqa: F401
+    with UnblockedOutput():
         try:
-            return _main(args)
+            return _main(ending, args)
         except ModuleNotFoundError as error:
             return _refuse(f"{error}; {SETUP}")
 
@@ -106,16 +117,21 @@ def in_plain_words(text: str) -> str:
     return "; ".join([text, *(hint for words, hint in HINTS.items() if words in text)])
 
 
-def _main(args: list[str]) -> int:
-    ending = Ending()
-    # This import takes half a second. Ending is ready before it, so a signal during the import
-    # ends the driver.
+def too_large(domain: str) -> bool:
+    """Return whether Fast DDS would end the process without a message because of this domain."""
+    return domain.isdecimal() and int(domain) > LARGEST_DOMAIN
+
+
+def _main(ending: Ending, args: list[str]) -> int:
     import rclpy
     from rclpy._rclpy_pybind11 import RCLError, UnknownROSArgsError
     from rclpy.exceptions import NameValidationException, ParameterException
     from rclpy.signals import SignalHandlerOptions
-    from rclpy.utilities import remove_ros_args
+    from rclpy.utilities import get_rmw_implementation_identifier, remove_ros_args
 
+    domain = os.environ.get("ROS_DOMAIN_ID", "")
+    if get_rmw_implementation_identifier().startswith("rmw_fastrtps") and too_large(domain):
+        return _refuse(f"ROS_DOMAIN_ID is {domain}; Fast DDS allows at most {LARGEST_DOMAIN}")
     try:
         if unknown := remove_ros_args(args)[1:]:
             return _refuse(f"unknown argument {' '.join(unknown)}; {USAGE}")

@@ -24,7 +24,7 @@ class UnblockedOutput:
     """A context in which writes to standard output and standard error never block."""
 
     def __enter__(self) -> Self:
-        _fill_gaps()
+        fill_gaps()
         if os.isatty(2):
             os.environ.setdefault("RCUTILS_COLORIZED_OUTPUT", "1")  # rcutils sees no terminal
         self._originals = [os.dup(descriptor) for descriptor in STANDARD]
@@ -60,7 +60,7 @@ class UnblockedOutput:
             os.close(original)
 
 
-def _fill_gaps() -> None:
+def fill_gaps() -> None:
     """Open /dev/null on each of the descriptors 0 to 2 that is closed.
 
     Otherwise the serial port might get the descriptor of standard output, and receive the log.

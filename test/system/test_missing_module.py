@@ -1,7 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the driver in a shell in which ROS is not set up."""
+"""Tests of the driver in a shell in which ROS is not set up, or set up wrongly."""
 
+import os
 import subprocess
 import sys
 
@@ -28,3 +29,30 @@ def test_it_says_what_is_missing_and_what_to_do(library: str) -> None:
     assert done.stderr.count("\n") == 1
     assert library in done.stderr
     assert "source /opt/ros/jazzy/setup.bash" in done.stderr
+
+
+def started_with(**environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a driver that cannot start with these environment variables."""
+    return subprocess.run(
+        [sys.executable, "-m", "omnibot_driver.driver", "--ros-args", "-p", "port:=sim://"],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_it_says_that_a_domain_is_too_large() -> None:
+    """ROS_DOMAIN_ID has no UDP ports. The driver says so. Fast DDS would end it in silence."""
+    done = started_with(ROS_DOMAIN_ID="233")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "omnibot_driver cannot start: ROS_DOMAIN_ID is 233; Fast DDS allows at most 232\n"
+    )
+
+
+def test_what_ros_says_about_a_missing_middleware_is_not_lost() -> None:
+    """RMW_IMPLEMENTATION is misspelt. ROS ends the process, and its message reaches the user."""
+    done = started_with(RMW_IMPLEMENTATION="rmw_fastdds_cpp")
+    assert done.returncode not in (0, None)
+    assert "rmw_fastdds_cpp" in done.stderr
