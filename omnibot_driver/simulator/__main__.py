@@ -25,14 +25,15 @@ _CONSOLE_HELP = """\
 truth    print the true pose and the true state of the robot as one line of JSON
 reboot   power-cycle the board; the robot stays where it is
 help     print this list
-quit     end the simulator; ctrl-C and SIGTERM end it too, the end of the input does not"""
+quit     end the simulator; ctrl-C, SIGTERM and a closed terminal end it too, the end of the input
+         does not"""
 
 _HEALTH_CHECK_S = 0.5
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a simulated board until SIGINT, SIGTERM or ``quit``; return the exit code."""
-    chooser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    """Run a simulated board until a signal or ``quit``; return the exit code."""
+    chooser = argparse.ArgumentParser(prog="simulator", add_help=False, allow_abbrev=False)
     _add_board(chooser)
     name = chooser.parse_known_args(argv)[0].board
     if name not in boards():
@@ -52,7 +53,7 @@ def boards() -> list[str]:
 
 
 def run(module: SimulatorModule, name: str, argv: Sequence[str] | None) -> int:
-    """Run the board of ``module`` until SIGINT, SIGTERM or ``quit``; return the exit code."""
+    """Run the board of ``module`` until a signal or ``quit``; return the exit code."""
     arguments = _parser(module).parse_args(argv)
     board, lines = options.from_arguments(arguments, module)
     # The driver refuses relative paths, and the hint is for another terminal.
@@ -128,14 +129,16 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 
 @contextmanager
 def _signals_as_readable() -> Iterator[int]:
-    """Yield a descriptor that becomes readable when SIGINT or SIGTERM arrives.
+    """Yield a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives.
 
-    These signals have no other effect.
+    These signals have no other effect. SIGHUP is left alone if it is ignored, as by nohup.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
     old_writer = signal.set_wakeup_fd(writer)
-    ending = (signal.SIGINT, signal.SIGTERM)
+    ending = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        ending.append(signal.SIGHUP)
     old_handlers = [signal.signal(number, lambda *_: None) for number in ending]
     try:
         yield reader
@@ -152,19 +155,40 @@ def _serve(served: ServedBoard[SimulatedBoard], signalled: int) -> None:
     console = sys.stdin.fileno() if sys.stdin else None
     held = b""
     while True:
-        watched = [signalled] if console is None else [signalled, console]
+        watched = [signalled]
+        if console is not None and not _is_in_background(console):
+            watched.append(console)
         readable, _, _ = select.select(watched, [], [], _HEALTH_CHECK_S)
         served.check()
         if signalled in readable:
             return
         if console in readable:
-            data = os.read(console, 4096)
+            data = _typed(console)
             if not data:
                 console = None
             *lines, held = (held + data).split(b"\n")
             for line in lines:
                 if not _answer(line.decode(errors="replace").strip(), served):
                     return
+
+
+def _is_in_background(console: int) -> bool:
+    """Return whether the console is a terminal that now belongs to another program, as after ``&``.
+
+    The kernel would suspend this process if it read from such a terminal.
+    """
+    try:
+        return os.tcgetpgrp(console) != os.getpgrp()
+    except OSError:  # not a terminal, or not that of this process
+        return False
+
+
+def _typed(console: int) -> bytes:
+    """Return the next input of the console; empty at its end, or if the terminal is gone."""
+    try:
+        return os.read(console, 4096)
+    except OSError:
+        return b""
 
 
 def _answer(command: str, served: ServedBoard[SimulatedBoard]) -> bool:

@@ -2,16 +2,20 @@
 
 """Tests of the simulator as a separate program, with toy boards."""
 
+import contextlib
+import fcntl
 import json
 import os
 import re
 import signal
 import subprocess
+import sys
+import termios
 from pathlib import Path
 
 import pytest
 import toy_lines
-from simulator_program import PATIENCE_S, line, say, toy
+from simulator_program import PATIENCE_S, ROOT, RUN_MODULE, line, say, toy
 
 from omnibot_driver import simulator as simulators
 from omnibot_driver.simulator.__main__ import boards, main, run
@@ -30,7 +34,7 @@ def test_the_console_helps_and_says_what_it_does_not_know() -> None:
     assert "no command 'fly'" in err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> None:
     """The program's input has ended. Only a signal ends the program.
 
@@ -45,6 +49,38 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
     assert process.returncode == 0
     assert "Traceback" not in err
     assert os.listdir(tmp_path) == []
+
+
+def test_in_the_background_it_leaves_the_terminal_to_other_programs() -> None:
+    """A user starts the program with ``&``, and types in the same terminal.
+
+    The kernel would suspend the program if it read what the user types. A suspended program would
+    not end at SIGTERM.
+    """
+    user, terminal = os.openpty()
+    os.write(user, b"quit\n")
+    shell = ["bash", "-c", 'set -m; "$@" & echo $!; wait $!', "bash"]
+    path = os.pathsep.join((str(ROOT), str(Path(__file__).parent)))
+    with subprocess.Popen(
+        [*shell, sys.executable, "-c", RUN_MODULE, "toy_udp"],
+        stdin=terminal,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+        start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),
+    ) as process:
+        simulator = int(line(process))
+        try:
+            assert line(process).startswith("udp://")
+            os.kill(simulator, signal.SIGTERM)
+            assert process.wait(PATIENCE_S) == 0
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(simulator, signal.SIGKILL)
+    for descriptor in (user, terminal):
+        os.close(descriptor)
 
 
 def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
