@@ -38,7 +38,7 @@ rejects a mixed array such as `[0.1, 0, 0]`. Put the value of a string parameter
 a word such as `on` or `no`. Without quotes, ROS reads such a word as true or false.
 
 A parameter file begins with `/**:`, which stands for every node. If the file begins with the name
-of another node or namespace, ROS ignores the file without a message.
+of another node or namespace, ROS ignores the file, and the driver warns you.
 """
 TYPES: Final = {bool: "bool", int: "int", float: "double", str: "string"}
 

@@ -158,16 +158,14 @@ def _main(ending: Ending, args: list[str]) -> int:
 def _run(ending: Ending, args: list[str]) -> None:
     from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 
+    from omnibot_driver import selfcheck
     from omnibot_driver.node import OmniBotDriver
 
     if ending.begun:
         return
     driver = OmniBotDriver(end=ending.begin)
-    if "--params-file" in args and not driver._parameter_overrides:
-        driver.get_logger().warning(
-            "the --params-file has no parameters for this node,"
-            f" {driver.get_fully_qualified_name()}; begin the file with /**:"
-        )
+    for advice in selfcheck.unread_files(args, driver.get_fully_qualified_name()):
+        driver.get_logger().warning(advice)
     executor = SingleThreadedExecutor()
     executor.add_node(driver)
     stopping = threading.Event()

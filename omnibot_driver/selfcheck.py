@@ -1,13 +1,17 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Advice on what disturbs the driver: settings of the computer, and other nodes.
+"""Advice on what disturbs the driver: settings of the computer, parameter files, and other nodes.
 
-This module reads sysfs; it does not use pyserial, ROS or a board.
+This module reads sysfs and parameter files; it does not use pyserial, ROS or a board.
 """
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
+
+import yaml
 
 from omnibot_driver.core.timing import clock_fit
 
@@ -73,6 +77,39 @@ def prefix_advice(prefix: str) -> str:
         f"frame_prefix '{prefix}' does not end with a slash, so the frame odom is named"
         f" {prefix}odom; if you do not want this, set frame_prefix to {prefix}/"
     )
+
+
+def unread_files(arguments: Sequence[str], node: str) -> list[str]:
+    """Return a warning for each parameter file of which ROS reads nothing for this node.
+
+    ``arguments``: the command line. ``node``: the node's full name, such as /robot1/omnibot_driver.
+    """
+    return [
+        f"the --params-file {file} has no parameters for this node, {node}; begin the file with"
+        " /**:"
+        for option, file in pairwise(arguments)
+        if option == "--params-file" and not _is_for(node, file)
+    ]
+
+
+def _is_for(node: str, file: str) -> bool:
+    try:
+        content = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
+    except (OSError, ValueError, yaml.YAMLError):
+        return True  # ROS has read the file, so nothing is known
+    return any(re.fullmatch(pattern, node) for pattern in _sections(content))
+
+
+def _sections(content: Any, above: str = "") -> Iterator[str]:
+    """Yield a pattern of the full names of nodes for each section of a parameter file.
+
+    In a name, ``*`` stands for one part of the name, and ``**`` for any number of parts.
+    """
+    for name, below in content.items() if isinstance(content, dict) else ():
+        if name == "ros__parameters":
+            yield above.replace("/**", r"(/\w+)*").replace("/*", r"/\w+")
+        else:
+            yield from _sections(below, f"{above}/{str(name).strip('/')}")
 
 
 def namesake_advice(name: str, publishers: Iterable[Any]) -> str:

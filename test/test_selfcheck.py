@@ -149,3 +149,36 @@ def test_publishers_of_the_other_type_are_named_with_the_remedy() -> None:
     text = selfcheck.type_conflict([teleop, nav], stamped=True)
     assert text.startswith("teleop publishes")
     assert text.endswith("enable_stamped_cmd_vel:=false")
+
+
+SECTION = "{name}:\n  ros__parameters:\n    max_linear_speed: 0.1\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "read"),
+    [
+        (SECTION.format(name="/**"), True),
+        (SECTION.format(name="/robot1/omnibot_driver"), True),
+        (SECTION.format(name="/robot1/*"), True),
+        (SECTION.format(name="/**/omnibot_driver"), True),
+        ("robot1:\n  omnibot_driver:\n    ros__parameters: {max_linear_speed: 0.1}\n", True),
+        (SECTION.format(name="/*"), False),
+        (SECTION.format(name="omnibot_driver"), False),
+        (SECTION.format(name="/robot2/omnibot_driver"), False),
+        ("", False),
+        (SECTION.format(name="omnibot_driver") + SECTION.format(name="/**"), True),
+    ],
+)
+def test_a_parameter_file_for_another_node_is_told_of(
+    tmp_path: Path, content: str, read: bool
+) -> None:
+    """A parameter file may name other nodes only. ROS then ignores it without a message.
+
+    The message has the names of the file and of the node.
+    """
+    file = tmp_path / "robot.yaml"
+    file.write_text(content)
+    arguments = ["driver", "--ros-args", "--params-file", str(file), "-p", "port:=sim://"]
+    told = selfcheck.unread_files(arguments, "/robot1/omnibot_driver")
+    assert bool(told) is not read
+    assert all(str(file) in text and "/robot1/omnibot_driver;" in text for text in told)
