@@ -3,6 +3,7 @@
 """Tests that a finished measurement is kept if its result cannot be drawn, saved or printed."""
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,6 +17,7 @@ from omnibot_driver import boards, calibration
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.tools.calibrate import connection, imu
 from omnibot_driver.tools.calibrate.__main__ import main
+from omnibot_driver.tools.calibrate.interruption import Interruption
 from omnibot_driver.tools.calibrate.result import Finding, Result
 
 FOUND = {"linear_scale": 71.3}
@@ -41,9 +43,18 @@ def ending(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Ending:
     """Return a function that runs ``calibrate`` with a given result and returns its exit code."""
 
     @contextmanager
-    def connect(*_arguments: object) -> Iterator[SimpleNamespace]:
+    def connect(
+        _namespace: str, _arguments: object, interruption: Interruption
+    ) -> Iterator[SimpleNamespace]:
+        def interrupted(_values: object) -> None:
+            os.kill(os.getpid(), signal.SIGINT)
+            interruption.check()
+
         yield SimpleNamespace(
-            parameters=boards.check_all({}), table=PARAMETERS, driver="/omnibot_driver"
+            parameters=boards.check_all({}),
+            table=PARAMETERS,
+            driver="/omnibot_driver",
+            apply=interrupted,
         )
 
     def end(
@@ -94,6 +105,18 @@ def test_a_file_that_cannot_be_written_costs_the_file_alone(
     said = capsys.readouterr()
     assert "parameter 'linear_scale' must be" in said.err
     assert "1e+09" in said.out
+
+
+def test_an_interruption_after_the_result_is_saved_says_where_it_is(
+    ending: Ending, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The user presses ctrl-C while ``--apply`` sets the parameters. The file is written already.
+
+    The message says so.
+    """
+    assert ending("--apply") == 130
+    assert calibration.load(tmp_path / "robot.yaml", PARAMETERS) == FOUND
+    assert f"and the result is saved to {tmp_path}/robot.yaml" in capsys.readouterr().err
 
 
 def test_a_broken_pipe_loses_nothing(

@@ -26,9 +26,12 @@ class Interruption:
     """A context manager that handles SIGINT, SIGTERM and SIGHUP.
 
     Outside the main thread it does nothing.
+
+    ``outcome``: words about the result, for the message of an interruption.
     """
 
     def __init__(self) -> None:
+        self.outcome = "nothing was written"
         self._requested = self._asking = self._deferred = False
 
     def __enter__(self) -> Self:
@@ -49,7 +52,7 @@ class Interruption:
     def check(self) -> None:
         """Raise Interrupted if a signal was received, except in a ``deferred`` context."""
         if self._requested and not self._deferred:
-            raise Interrupted("interrupted: the robot is stopped, and nothing was written")
+            raise Interrupted(f"interrupted: the robot is stopped, and {self.outcome}")
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
