@@ -12,10 +12,10 @@ from driver_process import Driver
 from probe import Probe
 
 
-def report(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def report(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "omnibot_driver.tools.report", "--output", folder, *arguments],
-        env={**os.environ, "MPLCONFIGDIR": str(folder.parent)},
+        env={**os.environ, "MPLCONFIGDIR": str(folder.parent), **environment},
         capture_output=True,
         text=True,
         check=False,
@@ -46,3 +46,11 @@ def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
     assert done.stderr.startswith("report: no driver was heard")
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_if_ros_does_not_start_it_says_so(tmp_path: Path) -> None:
+    """ROS refuses the domain. ``report --live`` prints one sentence instead of a traceback."""
+    done = report(tmp_path / "out", "--live", "3", ROS_DOMAIN_ID="robots")
+    assert done.returncode == 1
+    assert done.stderr.startswith("report: ROS does not start: ")
+    assert done.stderr.count("\n") == 1

@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import Any, Final
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -42,10 +43,13 @@ def listen(
 
     Raises ToolError if no robot is found or no message arrives.
     """
-    rclpy.init(
-        args=["--ros-args", "--disable-external-lib-logs"],
-        signal_handler_options=SignalHandlerOptions.NO,
-    )
+    try:
+        rclpy.init(
+            args=["--ros-args", "--disable-external-lib-logs"],
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+    except RCLError as error:
+        raise ToolError(f"ROS does not start: {error}") from error
     try:
         node = rclpy.create_node("omnibot_report")
         executor = SingleThreadedExecutor()
@@ -65,7 +69,7 @@ def listen(
         rclpy.try_shutdown()
     if not recorder.count:
         raise ToolError(
-            f"the driver of {robot} sent nothing for {seconds:g} s: is it still running?"
+            f"the driver of {robot} sent nothing for {spent_s:.1f} s: is it still running?"
         )
     return recorder.log(alone=alone)
 
@@ -104,7 +108,7 @@ def _discover(
             if robots:
                 raise
             raise ToolError(
-                f"no driver was heard for {DISCOVERY_S:g} s: is one running, with the same"
+                f"no driver was heard for {spent_s:.0f} s: is one running, with the same"
                 " ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?"
             ) from error
         return robot, topics, kinds, len(robots) == 1
