@@ -2,7 +2,8 @@
 
 """Finds running drivers of any board by the topics that every driver publishes."""
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 SIGNS: Final = {"state": "std_msgs/msg/String", "estop_active": "std_msgs/msg/Bool"}
@@ -29,3 +30,15 @@ def running_drivers(node: Any) -> list[str]:
         for name in drivers_among((topic, kind) for topic, kinds in found for kind in kinds)
         if all(node.count_publishers(f"{name}/{sign}") for sign in SIGNS)
     ]
+
+
+def discovery_advice(environment: Mapping[str, str] = os.environ) -> str:
+    """Return the end of a message about a driver that was not found; usually empty.
+
+    With a discovery server, a process that is not a super client sees no driver in any list.
+    """
+    if not environment.get("ROS_DISCOVERY_SERVER"):
+        return ""
+    if environment.get("ROS_SUPER_CLIENT", "").upper() in ("TRUE", "1"):
+        return ""
+    return "; because ROS_DISCOVERY_SERVER is set, this tool also needs ROS_SUPER_CLIENT=TRUE"

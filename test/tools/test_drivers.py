@@ -4,7 +4,9 @@
 
 from types import SimpleNamespace
 
-from omnibot_driver.tools.drivers import drivers_among, running_drivers
+import pytest
+
+from omnibot_driver.tools.drivers import discovery_advice, drivers_among, running_drivers
 
 STRING, BOOL = "std_msgs/msg/String", "std_msgs/msg/Bool"
 
@@ -34,3 +36,19 @@ def test_one_that_is_only_listened_to_does_not_run() -> None:
         count_publishers=lambda name: counts[name],
     )
     assert running_drivers(node) == ["/a"]
+
+
+@pytest.mark.parametrize(
+    ("environment", "advised"),
+    [
+        ({}, False),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811"}, True),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811", "ROS_SUPER_CLIENT": "FALSE"}, True),
+        ({"ROS_DISCOVERY_SERVER": "10.0.0.1:11811", "ROS_SUPER_CLIENT": "TRUE"}, False),
+    ],
+)
+def test_with_a_discovery_server_a_tool_says_that_it_must_be_a_super_client(
+    environment: dict[str, str], advised: bool
+) -> None:
+    """A tool finds no driver through a discovery server. It names the setting that is missing."""
+    assert ("ROS_SUPER_CLIENT=TRUE" in discovery_advice(environment)) is advised

@@ -19,7 +19,7 @@ from std_srvs.srv import SetBool, Trigger
 from omnibot_driver import boards
 from omnibot_driver.parameters import Table, Value
 from omnibot_driver.tools.calibrate.interruption import Interruption
-from omnibot_driver.tools.drivers import running_drivers
+from omnibot_driver.tools.drivers import discovery_advice, running_drivers
 from omnibot_driver.tools.needs import ToolError
 
 FOUND_WITHIN_S: Final = 5.0
@@ -54,7 +54,7 @@ class Client:
         if not (others := running_drivers(self._node)):
             raise ToolError(
                 "no driver is running: start one (ros2 run omnibot_driver driver), or set"
-                " ROS_DOMAIN_ID to the value that the driver uses"
+                f" ROS_DOMAIN_ID to the value that the driver uses{discovery_advice()}"
             )
         own = self._namespace()
         place = f"in the namespace {own}" if own else "without a namespace"

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
+from omnibot_driver.tools.drivers import discovery_advice
 from omnibot_driver.tools.monitor import text
 from omnibot_driver.tools.monitor.model import View
 from omnibot_driver.tools.monitor.rates import WINDOW_S
@@ -133,7 +134,7 @@ def _find(feed: "Feed", timeout_s: float) -> None:
         domain = os.environ.get("ROS_DOMAIN_ID", "0")
         raise ToolError(
             f"no driver is running in ROS domain {domain}: start one with ros2 run omnibot_driver"
-            " driver, or set ROS_DOMAIN_ID to the driver's domain"
+            f" driver, or set ROS_DOMAIN_ID to the driver's domain{discovery_advice()}"
         )
     namespace, _, name = there[0].rpartition("/")
     others = f"--namespace {namespace or '/'}" + (

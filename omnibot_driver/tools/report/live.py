@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 
+from omnibot_driver.tools.drivers import discovery_advice
 from omnibot_driver.tools.needs import ToolError
 from omnibot_driver.tools.report.log import Log
 from omnibot_driver.tools.report.recorder import DIAGNOSTICS, EVENTS, Recorder
@@ -109,7 +110,7 @@ def _discover(
                 raise
             raise ToolError(
                 f"no driver was heard for {spent_s:.0f} s: is one running, with the same"
-                " ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?"
+                f" ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE as here?{discovery_advice()}"
             ) from error
         return robot, topics, kinds, len(robots) == 1
 
