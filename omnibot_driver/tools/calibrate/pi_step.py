@@ -49,6 +49,9 @@ The period is long, because the board can miss encoder ticks while it sends.
 """
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
+UNRESTORED: Final = (
+    "driver and board keep the values of this measurement for {}; restart both to remove them"
+)
 
 Records = dict[str, list[Column]]
 """For each side (left or right) a list with one entry per record: the times between ticks, in s."""
@@ -75,8 +78,11 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         bench = _Bench(robot, lambda count: show(count / total), arguments.responses)
         try:
             wheels = _found(bench, arguments, goals)
-        except BaseException:
+        except BaseException as error:
             _restore(bench, before, names)
+            left = [n for n in names if before[n] is None and robot.parameters[n] is not None]
+            if left and isinstance(error, ToolError):
+                raise type(error)(f"{error}; {UNRESTORED.format(', '.join(left))}") from error
             raise
         worse = [wheel.name for wheel in wheels if wheel.worse]
         gains = [name for side in worse for name in _names("kp", "tn", "td", sides=(side,))]

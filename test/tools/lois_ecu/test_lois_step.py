@@ -342,6 +342,22 @@ def test_a_robot_is_calibrated_from_its_records(
     assert all(name in PARAMETERS.calibrated for name in result.parameters)
 
 
+def test_values_that_an_ended_measurement_leaves_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The tool ends early. It cannot restore parameters that had no value, so it names them."""
+
+    def fail(*_arguments: object) -> None:
+        raise ToolError("the robot does not move")
+
+    monkeypatch.setattr(pi_step, "tune", fail)
+    robot = SimulatedRobot(tmp_path, random_motors(5))
+    words = ["step", "--yes", "--records", "1", "--responses", "1", "--samples", "100"]
+    with pytest.raises(ToolError, match=r"not move; .* left_short_correction, .*; restart both"):
+        step.run(robot, Console(yes=True), command_line().parse_args(words))
+    assert robot.parameters["left_short_correction"] is not None
+
+
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
     """The predicted control error of a step is larger with slow gains than with tuned gains."""
     good = tune(PLANT, LOOP, Goals()).gains
