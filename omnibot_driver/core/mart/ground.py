@@ -228,6 +228,7 @@ class Ground:
     def _appears(self, now: float) -> None:
         """Record that the server may have been restarted, and that its log may be lost."""
         self.appeared_s = now
+        self.odometry.appear()
         self.jobs.log_may_be_lost = self.jobs.logging
         self.jobs.ended = False
 

@@ -115,6 +115,11 @@ class Reckoning:
             self.doubt.add(UNHEARD_M**2, UNHEARD_RAD**2)
         self.speeds.forget()
 
+    def appear(self) -> None:
+        """Record that the server may have been restarted: count and heading may begin at zero."""
+        self.wheel.appear()
+        self.heading.may_begin_anew = True
+
     def begin(self, motion: Motion, now: float) -> None:
         """Record that a motion was started; its encoder count begins at zero."""
         if motion is not Motion.REFERENCE and self.heading.from_s < self._stood_s:
@@ -204,6 +209,8 @@ class Reckoning:
             return False
         known = self.heading.is_known
         angle_rad = math.radians(degrees) * self._settings.heading_sign
+        if self.heading.begins_anew(angle_rad) and self.motion is not Motion.NONE:
+            self.doubt.add(0.0, ANY_RAD**2)
         changed = self.heading.tell(angle_rad, when, self._stood_s)
         if not known and self.heading.is_known and self.motion is Motion.REFERENCE:
             self.doubt.add(0.0, (BEGIN_RADPS * (when.at_s - self._began_s)) ** 2)

@@ -55,6 +55,8 @@ class RelativeHeading:
         self._before_rad = 0.0
         self._turned_rad = 0.0
         self.same = 0
+        self.may_begin_anew = False
+        """Whether the server may have been restarted since the last heading, and reports zero."""
         self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 
@@ -118,6 +120,10 @@ class RelativeHeading:
             return False
         if at_s <= before_s:
             return False
+        if self.begins_anew(angle_rad):
+            self._take(angle_rad, when)
+            self.from_s = when.from_s
+            return False
         turn_rad = angle_rad - before_rad
         moved_s = max(0.0, min(at_s, stood_s) - before_s)
         late_s = moved_s + when.spread_s
@@ -135,8 +141,14 @@ class RelativeHeading:
             self.changed_s, self.same = at_s, 0
         return bool(turn_rad)
 
+    def begins_anew(self, angle_rad: float) -> bool:
+        """Return whether a reported heading is the zero of a restarted server, not a turn."""
+        known = self._angle_rad is not None and abs(self._angle_rad) > OLD_RAD
+        return self.may_begin_anew and angle_rad == 0.0 and known
+
     def _take(self, angle_rad: float, when: Moment) -> None:
         self._odd = 0
+        self.may_begin_anew = False
         self._angle_rad, self.told_s = angle_rad, when.at_s
         self._track.append((when.at_s, self._turned_rad))
         self.rate_radps = 0.0

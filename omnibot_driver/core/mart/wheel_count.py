@@ -80,14 +80,20 @@ class WheelCount:
     def refused(self) -> None:
         """Record that the motion did not begin, so the count continues from its last value.
 
-        Ignored if the server has acknowledged the motion.
+        Ignored if the server has acknowledged the motion, or if its counts have come: they are in
+        the pose already, and the server has rather been restarted since then.
         """
-        if not self._confirmed:
+        if self._begins and not self._confirmed:
             self.last, self._begins = self._before, False
 
     def connect(self) -> None:
         """Begin a new connection; the robot may have moved, or the server may have restarted."""
         self.may_begin_anew = self._unseen = True
+
+    def appear(self) -> None:
+        """Record that the server answers after an absence, in which it may have been restarted."""
+        if self.last is not None:
+            self.may_begin_anew = self._unseen = True
 
     def rest(self) -> None:
         """Record that the motion is over. The next step begins at the last count received."""

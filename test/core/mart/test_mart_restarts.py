@@ -2,6 +2,8 @@
 
 """Tests of a server that is restarted or lost: the driver starts no motion before it is ready."""
 
+from itertools import pairwise
+
 import pytest
 from mart_bench import MartBench
 from mart_campaign import FIRMWARES
@@ -177,3 +179,46 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
     bench.server.restart()
     bench.command(0.0, 0.5, 6.0)
     assert bench.robot.board.facts["yaw_rate_radps"] == pytest.approx(0.5, rel=0.15)
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("motion", [(0.2, 0.0), (-0.2, 0.0), (0.0, 0.5)])
+@pytest.mark.parametrize("boot_s", [0.05, 0.3, 1.0])
+def test_odometry_goes_on_if_the_server_is_restarted_while_the_robot_drives(
+    boot_s: float, motion: tuple[float, float], firmware: Firmware
+) -> None:
+    """The server restarts in a drive, and knows of no motion when it is to stop it.
+
+    The driver took the start for lost, and added the whole drive to the pose once more.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 5.0)
+    bench.server.restart(boot_s)
+    bench.command(*motion, 1.0)
+    bench.run(8.0)
+    assert bench.robot.stands
+    assert bench.error.way_m < 0.1
+    assert abs(bench.error.yaw_rad) < 0.25
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+@pytest.mark.parametrize("motion", [(0.2, 0.0), (0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)])
+def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
+    motion: tuple[float, float], firmware: Firmware
+) -> None:
+    """The controller loses its power for a second. Its count and heading begin at zero again.
+
+    The driver took this for a drive back to the start: with 5 s of driving, 1 m within 50 ms.
+    """
+    bench = MartBench(firmware).ready()
+    bench.command(*motion, 5.0)
+    known = len(bench.odometry) - 1
+    bench.robot.board.reboot()
+    bench.command(*motion, 1.0)
+    bench.run(8.0)
+    assert bench.robot.stands
+    poses = [estimate.pose for estimate in bench.odometry[known:]]
+    assert max(one.way_to(other).way_m for one, other in pairwise(poses)) < 0.25
+    error, noise = bench.error, bench.odometry[-1].covariance
+    assert error.way_m < 0.2
+    assert error.yaw_rad**2 < 4.0 * noise.yaw_yaw + 0.05**2
