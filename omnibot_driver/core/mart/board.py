@@ -13,6 +13,7 @@ from omnibot_driver.core.commands.actuator import Wanted
 from omnibot_driver.core.commands.orders import Drive, GoTo, Order
 from omnibot_driver.core.commands.set_points import Authority
 from omnibot_driver.core.commands.stop_proof import StopProof
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.mart import words
 from omnibot_driver.core.mart.jobs import Job
@@ -55,6 +56,8 @@ After this time, the next reply yields at least NOTHING_MEASURED, a reading with
 the driver that the server answers. A moving robot is measured more often.
 """
 EXPECTED_EVERY_S: Final = 0.2
+FARTHEST_M: Final = 1000.0
+"""Largest distance to a goal, in m. The server might read more digits as another distance."""
 
 
 class MartBoard(Board):
@@ -261,9 +264,16 @@ class Conductor:
     def is_zero(self, order: Order) -> bool:
         """Return whether the order is so slow that the driver regards it as a standstill.
 
-        A goal (GoTo) is never regarded as a standstill.
+        A goal (GoTo) is never regarded as a standstill. Raises CommandRefused if it is too far away
+        for the server's commands.
         """
         if isinstance(order, GoTo):
+            way_m = self._pilot.odometry.pose.way_to(order.place).way_m
+            if not way_m <= FARTHEST_M:
+                raise CommandRefused(
+                    f"cmd_pose refused: the goal is {way_m:g} m away, but the limit is"
+                    f" {FARTHEST_M:g} m; choose a nearer goal"
+                )
             return False
         return not isinstance(order, Drive) or not (
             abs(order.twist.vx_mps) >= SLOWEST_MPS

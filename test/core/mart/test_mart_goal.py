@@ -8,6 +8,7 @@ from random import Random
 import pytest
 from mart_bench import MartBench
 
+from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.mart import MartSettings
 from omnibot_driver.core.mart.goal import INCH_M, MOST_MOVES, STRETCH, Move, Surplus, next_move
@@ -291,3 +292,17 @@ def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the
     assert bench.error.way_m < 0.25
     assert bench.odometry[-1].pose.x_m == pytest.approx(2.8, abs=0.1)
     assert surplus.inches(2.0, slow=False) == inches
+
+
+@pytest.mark.parametrize("x_m", [1e4, 1e9, 1e60, 1e308, -1e300])
+def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
+    """A goal is 1e60 m away. Its command would be longer than a request, which ended the driver."""
+    bench = MartBench().ready()
+    with pytest.raises(CommandRefused, match="the limit is 1000 m"):
+        bench.session.command_pose(Pose(x_m, 0.0, 0.0), bench.now)
+    bench.settle()
+    bench.run(3.0)
+    assert bench.server.chassis.way_m == 0.0
+    bench.go_to(0.5, 0.0, 0.0)
+    bench.run(3.0)
+    assert bench.server.chassis.way_m > 0.0
