@@ -3,7 +3,7 @@
 """Declare a board's parameters on a node: read them at start, describe them, check each change."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -24,6 +24,7 @@ NOT_OURS: Final = re.compile(
     r"use_sim_time|start_type_description_service|(qos_overrides|diagnostic_updater)\..+"
 )
 """Parameters that rclpy itself, or diagnostic_updater, declares for every node."""
+KNOWN_TYPES: Final = frozenset(kind.value for kind in rclpy.Parameter.Type)
 
 
 def declare(node: Node) -> dict[str, Any]:
@@ -47,6 +48,35 @@ def declare(node: Node) -> dict[str, Any]:
         )
     node.add_on_set_parameters_callback(partial(_check, node, table))
     return values
+
+
+def set_each(node: Node, request: Any, response: Any) -> Any:
+    """Serve rcl_interfaces/SetParameters: set each parameter that is valid.
+
+    rclpy's own callback raises an exception for a value of an unknown type, which would end the
+    driver. For an unknown name, its answer does not say what is wrong.
+    """
+    response.results = [_set(node, [message]) for message in request.parameters]
+    return response
+
+
+def set_all(node: Node, request: Any, response: Any) -> Any:
+    """Serve rcl_interfaces/SetParametersAtomically: set all parameters, or none of them."""
+    response.result = _set(node, request.parameters)
+    return response
+
+
+def _set(node: Node, messages: Sequence[Any]) -> SetParametersResult:
+    for message in messages:
+        if message.value.type not in KNOWN_TYPES:
+            reason = f"parameter '{message.name}' has a value of no type that ROS knows"
+            return SetParametersResult(successful=False, reason=f"{reason}; fix the sender")
+        if not node.has_parameter(message.name):
+            try:
+                boards.check_all({"board": node.get_parameter("board").value, message.name: None})
+            except ParameterError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+    return node.set_parameters_atomically([*map(rclpy.Parameter.from_parameter_msg, messages)])
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:

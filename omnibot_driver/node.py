@@ -9,10 +9,12 @@ import math
 import time
 import traceback
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import rclpy
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks
@@ -100,6 +102,16 @@ class OmniBotDriver(Node):
         """
         quiet = PublisherEventCallbacks(use_default_callbacks=False)
         return super().create_publisher(kind, topic, qos, event_callbacks=quiet, **options)
+
+    def create_service(
+        self, kind: type, name: str, callback: Callable[[Any, Any], Any], **options: Any
+    ) -> Any:
+        """Create a service. For those of rclpy that set parameters, the driver has its own
+        callbacks."""
+        own = {SetParameters: declaration.set_each, SetParametersAtomically: declaration.set_all}
+        if kind in own:
+            callback = partial(own[kind], self)
+        return super().create_service(kind, name, callback, **options)
 
     def _make_link(self, port: str) -> Link | Replay:
         if is_recording(port):

@@ -237,6 +237,35 @@ def test_tuning_changes_while_running_and_identity_does_not(
     assert "linear_scale" in result.reason
 
 
+@pytest.mark.parametrize(
+    ("name", "kind", "message"),
+    [
+        ("lineer_scale", ParameterType.PARAMETER_DOUBLE, "the nearest is 'linear_scale'"),
+        ("dock_distance", ParameterType.PARAMETER_DOUBLE, "belongs to board mart, not to omnibot"),
+        ("linear_scale", 99, "no type that ROS knows"),
+    ],
+)
+def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
+    start_driver: Start, probe_of: Start, name: str, kind: int, message: str
+) -> None:
+    """A client sets a parameter of another name, of another board, or to a value of no type.
+
+    rclpy raised an exception for such a value, which ended the driver.
+    """
+    driver: Driver = start_driver("sim://")
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    value = ParameterValue(type=kind, double_value=1.0)
+    assert message in set_parameter(probe, name, value).reason
+    wrong = [Parameter(name="linear_scale", value=real(80.0)), Parameter(name=name, value=value)]
+    result = probe.call(
+        SetParametersAtomically, "set_parameters_atomically", parameters=wrong
+    ).result
+    assert not result.successful
+    assert message in result.reason
+    assert set_parameter(probe, "linear_scale", real(100.0)).successful
+
+
 def test_the_command_that_is_repeated_is_said_in_a_new_scale(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
