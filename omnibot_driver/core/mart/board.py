@@ -56,6 +56,7 @@ After this time, the next reply yields at least NOTHING_MEASURED, a reading with
 the driver that the server answers. A moving robot is measured more often.
 """
 EXPECTED_EVERY_S: Final = 0.2
+SILENT: Final = "the server no longer answers; check its power and the network, then call again"
 FARTHEST_M: Final = 1000.0
 """Largest distance to a goal, in m. The server might read more digits as another distance."""
 
@@ -146,6 +147,7 @@ class MartBoard(Board):
     def silence(self) -> None:
         """Set the mode to unknown, because the silent server may have been restarted."""
         self._mode = Mode.UNKNOWN
+        self._pilot.jobs.cancel(SILENT)
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:

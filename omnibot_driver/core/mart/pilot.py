@@ -55,6 +55,8 @@ SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 
 ``GREET_AGAIN_S``: between two HELLOs.
 """
+COMMANDED: Final = "a motion command or a stop arrived; end the commands, then call again"
+ESTOPPED: Final = "the e-stop was latched meanwhile; release it, then call again"
 COPY_S: Final = 0.25
 """Time in s after a controlled move within which the server must answer a query (ENC or HELLO).
 
@@ -75,9 +77,7 @@ class Pilot(Hearing):
         if not (move and isinstance(order, GoTo) and order.place == move.place):
             move = None
         if wanted is not None and not (move and self.jobs.job is Job.TURN_RECORD):
-            self.jobs.cancel(
-                "a motion command or a stop arrived; end the commands, then call again"
-            )
+            self.jobs.cancel(ESTOPPED if isinstance(wanted, EmergencyStop) else COMMANDED)
         if wanted is not self._wanted:
             self._move = move.repeated() if move and not docks else None
             if is_standstill(self._wanted) or is_standstill(wanted):

@@ -40,6 +40,25 @@ def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
     assert not bench.server.blocked
 
 
+def test_a_job_ends_with_the_reason_that_ended_it() -> None:
+    """The server falls silent, or the e-stop is latched, or a command comes in a calibration."""
+    bench = MartBench().ready()
+    bench.hears = bench.speaks = False
+    assert "no longer answers" in bench.job(Job.BIAS).message
+    for stop, reason in (
+        (lambda: bench.estop(True), "e-stop was latched"),
+        (lambda: bench.command(0.3, 0.0, 0.1), "end the commands"),
+    ):
+        bench = MartBench().ready()
+        bench.board.ask(Job.BIAS, "token", bench.now)
+        bench.run(0.1)
+        stop()
+        bench.run(0.1)
+        (done,) = bench.extras(JobDone)
+        assert not done.success
+        assert reason in done.message
+
+
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
     """A docking job sends a move that ends at the dock (TF DOCK). It succeeds at the dock.
 
