@@ -104,6 +104,10 @@ class SafetyStops:
                 self._reporter.notify([f"e-stop latched by {by}"])
             self._policy.latch(now)
             self._task.give_up("the e-stop was latched during the request")
+            if not latched:
+                self._measurement.inertial.calibration.give_up(
+                    "the e-stop was latched meanwhile; call again"
+                )
             if self._mode_manager.phase is CLOSED:
                 return "e-stop latched; the port is not open; the stop will be sent when it opens"
             if missing := self._reporter.missing:

@@ -238,3 +238,21 @@ def test_the_figures_count_what_happened() -> None:
     figures = bench.session.figures(bench.now)
     assert figures.tally.restarts == 1
     assert figures.commands.source is None
+
+
+def test_a_calibration_ends_when_the_estop_is_latched() -> None:
+    """Somebody latches the e-stop during a calibration, which then fails.
+
+    A calibration that is called while the e-stop is latched succeeds.
+    """
+    bench = running()
+    bench.session.calibrate_gyro("token", bench.now)
+    bench.run(0.5)
+    bench.session.estop(True, bench.now)
+    bench.run(0.1)
+    (done,) = [event for event in bench.events if isinstance(event, RequestDone)]
+    assert not done.success
+    assert "e-stop was latched" in done.message
+    bench.session.calibrate_gyro("again", bench.now)
+    bench.run(3.0)
+    assert [e.success for e in bench.events if isinstance(e, RequestDone)] == [False, True]
