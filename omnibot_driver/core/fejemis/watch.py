@@ -27,6 +27,7 @@ UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
     " or check the USB hub"
 )
+SILENT: Final = "no data from the boards; check their power and cables"
 SLACK_S: Final = 1e-6
 
 
@@ -152,7 +153,7 @@ class Watch:
         if trouble := self._ports.trouble or self._front.trouble:
             return trouble
         if (self.blind or self.unposed) and self._looked_at < self._unread_until:
-            return UNREAD
+            return UNREAD if self._looked_at - self._heard_at < SILENT_S else SILENT
         if self.blind:
             return "no angle of the front wheel for 60 ms; check the front board"
         if self.unposed:

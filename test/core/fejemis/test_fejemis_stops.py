@@ -389,3 +389,19 @@ def test_what_turns_is_switched_off_thrice_at_the_exit() -> None:
     front = [data for channel, data in bench.board.switch_off() if channel == FRONT]
     assert b"".join(front).count(b"brush 0") == 3
     assert b"".join(front).count(b"motv 0 0") == 3
+
+
+def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
+    """Both boards lose their power, and the ports stay open.
+
+    At first the driver may have read late. Later the reason is the boards.
+    """
+    bench = nominal()
+    bench.drive_on()
+    bench.speaks.clear()
+    bench.run(0.2)
+    with pytest.raises(CommandRefused, match="read nothing from either board"):
+        bench.drive()
+    bench.run(4.0)
+    with pytest.raises(CommandRefused, match="no data from the boards; check their power"):
+        bench.drive()
