@@ -15,6 +15,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.node import Node
 
 from omnibot_driver import boards, calibration, parameters
@@ -69,14 +70,17 @@ def set_all(node: Node, request: Any, response: Any) -> Any:
 def _set(node: Node, messages: Sequence[Any]) -> SetParametersResult:
     for message in messages:
         if message.value.type not in KNOWN_TYPES:
-            reason = f"parameter '{message.name}' has a value of no type that ROS knows"
-            return SetParametersResult(successful=False, reason=f"{reason}; fix the sender")
+            reason = f"the value of parameter '{message.name}' has no type that ROS knows"
+            return SetParametersResult(successful=False, reason=f"{reason}; correct the sender")
         if not node.has_parameter(message.name):
             try:
                 boards.check_all({"board": node.get_parameter("board").value, message.name: None})
             except ParameterError as error:
                 return SetParametersResult(successful=False, reason=str(error))
-    return node.set_parameters_atomically([*map(rclpy.Parameter.from_parameter_msg, messages)])
+    try:
+        return node.set_parameters_atomically([*map(rclpy.Parameter.from_parameter_msg, messages)])
+    except ParameterNotDeclaredException as error:
+        return SetParametersResult(successful=False, reason=str(error))
 
 
 def updated(values: Mapping[str, Any], changed: list[rclpy.Parameter]) -> dict[str, Any]:

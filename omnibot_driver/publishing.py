@@ -35,6 +35,8 @@ RAW_DEPTH: Final = 1000
 """Queue depth of the topics with raw bytes. A recorder that is delayed for seconds still gets every
 byte."""
 UNHEARD: Final = ("disconnected", "connecting")
+LATEST_NS: Final = (2**31 - 60) * 10**9
+"""End of the time that a stamp can express, in ns, less a minute for later stamps."""
 
 
 class Publishing:
@@ -157,7 +159,8 @@ class Publishing:
     def _deliver_simulated(self, events: Sequence[Event]) -> None:
         """Publish events with stamps of a simulated clock.
 
-        While this clock is 0, measurements are not published. The clock may also jump back.
+        While this clock is 0 or outside the range of ROS time, measurements are not published. The
+        clock may also jump back.
         """
         now_ns = self._clock.now().nanoseconds
         if now_ns < self._simulated_ns:
@@ -168,7 +171,7 @@ class Publishing:
             kind = type(event)
             if not isinstance(event, ImuEstimate | OdometryEstimate | Extra):
                 self._handlers[kind](event, offset_ns)
-            elif now_ns:
+            elif 0 < now_ns < LATEST_NS:
                 steady_ns = round(event.stamp_s * 1e9)
                 stamp_ns = max(steady_ns + offset_ns, self._stamped_ns.get(kind, 0) + 1)
                 self._stamped_ns[kind] = stamp_ns

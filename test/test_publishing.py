@@ -110,6 +110,25 @@ def test_stamps_follow_simulated_time_while_there_is_any(
         publishing._time_watch.unregister()  # otherwise rcl calls it after it was destroyed
 
 
+def test_a_simulated_time_that_no_stamp_can_express_publishes_nothing(
+    node: Node, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A faulty ``/clock`` sends the largest seconds and nanoseconds that a message can contain.
+
+    The measurement is not published, and the driver continues.
+    """
+    node.set_parameters([rclpy.Parameter("use_sim_time", value=True)])
+    _, publishing = session_with(node)
+    published: list[bytes] = []
+    monkeypatch.setattr(publishing._imu, "publish", published.append)
+    clock = node.get_clock()
+    for nanoseconds, count in (((2**31 - 1) * 10**9 + 2**32 - 1, 0), (5 * 10**9, 1)):
+        clock.set_ros_time_override(Time(nanoseconds=nanoseconds))  # type: ignore[attr-defined]
+        publishing.deliver([ImuEstimate(time.monotonic(), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0))])
+        assert len(published) == count
+    publishing._time_watch.unregister()  # otherwise rcl calls it after it was destroyed
+
+
 def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
