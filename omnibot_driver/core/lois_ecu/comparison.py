@@ -63,6 +63,9 @@ steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
 speed. It is added to the effect of ``SWINGING_M``."""
+LATE_PART: Final = 0.6
+"""Standard deviation of the error that a late report causes in a wheel's distance without counted
+ticks, as a fraction of what the wheel rolls in the delay."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation, in RPM, of the true difference of two wheel speeds if the board's odometry
 shows that they are equal."""
@@ -173,7 +176,8 @@ class Comparison:
                 rolled_m = abs(motion.speed_mps(index)) * duration_s
                 swings = wheel.rests or self._speeds[index].resting.swings
                 part = SWINGING_M if swings else BLIND_M
-                motion.shift(index, 0.0, part * math.sqrt(min(rolled_m, 1.0)))
+                late_m = 0.0 if wheel.rests else LATE_PART * motion.speed_mps(index) * late_s
+                motion.shift(index, 0.0, math.hypot(part * math.sqrt(min(rolled_m, 1.0)), late_m))
                 for state in (X, Y) if swings else ():
                     motion.filter.disturb([(state, 1.0)], SWERVED_M**2 * min(rolled_m, 1.0))
         # Neither wheel has ticked, or both wheels have the same speed.

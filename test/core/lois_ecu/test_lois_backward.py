@@ -93,6 +93,18 @@ def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differ
     assert one.sigmas < 3.5
 
 
+@pytest.mark.parametrize("seed", [303, 334])
+def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_computer(
+    seed: int,
+) -> None:
+    """The driver reads once in 0.05 to 0.35 s, so it corrects the motion of the wheels late.
+
+    The heading is then wrong by up to 30°. The covariance includes this.
+    """
+    one = motion(wrong("firmware", seed), "place left", HOST_GAINS, reads_s=LATE_READS_S)
+    assert one.sigmas < 4.0
+
+
 @pytest.mark.parametrize(
     ("name", "seed"), [("straight back", 9001), ("straight back", 9025), ("curve back", 9013)]
 )
