@@ -16,14 +16,14 @@ from pieces import add
 from report import one
 from truth import SCENARIOS, generate
 
-SECONDS, SEEDS = 11.0, 2
+SECONDS, SEEDS = 11.0, 1
 
 
 @pytest.fixture(scope="module")
 def scores() -> Scores:
     """Return the scores of every scenario, fault and chunking.
 
-    Each limit is tested with about 16,000 frames.
+    Each limit is tested with about 8,000 frames.
     """
     jobs = [(scenario, seed, "driver") for seed in range(SEEDS) for scenario in SCENARIOS]
     total: Scores = {}
@@ -40,7 +40,7 @@ def test_the_bounds_of_the_integrity_report_hold(fault: str, chunker: str, score
     """All scenarios together keep the limits of wrong frames and of lost frames."""
     score = over_scenarios(scores, fault, chunker)
     assert BOUNDS[fault].holds(chunker, score), score
-    assert score.out > 12_500
+    assert score.out > 6_250
 
 
 def test_the_judge_finds_nothing_wrong_with_a_stream_that_is_whole() -> None:
