@@ -88,11 +88,11 @@ def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_pat
         assert first.path != second.path
 
 
-def test_an_unplugged_port_is_reported_and_ends_the_state() -> None:
+def test_an_unplugged_port_is_reported_and_ends_the_state(tmp_path: Path) -> None:
     """A board is unplugged. The link reports this, and its state is disconnected."""
-    listener, ours = Listener(), session()
-    with PtyBoard(SimulatedBoard()) as board:
-        link = link_to(board.path, listener, ours)
+    name, listener, ours = tmp_path / "omnibot", Listener(), session()
+    with PtyBoard(SimulatedBoard(), str(name)):
+        link = link_to(str(name), listener, ours)
         link.start()
         listener.wait_for(lambda: ours.state == "nominal")
     listener.wait_for(lambda: ours.state == "disconnected" and len(listener.reports) > 1)
@@ -146,14 +146,14 @@ def test_a_robot_that_was_lost_while_it_drove_is_told_to_stop_at_the_end(tmp_pat
     wait_for_the_end_of("omnibot-reader")
 
 
-def test_a_robot_that_was_lost_while_it_drove_is_known_not_to_be_stopped() -> None:
+def test_a_robot_that_was_lost_while_it_drove_is_known_not_to_be_stopped(tmp_path: Path) -> None:
     """The cable is unplugged during a drive, and the driver ends.
 
     The link reports that it could not stop the robot.
     """
-    listener, ours = Listener(), session()
-    with PtyBoard(SimulatedBoard(BoardSettings(running=True))) as board:
-        link = link_to(board.path, listener, ours)
+    name, listener, ours = tmp_path / "omnibot", Listener(), session()
+    with PtyBoard(SimulatedBoard(BoardSettings(running=True)), str(name)) as board:
+        link = link_to(str(name), listener, ours)
         link.start()
         listener.wait_for(lambda: ours.state == "nominal")
         link.call(lambda s, now: s.command_twist(BodyTwist(0.3, 0.0, 0.0), now))
