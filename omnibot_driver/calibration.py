@@ -2,8 +2,6 @@
 
 """The calibration file: measured values of one robot in YAML, which the driver reads at start."""
 
-import contextlib
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -11,6 +9,7 @@ from typing import Any, Final
 import yaml
 
 from omnibot_driver.core.errors import ParameterError
+from omnibot_driver.files import write_whole
 from omnibot_driver.parameters import Table, Value
 
 RECORDED: Final = ("imu_rpy", "step")
@@ -62,23 +61,11 @@ def save(path: Path, values: Mapping[str, Any]) -> None:
     Comments are lost. A symbolic link is kept. Raises ParameterError if the old file is unreadable,
     and OSError if the new file cannot be written.
     """
-    import tempfile  # takes 1 MB, and few drivers ever save
-
     content = {**_read(path), **values}
-    path = path.resolve()
-    path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, name = tempfile.mkstemp(prefix=path.name, dir=path.parent)
-    try:
-        with open(descriptor, "w", encoding="utf-8") as file:
-            os.fchmod(descriptor, 0o644)
-            yaml.safe_dump(content, file, sort_keys=False, default_flow_style=None)
-            file.flush()
-            os.fsync(descriptor)
-        os.replace(name, path)
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        raise
+    write_whole(
+        path.resolve(),
+        lambda file: yaml.safe_dump(content, file, sort_keys=False, default_flow_style=None),
+    )
 
 
 def _read(path: Path) -> dict[Any, Any]:

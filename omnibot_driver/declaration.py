@@ -105,8 +105,8 @@ def _calibration(node: Node, path: Path, table: parameters.Table) -> dict[str, p
     unread = [name for name in names if name not in table.calibrated + calibration.RECORDED]
     if not names:
         node.get_logger().warning(
-            f"calibration_file {path} does not exist, so nothing is loaded from it; check the"
-            " path, or calibrate to create the file"
+            f"calibration_file {path} does not exist or is empty, so nothing is loaded from it;"
+            " check the path, or calibrate to create the file"
         )
     if unread:
         nearest = [

@@ -98,7 +98,10 @@ def test_a_standstill_long_ago_is_forgotten() -> None:
 
 
 def test_a_command_that_was_sent_shortly_before_the_standstill_waited_as_well() -> None:
-    """A command is sent shortly before a stall, and waits during the stall. It is refused."""
+    """The driver's process stalls just after a command was sent, and receives it late.
+
+    The command is refused.
+    """
     standstill = resumed(3.0)
     standstill.passed(103.4, wall_ns(103.4))
     assert not standstill.outlived_by(wall_ns(99.9), 103.4)

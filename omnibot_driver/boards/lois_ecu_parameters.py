@@ -219,7 +219,9 @@ PERIODS: Final[Mapping[str, Stream]] = {
 """Messages that the board sends periodically, by the name of the parameter that sets the period."""
 
 
-def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
+def _period(
+    name: str, what: str, default_s: float = 0.0, high_s: float = LONGEST_PERIOD_S
+) -> Parameter:
     note = "" if default_s else " If it is not set, the board keeps its own value."
     return Parameter(
         name,
@@ -228,13 +230,13 @@ def _period(name: str, what: str, default_s: float = 0.0) -> Parameter:
         f"Period of the {what}; 0 turns it off. The board cannot receive while it sends, so"
         f" with a shorter period it misses more commands.{note}",
         low=0.0,
-        high=LONGEST_PERIOD_S,
+        high=high_s,
         unset=not default_s,
     )
 
 
 SENT: Final = (
-    _period("ticks_period", "message with the ticks (0x12), which odometry needs", 0.2),
+    _period("ticks_period", "message with the ticks (0x12), which odometry needs", 0.2, 0.5),
     _period("odometry_period", "message with the board's own odometry (0x20)", 0.2),
     _period("heading_period", "heading (0x10)"),
     _period("position_period", "GPS position (0x0d)"),
@@ -280,9 +282,8 @@ def require_possible_periods(values: Mapping[str, Any]) -> None:
                 f"parameter '{name}' must be 0 (off) or {SHORTEST_PERIOD_S} to"
                 f" {LONGEST_PERIOD_S:g} s, not {period_s:g}"
             )
-    if not 0.0 < values["ticks_period"] <= 0.5:
+    if not values["ticks_period"]:
         raise ParameterError(
-            "parameter 'ticks_period' must be above 0 and at most 0.5 s, not"
-            f" {values['ticks_period']:g}: without the ticks the driver has no odometry and cannot"
-            " confirm a stop"
+            "parameter 'ticks_period' must be above 0, not 0: without the ticks the driver has no"
+            " odometry and cannot confirm a stop"
         )

@@ -5,10 +5,7 @@
 This module knows records and files; it knows neither ROS nor the board's lines.
 """
 
-import contextlib
 import csv
-import os
-import tempfile
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from itertools import zip_longest
@@ -17,6 +14,7 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu import RecordKind
 from omnibot_driver.core.lois_ecu.readings import RecordReading
+from omnibot_driver.files import write_whole
 
 SATURATED: Final = 0xFFFF
 """Timer count that the board reports if the time of an encoder tick does not fit into 16 bits."""
@@ -84,23 +82,10 @@ def save(reading: RecordReading, path: Path, wanted: Callable[[], bool] = lambda
 
     ``wanted``: called after writing; if it returns False, the written data are discarded.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}", dir=path.parent)
-    try:
-        with open(descriptor, "w", encoding="utf-8", newline="") as file:
-            os.fchmod(descriptor, 0o644)
-            csv.writer(file, lineterminator="\n").writerows(table(reading))
-            file.flush()
-            os.fsync(descriptor)
-        if wanted():
-            os.replace(name, path)
-            return True
-        os.unlink(name)
-        return False
-    except BaseException:
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        raise
+    rows = table(reading)
+    return write_whole(
+        path, lambda file: csv.writer(file, lineterminator="\n").writerows(rows), wanted=wanted
+    )
 
 
 def _tick_s(count: object, count_s: float | None) -> float | None:

@@ -33,6 +33,7 @@ from omnibot_driver.core.mart.readings import (
     SonarReading,
 )
 from omnibot_driver.core.session import Session
+from omnibot_driver.files import unused, write_whole
 from omnibot_driver.qos import DEEP, LATCHED
 
 NAN: Final = float("nan")
@@ -172,9 +173,8 @@ class MartTopics:
         def save() -> None:
             try:
                 directory = Path(self._values["record_directory"]).expanduser()
-                directory.mkdir(parents=True, exist_ok=True)
-                path = (directory / PurePosixPath(done.name).name).absolute()
-                path.write_text(done.content.decode("latin-1"), encoding="utf-8")
+                path = unused((directory / PurePosixPath(done.name).name).absolute())
+                write_whole(path, lambda file: file.write(done.content.decode("latin-1")))
                 answer.set_result((True, str(path)))
             except Exception as error:  # the caller must get an answer
                 answer.set_result((False, str(error)))

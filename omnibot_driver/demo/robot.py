@@ -12,6 +12,7 @@ from collections import deque
 import rclpy
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -22,6 +23,7 @@ from omnibot_driver.core.geometry.quaternion import yaw_of
 from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.demo.display import status_row
+from omnibot_driver.demo.program import DemoFailed
 from omnibot_driver.demo.square import HALT, steer, steer_ahead
 from omnibot_driver.tools.monitor.rates import Rate
 
@@ -38,6 +40,8 @@ class Robot:
     For every two odometry messages, the object publishes one velocity on ``cmd_vel``.
     ``driving``: whether this velocity drives the square. Otherwise it is zero.
     ``leg``: how many sides of the square are complete.
+
+    Raises DemoFailed if ROS does not start.
     """
 
     def __init__(self, namespace: str, *, imu: bool = True, sideways: bool = True) -> None:
@@ -50,10 +54,13 @@ class Robot:
         self._state, self._estop = "starting", False
         self._commanded = self._measured = HALT
         self._stood_for = 0
-        rclpy.init(
-            args=["--ros-args", "--disable-external-lib-logs"],
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+        try:
+            rclpy.init(
+                args=["--ros-args", "--disable-external-lib-logs"],
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+        except RCLError as error:
+            raise DemoFailed(f"ROS does not start: {error}") from error
         self._node = node = rclpy.create_node("demo", namespace=namespace)
         self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
         if imu:

@@ -62,7 +62,7 @@ class Course:
 
     @property
     def rehearsals(self) -> int:
-        """Number of runs of the session for this course and all courses that branch off from it."""
+        """How often the session ran for this course and for all courses that branch off from it."""
         return 1 + sum(other.rehearsals for other in self._others.values())
 
     def _understand(self, kind: ReceiverKind) -> Understood:

@@ -9,7 +9,7 @@ import pytest
 from driver_process import Driver
 
 Start = Callable[..., Driver]
-WARNED = "calibration_file {} does not exist, so nothing is loaded from it; check the path"
+WARNED = "calibration_file {} does not exist or is empty, so nothing is loaded from it"
 
 
 def said_of(path: Path, start_driver: Start) -> str:

@@ -25,7 +25,8 @@ LARGEST: Final = 4
 def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all numbers that can be sent safely, in rising order, and the text of each number.
 
-    ``negative``: whether the line has a minus sign, so that the numbers contain no ``6``.
+    ``negative``: whether the line has a minus sign. Its numbers must then not contain ``6``,
+    because the checksum would not detect the loss of both characters.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.

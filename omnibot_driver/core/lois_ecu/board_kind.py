@@ -61,7 +61,7 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        It does if a wheel rolls backward by the board's odometry, but no count falls.
+        It does if the board's odometry shows a wheel that rolls backward, and no count decreases.
 
         ``told``: changes in the board's odometry since its last report, None if unknown.
         """

@@ -65,7 +65,7 @@ class ModeChange:
     def sensor_wanted(self) -> bool:
         """Whether a sensor's mode is requested.
 
-        In such a mode, the board sends none of its own messages.
+        In such a mode, the board only passes on the sensor's lines.
         """
         return self.wanted in SENSORS
 

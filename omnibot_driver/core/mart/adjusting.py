@@ -27,7 +27,7 @@ A working IMU shows the turn. Without it, a straight drive and a dead IMU would 
 """
 
 STARTED_M: Final = 0.01
-"""If the robot moves at least this far (m) in a motion, its motors have enough units to turn."""
+"""Least distance in m that shows that the units of a motion are enough for the motors to turn."""
 
 
 class Adjusting(Moves):

@@ -2,8 +2,8 @@
 
 """What the pilot does after a start command that the server answers by a failure.
 
-This module knows the failure texts and their usual causes; it does not know when a motion starts.
-The caller passes the time.
+This module knows the failure texts and their usual causes; it does not start motions, and
+reads no clock.
 """
 
 from typing import Final

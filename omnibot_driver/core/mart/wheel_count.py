@@ -13,7 +13,7 @@ from typing import Final
 from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_M, DOUBT_MPS = 0.03, 0.3
-"""Largest accepted error of a count that may answer another query.
+"""Largest accepted error of a count whose reply may belong to another query.
 
 It is DOUBT_M (m), plus DOUBT_MPS (m/s) times the sum of two times: the driving time since the last
 count, and the time uncertainty of the reply.

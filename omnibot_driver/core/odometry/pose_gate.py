@@ -100,7 +100,7 @@ class PoseGate:
 def expected(way: Pose, gap: Covariance) -> bool:
     """Return whether rounding or lost displacements can explain that a pose deviates by ``way``.
 
-    ``gap``: covariance of the motion of lost displacements that no pose has shown yet.
+    ``gap``: covariance of the motion that was lost since the last pose.
     """
     metres = math.sqrt(gap.xx + gap.yy) * BELIEVED_SIGMAS
     turn = math.sqrt(gap.yaw_yaw) * BELIEVED_SIGMAS

@@ -42,9 +42,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--reverse",
         choices=get_args(Reverse),
         default="mirrored",
-        help="angle of the front wheel in a curve that the robot drives backward. mirrored (the"
-        " default): the same angle as in that curve driven forward. clamped: an angle beyond 90"
-        " degrees stays at 90 degrees",
+        help="how the robot steers in a curve that it drives backward. mirrored (the default): with"
+        " the same angle as in the same curve driven forward. clamped: with an angle of at most 90"
+        " degrees",
     )
     for name, effect in _SWITCHES:
         parser.add_argument(f"--{name}", action="store_true", help=effect)

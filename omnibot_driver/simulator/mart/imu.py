@@ -52,8 +52,8 @@ class Imu:
     def sample(self, rate_dps: float, now: float, *, integrates: bool) -> None:
         """Take a sample of the turn rate.
 
-        ``integrates``: whether to add the rate times the time since the previous sample to the
-        heading.
+        ``integrates``: whether the heading changes too, by the rate times the time since the
+        previous sample.
         """
         self.rate_dps = rate = rate_dps + self._bias_dps - self._known_dps
         if integrates:

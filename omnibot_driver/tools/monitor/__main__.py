@@ -39,6 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("monitor: interrupted before the driver was found", file=sys.stderr)
     except BrokenPipeError:  # the pipe's reader has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        print(f"monitor: the output cannot be written: {error}", file=sys.stderr)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1
 
 
@@ -171,7 +174,9 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
             " node that publishes such values"
         )
     print(
-        text.as_json(view, troubles) if as_json else text.report(view), end="\n" if as_json else ""
+        text.as_json(view, troubles) if as_json else text.report(view),
+        end="\n" if as_json else "",
+        flush=True,
     )
     for trouble in troubles:
         print(f"monitor: {trouble}", file=sys.stderr)

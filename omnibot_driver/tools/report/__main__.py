@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from omnibot_driver.files import unused
 from omnibot_driver.tools.needs import ToolError, need
 
 if TYPE_CHECKING:
@@ -43,8 +44,8 @@ def arguments(given: list[str] | None) -> argparse.Namespace:
         "--output",
         type=Path,
         metavar="FOLDER",
-        help="folder for page and pictures (default: BAG_report or live_report in the current"
-        " folder)",
+        help="folder for page and pictures (default: BAG_report, or an unused name such as"
+        " live_report, in the current folder)",
     )
     parsed = parser.parse_args(given)
     if (parsed.bag is None) == (parsed.live is None):
@@ -102,7 +103,7 @@ def _report(wanted: argparse.Namespace) -> int:
 
     if wanted.live is not None:
         log, source = _listen(wanted.live, wanted.namespace), "live"
-        default = Path("live_report")
+        default = unused(Path("live_report"))
     else:
         log, source = _read(wanted.bag, wanted.namespace), wanted.bag.resolve().name
         default = Path(f"{wanted.bag.resolve().stem}_report")

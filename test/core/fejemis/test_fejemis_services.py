@@ -291,9 +291,9 @@ def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None
 
 
 def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
-    """One board restarts during a loading, but both have loaded their saved values (``eer``).
+    """Both boards load their saved values (``eer``), and one of them restarts meanwhile.
 
-    The driver writes the user's settings to both again.
+    Both have lost the user's settings, so the driver writes them to both again.
     """
     wheels = (0.08, 0.08, 9.7, 48.0, 0.4)
     bench = nominal(settings=FejemisSettings(written={Written.WHEELS: wheels}))

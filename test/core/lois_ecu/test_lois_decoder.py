@@ -31,7 +31,7 @@ GROUPS: dict[str, list[Report]] = {"0x20": [*ODOMETRY], "0x12": [*TICKS], "0x0d"
 
 
 def rounded(found: list[Report]) -> list[bytes]:
-    """Return the reports as lines, which can be compared in spite of rounded floats."""
+    """Return the reports as lines with rounded floats, so that rounding errors do not matter."""
     return [encode_report(report) for report in found]
 
 

@@ -121,7 +121,9 @@ def test_a_wheel_with_feed_forward_may_roll_much_faster_than_its_set_point() -> 
 
 
 def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
-    """The left wheel rolls backward, at its set-point or 10 % too fast. Its integer speed repeats.
+    """The left wheel rolls backward, at its set-point or 10 % too fast.
+
+    Speeds are reported in whole RPM, so the same value comes several times.
 
     No wheel looks stalled.
     """

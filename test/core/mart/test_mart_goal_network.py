@@ -165,8 +165,8 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
 def test_a_move_whose_reply_is_lost_is_counted_from_its_start(firmware: Firmware) -> None:
     """The reply to each turn is lost. The driver sends a stop, and the server answers "no motion".
 
-    The turn has ended by itself, so the odometry counts it from zero. It does not count from the
-    last count of the drive before the turn.
+    This shows that the turn was completed. Its encoder count began at zero, so the odometry must
+    not subtract the last count of the drive before it.
     """
     bench = on(NetworkFaults(), firmware)
     reach(bench, Pose(0.15, 0.0, 0.0))

@@ -211,7 +211,7 @@ def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
 
 @pytest.mark.parametrize("reply", [b"", b"ok " + 55 * b"7" + b".00"], ids=["lost", "unreadable"])
 def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: bytes) -> None:
-    """No reply to the heading query (RMRA) is useful, neither in a drive nor at rest.
+    """Every reply to the heading query (RMRA) is unusable, in a drive and at rest.
 
     The driver reports it. The encoder is still read, and the next drive begins.
     """

@@ -179,7 +179,7 @@ def test_a_running_board_takes_no_letters_out_of_frames() -> None:
 def test_an_unknown_control_mode_is_ignored() -> None:
     """A frame has an unknown control mode.
 
-    The board ignores it, and a 0x50 in it is not a letter.
+    The board ignores all of it. A byte 0x50 in it is not taken for the command letter P.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(bytes.fromhex("FF FE 03 00 50 00 50 00 50"))

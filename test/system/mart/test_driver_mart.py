@@ -206,7 +206,8 @@ def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe
 def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
     """The services calibrate the gyro, start the log, and download the last move and the log.
 
-    The download of the log ends the MART server.
+    A second file of the same name does not replace the first one. The download of the log ends the
+    MART server.
     """
     with driven(probe, mart, 0.3, 0.0):
         pass
@@ -217,6 +218,8 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
     assert done.success, done.message
     assert Path(done.message).parent == tmp_path
     assert Path(done.message).read_text(encoding="utf-8")
+    again = mart.answer(probe, "download_last_move")
+    assert Path(again.message).name == f"{Path(done.message).stem}-2.csv"
     assert not probe.call(Trigger, "download_log").success
     assert mart.answer(probe, "start_log").success
     done = mart.answer(probe, "download_log")
