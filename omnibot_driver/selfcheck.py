@@ -93,6 +93,8 @@ def unread_files(arguments: Sequence[str], node: str) -> list[str]:
 
 
 def _is_for(node: str, file: str) -> bool:
+    if not Path(file).is_file():
+        return True  # ROS has emptied the pipe, so nothing is known
     try:
         content = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError):

@@ -146,4 +146,4 @@ def test_the_first_process_of_a_container_passes_a_stop_on() -> None:
         assert process.stdout is not None
         process.stdout.readline()
         process.send_signal(signal.SIGTERM)
-        assert process.wait() == 7
+        assert process.wait(60.0) == 7

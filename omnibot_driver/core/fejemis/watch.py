@@ -153,7 +153,8 @@ class Watch:
         if trouble := self._ports.trouble or self._front.trouble:
             return trouble
         if (self.blind or self.unposed) and self._looked_at < self._unread_until:
-            return UNREAD if self._looked_at - self._heard_at < SILENT_S else SILENT
+            silent = self._looked_at - self._heard_at >= SILENT_S
+            return SILENT if silent and self._looked_at >= self._patient_until else UNREAD
         if self.blind:
             return "no angle of the front wheel for 60 ms; check the front board"
         if self.unposed:

@@ -128,6 +128,8 @@ class Measuring(Starts):
             self.health.strays(now)
         # the robot has not been at rest since the last start, or since a restart of the server
         unknown = self._stood_s < max(self.appeared_s, self._started_s)
+        if unknown:
+            self.odometry.lose_turn()
         if unknown and self._negative_sweep and now - self._swept_s < 2.0:
             self._stray_s = now
             self._rescue = True

@@ -144,6 +144,18 @@ class Reckoning:
             self.wheel.started()
         self.heading.changed_s = now
 
+    def refused(self) -> None:
+        """Record that the server knows of no motion, although a start was sent."""
+        if self.wheel.refused():
+            self.lose_turn()
+
+    def lose_turn(self) -> None:
+        """Add the error of the turn since a restart of the server in a motion.
+
+        The motors keep their last command, and the server's relative heading begins at zero.
+        """
+        self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
+
     def stopping(self, now: float) -> None:
         """Record that a stop was sent to the robot."""
         if self.slowing_since_s is None:

@@ -209,7 +209,7 @@ class Stops(Ground, ABC):
             and (motion in UNCONTROLLED or self._refused)  # a controlled move ends by itself
             and not self.conversation.doubles(now)
         ):
-            self.odometry.wheel.refused()
+            self.odometry.refused()
         self._rolled = result is not None and self._is_slow_stop(result, motion, now)
         slow = result is not None and stopping.planned and self._rolled
         told = isinstance(result, Ok) and result.form is Form.INTEGER

@@ -77,14 +77,19 @@ class WheelCount:
         """Record that the server has acknowledged the motion."""
         self._confirmed = True
 
-    def refused(self) -> None:
-        """Record that the motion did not begin, so the count continues from its last value.
+    def refused(self) -> bool:
+        """Record that the server knows of no motion; return whether it was restarted since then.
 
-        Ignored if the server has acknowledged the motion, or if its counts have come: they are in
-        the pose already, and the server has rather been restarted since then.
+        Ignored if the server has acknowledged the motion. If its counts have come, they are in the
+        pose already, so the server was restarted. Otherwise the motion did not begin, and the count
+        continues from its last value.
         """
-        if self._begins and not self._confirmed:
+        if self._confirmed:
+            return False
+        if self._begins:
             self.last, self._begins = self._before, False
+            return False
+        return True
 
     def connect(self) -> None:
         """Begin a new connection; the robot may have moved, or the server may have restarted."""

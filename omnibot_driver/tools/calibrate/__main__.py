@@ -74,7 +74,8 @@ def _calibrate(
         interruption.check()
         try:
             save(result, output, robot.table)
-            interruption.outcome = f"the result is saved to {output}"
+            if result.parameters or result.record:
+                interruption.outcome = f"the result is saved to {output}"
         finally:  # report the result even when the file cannot be written
             console.table(f"calibrate {arguments.subcommand}: {robot.driver}", result.findings)
         for note in result.notes:

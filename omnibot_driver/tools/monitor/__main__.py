@@ -39,9 +39,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("monitor: interrupted before the driver was found", file=sys.stderr)
     except BrokenPipeError:  # the pipe's reader has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    except OSError as error:
-        print(f"monitor: the output cannot be written: {error}", file=sys.stderr)
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1
 
 
@@ -173,11 +170,17 @@ def _print(view: View, feed: "Feed", as_json: bool) -> int:
             f"these values are NaN or infinite: {', '.join(strange)}; before you drive, fix the"
             " node that publishes such values"
         )
-    print(
-        text.as_json(view, troubles) if as_json else text.report(view),
-        end="\n" if as_json else "",
-        flush=True,
-    )
+    try:
+        print(
+            text.as_json(view, troubles) if as_json else text.report(view),
+            end="\n" if as_json else "",
+            flush=True,
+        )
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise ToolError(f"the output cannot be written: {error}") from error
     for trouble in troubles:
         print(f"monitor: {trouble}", file=sys.stderr)
     return 1 if troubles else 0
