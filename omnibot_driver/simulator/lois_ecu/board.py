@@ -284,7 +284,8 @@ class SimulatedLois:
             if not self._scan:
                 self._read_input()
                 self._say_record(self._records.of_wheels())
-                self._scan = list(self._timers)
+                if self._uart.sending or self._timers.any_due(self._clock_ms):
+                    self._scan = list(self._timers)
             while self._scan and not self._uart.sending:
                 self._periodic(self._scan.pop(0))
             if not self._scan and not self._uart.sending and self._button_news is not None:

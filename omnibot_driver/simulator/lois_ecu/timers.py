@@ -25,6 +25,8 @@ class Timers:
 
     def __init__(self) -> None:
         self._timers = {code: Timer(period) for code, period in PERIODS_MS.items()}
+        self._none_due_ms = -1
+        """The board's clock up to which no message is due, in ms."""
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._timers)
@@ -38,11 +40,25 @@ class Timers:
     def set(self, code: int, period_ms: int, clock_ms: int) -> None:
         """Set the period of a message in ms, and begin a new period now."""
         self._timers[code] = Timer(period_ms, clock_ms)
+        self._none_due_ms = -1
 
     def restart(self, clock_ms: int) -> None:
         """Begin new periods of all messages."""
         for timer in self._timers.values():
             timer.since_ms = clock_ms
+        self._none_due_ms = -1
+
+    def any_due(self, clock_ms: int) -> bool:
+        """Return whether a message is due."""
+        if clock_ms <= self._none_due_ms:
+            return False
+        timers = [timer for timer in self._timers.values() if timer.period_ms != NEVER]
+        if any(timer.period_ms == ONCE for timer in timers):
+            return True
+        self._none_due_ms = min(
+            (timer.since_ms + timer.period_ms for timer in timers), default=clock_ms
+        )
+        return clock_ms > self._none_due_ms
 
     def take(self, code: int, clock_ms: int) -> bool:
         """Return whether the message ``code`` is due. If so, begin its next period."""
