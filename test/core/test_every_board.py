@@ -36,6 +36,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
     assert bench.robot.way_m == before
 
 
+@pytest.mark.slow
 def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -> None:
     """The robot is commanded to drive 0.3 m/s for 4 s. It drives 1.2 m, or less if it starts late.
 
@@ -49,6 +50,7 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
     assert bench.odometry[-1].pose.x_m == pytest.approx(bench.robot.way_m, abs=0.02)
 
 
+@pytest.mark.slow
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
     """The user sends a hundred commands at 20 Hz.
 
@@ -60,6 +62,7 @@ def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) 
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
 def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: AnyBench) -> None:
     """The user stops sending commands.
 
@@ -72,6 +75,7 @@ def test_a_robot_stands_after_the_timeout_and_is_not_commanded_any_more(bench: A
     assert bench.session.shutdown.stands
 
 
+@pytest.mark.slow
 def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
     """The user commands zero while the robot drives.
 
@@ -149,6 +153,7 @@ def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None:
     """A driving robot sends nothing any more, but still receives. The driver stops it.
 
@@ -167,6 +172,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
 def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard_again(
     bench: AnyBench,
 ) -> None:
@@ -182,6 +188,7 @@ def test_a_robot_that_was_cut_off_in_both_directions_is_stopped_when_it_is_heard
     assert bench.robot.stands
 
 
+@pytest.mark.slow
 def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> None:
     """A command with NaN is refused, and the command before it stays active."""
     bench.drive_on()
@@ -191,6 +198,7 @@ def test_what_is_not_a_number_is_refused_and_stops_nothing(bench: AnyBench) -> N
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
 def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
     """The user commands 100 m/s.
 
@@ -202,6 +210,7 @@ def test_no_command_is_faster_than_the_limit(bench: AnyBench) -> None:
     assert bench.robot.way_m - before < 1.05
 
 
+@pytest.mark.slow
 def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
     """The driver shuts down while the robot drives, and sends Stop until the robot is at rest.
 
@@ -219,6 +228,7 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
         bench.drive()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench, seed: int) -> None:
     """The line is cut at random moments while the robot drives, reverses and stands.

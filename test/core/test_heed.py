@@ -31,6 +31,7 @@ def opened(*, run: bool = True) -> Session:
 REQUESTS = {500: Request.START, 1000: Request.PAUSE, 1500: Request.START, 2000: Request.RESET}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [True, False])
 @pytest.mark.parametrize("drives", [False, True])
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(

@@ -43,6 +43,7 @@ def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) 
     assert settled(on), on.error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hidden", [(), (TEXT,), (TEXT, DELTA), (TEXT, POSE)])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_restarted_board_goes_on_where_odom_is(seed: int, hidden: tuple[bytes, ...]) -> None:

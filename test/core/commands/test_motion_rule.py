@@ -43,6 +43,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("event", EVENTS.values(), ids=EVENTS)
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]

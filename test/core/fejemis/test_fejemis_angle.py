@@ -131,6 +131,7 @@ SENSOR = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_broken_angle_sensor_stops_the_robot() -> None:
     """The angle sensor of the front wheel reports a fault while the robot drives.
 

@@ -113,6 +113,7 @@ def drive_whatever_is_said(bench: Bench, v: float, w: float, seconds: float) -> 
         bench.run(0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("w", [0.0, 0.3])
 def test_a_clamped_reverse_is_stopped(w: float) -> None:
     """The firmware limits the wheel to 90° in reverse, so the robot turns instead of reversing.
@@ -147,6 +148,7 @@ def test_a_wheel_that_rests_short_of_across_is_noticed(monkeypatch: pytest.Monke
     assert any("does not go where it is commanded" in text for text in bench.notices)
 
 
+@pytest.mark.slow
 def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

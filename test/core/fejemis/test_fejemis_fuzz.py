@@ -35,6 +35,7 @@ def any_line(chance: random.Random) -> bytes:
     return chance.randbytes(chance.randrange(300)) if chance.random() < 0.05 else bytes(line)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_no_input_raises_or_keeps_the_session_busy(seed: int) -> None:
     """Bytes, lost ports, commands and requests come in random order. The session raises no error.
@@ -104,6 +105,7 @@ def test_many_lines_that_are_not_understood_are_told_once() -> None:
     assert bench.session.state == "nominal"
 
 
+@pytest.mark.slow
 def test_a_stream_that_the_firmware_does_not_know_is_told_and_not_asked_for_again() -> None:
     """The firmware does not know one stream, here that of the time-of-flight sensor.
 

@@ -38,6 +38,7 @@ def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
     assert not bench.board.figures.own.get("Front lines unknown")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> None:
     """One board becomes silent. The robot is stopped, and a notice names the board.
@@ -65,6 +66,7 @@ def test_a_half_that_falls_silent_stops_the_robot_and_is_named(half: str) -> Non
     assert not bench.robot.standing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [(), (DRIVE,), (FRONT,)])
 def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]) -> None:
     """The driver stalls. Afterwards it reports only a board that still sends nothing."""
@@ -80,6 +82,7 @@ def test_a_stall_of_the_driver_is_not_blamed_on_the_boards(lost: tuple[int, ...]
     assert_stands(bench)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
     """One board restarts while the robot drives.
@@ -102,6 +105,7 @@ def test_a_half_that_restarts_is_subscribed_again(half: str) -> None:
     assert not bench.robot.standing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", HALVES)
 def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: str) -> None:
     """The port of one board disappears while the robot drives. The other board receives a stop.
@@ -132,6 +136,7 @@ def test_a_half_whose_port_is_gone_is_missed_and_the_other_hears_the_stop(half: 
     assert not bench.robot.standing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ids", "sentence"),
     [
@@ -206,6 +211,7 @@ def test_no_board_is_named_after_a_reconnect_if_both_are_silent() -> None:
     assert "no data from the board for" in notice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begins", [False, True])
 def test_sums_that_begin_or_cease_stop_the_robot_once(*, begins: bool) -> None:
     """While the robot drives, its boards start or stop sending checksums. The robot stops once.
@@ -238,6 +244,7 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
     assert bench.board.figures.own["Drive lines unknown"] == "xyz"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", [
     Firmware(acceleration_in_g=True), Firmware(timed_velocity=True), Firmware(tilt=True),
     Firmware(carriage_return=False), Firmware(single_precision=True), Firmware(confirms=True),
@@ -289,6 +296,7 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
     assert not told & bench.board.figures.own.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
     """The front board's clock is ``ahead_s`` seconds ahead, and the boards change their ports.

@@ -203,6 +203,7 @@ def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Re
     assert set(wanted) <= set(numbers)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
 @pytest.mark.parametrize("period_s", [0.001, 0.004, 0.0075, 0.02, 0.033, 0.1])
 def test_every_sample_is_given_if_no_line_is_lost(layout: Layout, period_s: float) -> None:
@@ -219,6 +220,7 @@ def test_every_sample_is_given_if_no_line_is_lost(layout: Layout, period_s: floa
 pauses = st.sampled_from([[0.001], [0.006], [0.001, 0.006], [0.0]])
 
 
+@pytest.mark.slow
 @given(layouts, chances, pauses)
 @settings(max_examples=60, deadline=None)
 def test_every_sample_is_given_in_pieces(
@@ -247,6 +249,7 @@ def test_every_sample_is_given_by_a_reader_that_stalls(
     assert_nothing_is_missing(outcome(reads), lines, reads)
 
 
+@pytest.mark.slow
 @given(
     layouts,
     chances,

@@ -102,6 +102,7 @@ ENDS: dict[str, Callable[[Bench], object]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
 def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]) -> None:
     """An event such as an e-stop or a restart stops brush and lift.

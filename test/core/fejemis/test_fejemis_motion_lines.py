@@ -64,6 +64,7 @@ def test_the_example_of_the_manual_becomes_another_motion_by_two_lost_characters
     assert motions(damaged) == [(0.25, 1.459, 0.0)]
 
 
+@pytest.mark.slow
 def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
     """A line loses one or two characters, and another line follows. No wrong motion is read.
 
@@ -153,6 +154,7 @@ def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
     assert (drive_v < 0.0) is (v < 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), [(1.0, 0.0), (0.0, -1.0), (-1.0, 0.0), (-0.8, -0.6)])
 def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
     """The lines avoid certain digits, but the outer wheel reaches every speed within 1.8 %.

@@ -103,6 +103,7 @@ def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
     assert_still_refused(bench)
 
 
+@pytest.mark.slow
 def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connected(
     bench: Bench,
 ) -> None:
@@ -140,6 +141,7 @@ def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
     assert_still_refused(bench)
 
 
+@pytest.mark.slow
 def test_a_power_off_without_an_answer_may_still_come() -> None:
     """The board does not answer a request to power off. The request fails.
 

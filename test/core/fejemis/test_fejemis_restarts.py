@@ -49,6 +49,7 @@ def test_a_pose_before_the_start_line_in_one_read_belongs_to_the_time_before_the
     assert not bench.board._ports.halves[DRIVE].clock.known
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("boot_s", [0.002, 0.05])
 def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
     """The drive board restarts at different times between two reads, which are 20 ms apart.
@@ -162,6 +163,7 @@ def test_a_heartbeat_from_before_the_pause_does_not_rule_out_a_restart() -> None
     assert not half.unsure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("pause_s", [0.9, 1.3, 3.0])
 def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
@@ -200,6 +202,7 @@ def test_the_heartbeat_is_requested_ten_times_a_second_after_a_pause() -> None:
     assert bench.now - mark < 0.13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("read_s", [0.001, 0.05])
 def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) -> None:
     """One line in twenty is lost for 10 s. The driver does not suspect a restart."""
@@ -219,6 +222,7 @@ def test_lost_lines_and_late_reads_do_not_make_a_board_suspect(read_s: float) ->
     assert not any("restarted" in text for text in bench.notices)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.3, 0.7, 1.2])
 def test_a_stall_of_the_computer_is_not_a_long_suspicion(stall_s: float) -> None:
     """The computer stalls, so the boards may have restarted unnoticed.

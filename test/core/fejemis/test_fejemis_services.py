@@ -82,6 +82,7 @@ def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     assert bench.robot.drive.config.gyro_offset_dps == pytest.approx((1.0, -2.0, 3.0), abs=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("job", "word"),
     [(Job.CALIBRATE_GYRO, "gyroc"), (Job.CALIBRATE_ACCELEROMETER, "acccal2")],
@@ -122,6 +123,7 @@ def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets(
     assert bench.board.advice is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("job", Job)
 def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
     """While the robot is driven, only the loading of a configuration is accepted.
@@ -138,6 +140,7 @@ def test_no_job_is_done_while_the_robot_is_driven(job: Job) -> None:
     assert bench.robot.standing
 
 
+@pytest.mark.slow
 def test_a_job_that_nothing_confirms_fails() -> None:
     """The board receives nothing, so the job is not confirmed and fails within its time limit.
 
@@ -240,6 +243,7 @@ def test_a_low_battery_is_told_once_a_minute() -> None:
     assert sum("battery is low" in text for text in bench.notices) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
     """During a calibration or a loading, motion is refused, because the robot must be at rest."""
@@ -290,6 +294,7 @@ def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None
     assert bench.robot.front.config.angle_offset_deg == 2.5
 
 
+@pytest.mark.slow
 def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_loading() -> None:
     """Both boards load their saved values (``eer``), and one of them restarts meanwhile.
 

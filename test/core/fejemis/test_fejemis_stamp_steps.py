@@ -27,6 +27,7 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
     assert second_s == pytest.approx(50_000.000001, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 7, 17])
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
     """The boards restart, and each read brings the lines of up to half a second.

@@ -215,6 +215,7 @@ def test_a_wheel_that_overshoots_across_makes_the_body_turn_no_quicker(side: int
     assert not bench.robot.standing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), [(-0.2, 0.0), (-0.2, 0.3), (-0.01, 0.5)])
 def test_reverse_is_off_until_it_is_allowed(v: float, w: float) -> None:
     """The parameter ``allow_reverse`` is off, and the user commands a motion backward.

@@ -15,6 +15,7 @@ def without_relays(lines: list[str]) -> list[str]:
     return [text for text in lines if not text.startswith(("fwl", "hcsr", "sub"))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
     """An e-stop is latched on both boards. At its release, only the drive board gets ``start``.

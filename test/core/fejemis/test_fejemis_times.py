@@ -140,6 +140,7 @@ def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
     assert clock.host_s(102.0) == pytest.approx(7.0, abs=0.001)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_rare_reads_lose_no_odometry(seed: int) -> None:
     """The driver reads each port only every 50 ms, so each read brings two or three poses.
@@ -310,6 +311,7 @@ def cycles_of(bench: Bench) -> list[tuple[float, float]]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", ["all", "lost", "twice"])
 def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
     """A read every 100 ms has ten samples. In some cases, 1 % of the lines is lost or comes twice.
@@ -331,6 +333,7 @@ def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
     assert len(cycles) > (565 if kept == "lost" else 580)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pause_s", [0.001, 0.006])
 def test_a_sample_whose_lines_come_in_pieces_is_published(pause_s: float) -> None:
     """The lines arrive in pieces, with pauses that may fall between the two lines of a sample.

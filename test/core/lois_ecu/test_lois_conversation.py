@@ -126,6 +126,7 @@ def test_a_board_without_checksum_is_driven_without() -> None:
     assert rig.board.truth.speed_mps > 0.2
 
 
+@pytest.mark.slow
 @BOTH
 def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
     """After a forward drive, the ticks prove that the robot is at rest.

@@ -31,6 +31,7 @@ class DeafBench(Bench):
         self.events += self.session.take_events()
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None:
     """A request for one date ends the periodic dates, so the driver sends the period again.

@@ -31,6 +31,7 @@ def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
     return found + decoder.flush(given[-1][0]), decoder
 
 
+@pytest.mark.slow
 @FIRMWARE
 @pytest.mark.parametrize("pause_s", [0.06, 0.1, 0.14])
 def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: float) -> None:

@@ -53,6 +53,7 @@ def losses(length: int, most: int) -> Iterator[tuple[int, ...]]:
         yield from combinations(range(length), count)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TALKS)
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 @pytest.mark.parametrize("lenient", [True, False], ids=["lenient", "strict"])

@@ -30,6 +30,7 @@ def restarts(bench: Bench) -> int:
     return int(board._ecu.translation.restarts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [2.9, 3.0, 3.1, 3.4, 3.7, 4.0])
 def test_a_restart_is_not_taken_for_wheels_that_roll_back(seconds: float) -> None:
     """The board restarts during a drive. Its tick counts and its clock begin at zero again.
@@ -52,6 +53,7 @@ def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: f
     bench.drive_on(speed_mps, seconds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrapped_for_s", [-0.25, -0.15, -0.06, 0.06, 0.15, 0.25])
 @pytest.mark.parametrize("speed_mps", [0.3, -0.3])
 def test_a_restart_shows_although_the_clock_wraps_at_that_time(
@@ -109,6 +111,7 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
     assert error(bench)[0] < 2 * math.sqrt(covariance.xx + covariance.yy)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0.0, 0.15])
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
     """The robot drives forward and then back to where the counts are zero. The clock wraps then.

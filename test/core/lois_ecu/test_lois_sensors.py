@@ -88,6 +88,7 @@ def test_declination_turns_the_heading() -> None:
     assert found[-1] == HeadingReading(pytest.approx(-0.1))
 
 
+@pytest.mark.slow
 def test_false_headings_at_north_are_refused() -> None:
     """The public firmware averages headings around north wrongly: 359°, 1° and 1° give 120°.
 

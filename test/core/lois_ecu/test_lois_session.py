@@ -61,6 +61,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
     assert bench.session.figures(bench.now).commands.interlock == ""
 
 
+@pytest.mark.slow
 @FIRMWARE
 @pytest.mark.parametrize("seconds", [6.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
@@ -115,6 +116,7 @@ def test_a_reset_that_is_lost_is_not_counted_as_done(firmware: str) -> None:
     assert bench.board.wheels[0].ticks == 0
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str) -> None:
     """The counters are still zero after a first reset. A second reset is lost.
@@ -184,6 +186,7 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
     assert "makes sense" not in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", range(1, 13))
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     """Whenever the board sends a report, it receives nothing for a moment.

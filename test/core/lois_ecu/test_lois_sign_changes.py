@@ -37,6 +37,7 @@ def test_a_change_of_sign_soon_after_another_is_doubted_more_with_the_boards_own
     assert variance(LoisEcuSettings(), 0.6) > 1.5 * variance(HOST_GAINS, 0.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [LoisEcuSettings(), HOST_GAINS], ids=["own", "set"])
 def test_a_wheel_that_has_settled_is_not_doubted(
     settings: LoisEcuSettings, monkeypatch: pytest.MonkeyPatch

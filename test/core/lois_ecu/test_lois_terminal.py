@@ -20,6 +20,7 @@ GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
 COMPASS = LoisEcuSettings(terminal_mode=TerminalMode.COMPASS)
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     """The user sets a terminal mode during a drive. The driver stops the robot first.
@@ -45,6 +46,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     bench.drive(0.0)
 
 
+@pytest.mark.slow
 @FIRMWARE
 @pytest.mark.parametrize("hears", [True, False])
 def test_out_of_a_terminal_mode_the_correction_is_back_and_the_button_is_unknown(

@@ -27,6 +27,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("data", "sentence"), WRONG.values(), ids=WRONG)
 def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, sentence: str) -> None:
     """Foreign data arrives. One notice names its likely source, and motion is refused.
@@ -53,6 +54,7 @@ def test_what_is_not_this_boards_is_named_and_refuses_motion(data: bytes, senten
     assert not robot.stands
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["lois_ecu", "lois_ecu as documented"])
 @pytest.mark.parametrize("checks", [True, False])
 def test_a_board_whose_checksum_is_set_otherwise_is_set_right(

@@ -235,6 +235,7 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
     assert "copy the file from the controller" in done.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
     """After a straight drive, the heading is often exactly zero, as after a restart.

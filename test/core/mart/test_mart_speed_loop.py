@@ -70,6 +70,7 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
     assert 0.0 < line.units(5.0) < line.units(50.0) < 200.0
 
 
+@pytest.mark.slow
 @given(SLOPES, DEAD, st.integers(0, 1000))
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int

@@ -116,6 +116,7 @@ def test_any_other_file_has_no_angle(pieces: list[bytes]) -> None:
     assert recorded_deg(pieces, MCR.request(90)) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inequality", [-0.05, 0.05])
 def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequality: float) -> None:
     """One wheel turns 5 % faster, and the server reports no heading.
@@ -131,6 +132,7 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
     assert downloads(bench) >= len(GOALS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("missing", ["angle", "file"])
 def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
@@ -150,6 +152,7 @@ def test_a_server_without_records_is_asked_three_times(
     assert downloads(bench) == UNRECORDED
 
 
+@pytest.mark.slow
 def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -> None:
     """One motor turns 10 % faster. A few records show the ratio.
 

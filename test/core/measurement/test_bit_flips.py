@@ -167,6 +167,7 @@ def test_what_is_refused_is_counted_and_told() -> None:
     assert "1 odometry" in notice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bit", range(8))
 @pytest.mark.parametrize("byte", range(4))
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:

@@ -124,6 +124,7 @@ def test_motion_during_a_pause_moves_the_pose_and_gives_no_speed(bench: Bench) -
     assert after[-1].pose.x_m == pytest.approx(bench.board.truth.x_m, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signs", list(itertools.product([1, -1], repeat=3)))
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_with_any_axis_signs_the_odometry_shows_what_was_commanded(

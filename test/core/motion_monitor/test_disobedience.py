@@ -52,6 +52,7 @@ DISOBEYING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["earth", "body", "wheel_counts"])
 @pytest.mark.parametrize(
     ("board", "command", "what", "advice"), DISOBEYING.values(), ids=DISOBEYING
@@ -70,6 +71,7 @@ def test_a_robot_that_does_not_do_what_it_is_commanded_is_stopped_within_0_3_s(
     assert advice in notice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("board", "command"),
     [(board, command) for board, command, _, _ in DISOBEYING.values()],

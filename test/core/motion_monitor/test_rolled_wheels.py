@@ -85,6 +85,7 @@ def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int,
     assert angles(estimates[-1].rolled) == pytest.approx(turned, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("lost_s", "off_rad"), [(0.0, 0.12), (0.04, 0.12), (0.4, 0.12), (2.0, 5.0)]
 )

@@ -124,6 +124,7 @@ def test_a_robot_that_rolls_out_or_is_nudged_makes_no_notice(bench: Bench) -> No
     assert bench.notices == []
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_pushed_for_long_is_not_stopped_without_end() -> None:
     """A robot is pushed for a long time. The driver sends Stop at once, and then ever more rarely.
 

@@ -58,6 +58,7 @@ def test_a_spin_stays_in_place_and_counts_its_turns() -> None:
     assert last(estimates) == close((0.0, 0.0, 20.0))
 
 
+@pytest.mark.slow
 @given(st.lists(small_moves, min_size=1, max_size=40), headings, axis_signs)
 @settings(max_examples=200)
 def test_the_way_is_the_true_one_whatever_the_boards_heading_and_axes(

@@ -41,6 +41,7 @@ def drive(on: Bench) -> None:
     on.run(1.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
     """The board assumes wrong sizes of its wheels and its base, and drives metres of curves.

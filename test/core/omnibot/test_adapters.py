@@ -64,6 +64,7 @@ def behind_timer(timer_s: float) -> Handed:
             held += data[number : number + 1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("adapter", "waits"),
     [(pieces, 0.01), (lambda: behind_timer(0.001), 0.01), (lambda: behind_timer(0.016), 0.005)],

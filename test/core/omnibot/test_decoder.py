@@ -256,6 +256,7 @@ def test_an_undamaged_stream_has_no_faults(name: str) -> None:
     assert (made.statistics.faults, made.statistics.discarded_bytes) == (0, 0)
 
 
+@pytest.mark.slow
 @given(st.lists(st.one_of(frames.map(encode), st.binary(max_size=20)), max_size=20))
 @example([LEAD_IN, b"\x00", LEAD_IN])
 def test_every_byte_is_a_frames_or_counted_as_discarded(pieces: list[bytes]) -> None:

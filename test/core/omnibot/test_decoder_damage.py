@@ -154,6 +154,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
             assert len(truth) - 4 <= len(found) < len(truth), f"tick {number}, byte {place}"
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.one_of(frames, st.binary(min_size=1, max_size=20)), max_size=20),
     st.data(),

@@ -60,6 +60,7 @@ def test_any_bytes_at_any_times_give_only_frames_that_stand_there(
     assert_stand_in_order(found, stream)
 
 
+@pytest.mark.slow
 @given(st.lists(st.lists(st.one_of(believable_frames, paused_frames), max_size=6)), st.data())
 def test_all_frames_between_silences_come_in_any_chunks(
     bursts: list[list[Frame]], data: st.DataObject

@@ -79,6 +79,7 @@ def test_twist_pose_and_stamps_are_right_at_any_rate(period_s: float, frame: str
     assert bench.notices == []
 
 
+@pytest.mark.slow
 @EVERY_PERIOD
 def test_an_undamaged_stream_is_decoded_whole_in_ticks_and_byte_by_byte(period_s: float) -> None:
     """At every delta period, all frames of an undamaged stream are returned, without a fault."""

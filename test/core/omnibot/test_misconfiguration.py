@@ -48,6 +48,7 @@ def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
     assert f"`pose_byte_order` to {sent}" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
 @pytest.mark.parametrize("period_s", DELTA_PERIODS_S)
 def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: float) -> None:
@@ -59,6 +60,7 @@ def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: floa
     assert f"`delta_frame` to {sent}" in told
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sent_s", DELTA_PERIODS_S)
 @pytest.mark.parametrize("read_s", DELTA_PERIODS_S)
 def test_a_wrong_period_of_deltas_is_noticed(sent_s: float, read_s: float) -> None:
@@ -108,6 +110,7 @@ def test_a_wrong_period_is_noticed_on_a_bad_line_too(lose: float) -> None:
     assert "`delta_period` to 0.1" in driver.advice
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reads_s", [0.016, 0.1, 0.5, 1.0])
 def test_reads_that_bring_much_at_once_do_not_pass_for_another_period(reads_s: float) -> None:
     """A busy computer reads up to one second of data at once.

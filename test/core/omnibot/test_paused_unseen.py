@@ -8,6 +8,7 @@ from session_bench import STOP, TICK_S, Bench
 from omnibot_driver.simulator.omnibot import BoardSettings
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [True, False])
 @pytest.mark.parametrize("imu_only", [True, False])
 @pytest.mark.parametrize("kept_back", [3, 12, 25])

@@ -148,6 +148,7 @@ def test_on_an_ideal_line_the_stamps_are_no_worse_than_arrival_times(chunker: Ch
         assert stamped.unevenness() <= arrivals.unevenness()
 
 
+@pytest.mark.slow
 def test_blocks_as_large_as_the_hosts_buffer_are_spread_over_their_ticks() -> None:
     """Data arrives in blocks of 240 ticks. From 20 s on, the ticks' stamps are evenly spaced."""
     for seed in SEEDS:
@@ -308,6 +309,7 @@ edges = st.none() | st.builds(
 reads = st.tuples(st.floats(1e-3, 3.0), st.lists(imu_readings | displacements, max_size=30), edges)
 
 
+@pytest.mark.slow
 @given(st.lists(reads, max_size=60))
 def test_any_reads_are_stamped_forwards_and_not_later_than_they_arrived(
     reads: list[tuple[float, list[ImuReading | DisplacementReading], SampleBoundary | None]],

@@ -53,6 +53,7 @@ def all_of(port: int) -> Iterator[bytes]:
             yield data
 
 
+@pytest.mark.slow
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """No program reads the terminal.
 

@@ -37,6 +37,7 @@ def place(address: str) -> tuple[str, int]:
     return host.removeprefix("//"), int(port)
 
 
+@pytest.mark.slow
 def test_each_serial_channel_has_a_terminal_of_its_own() -> None:
     """A board has two serial channels, and each has its own terminal.
 

@@ -151,6 +151,7 @@ KEYS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("port", "key"), [(port, key) for port, keys in KEYS.items() for key in keys.split()]
 )

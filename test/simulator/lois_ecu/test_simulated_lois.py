@@ -63,6 +63,7 @@ def test_periods_stretch_with_the_load() -> None:
     assert len(ticks_in(rig.run(42.2))) in range(98, 103)
 
 
+@pytest.mark.slow
 @BOTH
 def test_the_robot_stands_at_the_commanded_speed_after_a_while(quirks: Quirks) -> None:
     """20 RPM are commanded once.

@@ -40,6 +40,7 @@ def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
     assert mode_of(board) is BoardMode.PAUSED
 
 
+@pytest.mark.slow
 def test_a_paused_board_counts_once_a_second() -> None:
     """A paused board sends a text once a second.
 

@@ -132,6 +132,7 @@ def test_a_latching_emergency_stop_ends_with_a_reset_alone() -> None:
 POSITION = BoardSettings(running=True, control="position")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("goal", [(1000, 500, 1571), (-300, 0, -7000), (0, 0, 0), (2, -1, 1)])
 def test_with_the_switch_on_position_the_robot_drives_to_the_commanded_pose(
     goal: tuple[int, int, int],

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 
+import pytest
 from simulator_program import PATIENCE_S, line, say, simulator
 
 
@@ -47,6 +48,7 @@ def test_the_console_reboots_the_board() -> None:
     assert truth["mode"] in ("booting", "paused")
 
 
+@pytest.mark.slow
 def test_the_end_of_the_input_does_not_end_it() -> None:
     """The program runs with /dev/null as its input.
 

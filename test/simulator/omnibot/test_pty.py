@@ -7,6 +7,8 @@ import select
 import time
 from collections.abc import Callable
 
+import pytest
+
 from omnibot_driver.simulator.omnibot import BoardMode, BoardSettings, PtyBoard, SimulatedBoard
 
 PATIENCE_S = 20.0
@@ -48,6 +50,7 @@ def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> N
             os.close(port)
 
 
+@pytest.mark.slow
 def test_the_stream_read_is_the_stream_sent() -> None:
     """A program reads the terminal. No byte is changed, added or lost."""
     with PtyBoard(SimulatedBoard(RUNNING)) as pty:
