@@ -12,7 +12,10 @@ all of them is regarded as a driver."""
 
 
 def drivers_among(topics: Iterable[tuple[str, str]]) -> list[str]:
-    """Return the full node names of the drivers that publish ``topics``, pairs of name and type."""
+    """Return the full node names of the drivers whose SIGNS are all among ``topics``.
+
+    ``topics``: pairs of name and type.
+    """
     pairs = set(topics)
     names = {topic.rpartition("/")[0] for topic, _kind in pairs}
     return sorted(

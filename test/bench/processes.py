@@ -83,7 +83,10 @@ def driver(path: str, namespace: str, before: str = "", **environment: str) -> P
 
 
 def floor(what: str, path: str, namespace: str) -> Program:
-    """Start the smallest program with the driver's output (``floor.py``) for the task ``what``."""
+    """Start ``floor.py``, the smallest program with the same output as the driver.
+
+    ``what``: the task of the program.
+    """
     return Program(str(HERE / "floor.py"), what, path, namespace)
 
 

@@ -216,7 +216,7 @@ def test_foxglove_lays_out_every_panel_once() -> None:
 
 
 def test_foxglove_drives_slowly_and_often_enough() -> None:
-    """Foxglove's buttons command speeds within the driver's limits.
+    """Foxglove's buttons send speeds within the driver's limits.
 
     A button repeats its command more than twice within the driver's command timeout.
     """

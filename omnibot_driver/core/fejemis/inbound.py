@@ -125,7 +125,7 @@ class Inbound:
         if self._ports.identify() and self._ports.swapped:
             self._told.tell(
                 "the ports are swapped: the drive board is at `front_port`; the driver works"
-                " with swapped ports",
+                " in this order too",
                 now,
             )
         if trouble := self._ports.trouble:

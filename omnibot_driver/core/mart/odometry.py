@@ -23,7 +23,8 @@ ACCELERATION_MPS2: Final = 1.0
 FASTER_MPS, FASTER_RADPS = 0.1, 0.2
 """Standard deviations of the errors of measured speeds, in m/s and rad/s."""
 STARTS_MPS, STARTS_RADPS = 0.3, 0.6
-"""Standard deviations of speed and turn rate from a start until both are measured."""
+"""Standard deviations of speed and turn rate, in m/s and rad/s, after a start, until both are
+measured."""
 BLIND_RADPS: Final = 1.5
 """Standard deviation of the turn rate of a robot during a controlled move, in rad/s."""
 SPEED_STDDEV_MPS, SPEED_STDDEV_RADPS = 0.02, 0.03

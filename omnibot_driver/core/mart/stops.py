@@ -51,7 +51,7 @@ UNCONTROLLED: Final = (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Measured speeds in m/s and rad/s. A robot that exceeds either of them certainly moves."""
 BLOCKED_S: Final = 0.6
-"""Time in s for which a wheel must stand in a drive before the driver regards it as blocked."""
+"""Time in s for which a wheel must stand still in a drive before it is regarded as blocked."""
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
     Motion.REFERENCE: "RM",

@@ -129,7 +129,7 @@ class DriveTeensy(Teensy[DriveConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write the lines, by the name of the line in the help text."""
+        """Return the functions that write lines. The keys are the lines' names in the help text."""
         return super().items() | {
             "hbt": self._heartbeat,
             "adc": lambda: f"adc {self.settings.volts * 100:.0f} 2050 812 790 0",

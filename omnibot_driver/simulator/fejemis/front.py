@@ -117,7 +117,7 @@ class FrontTeensy(Teensy[FrontConfig]):
     # What it sends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write the lines, by the name of the line in the help text."""
+        """Return the functions that write lines. The keys are the lines' names in the help text."""
         return super().items() | {
             "hbt": lambda: (
                 f"hbt {self.clock_text(4)} {self.config.number} {self.version} 0.00 1 0.011"

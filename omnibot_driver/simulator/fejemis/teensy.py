@@ -88,7 +88,7 @@ class Teensy(Generic[C]):
     # What each kind of Teensy extends
 
     def items(self) -> dict[str, Callable[[], str]]:
-        """Return the functions that write the lines, by the name of the line in a subscription."""
+        """Return the functions that write lines. The keys are the lines' names in subscriptions."""
         return {
             "ver": lambda: f"ver {self.version} Fejemis {self.config.name} {self.version / 100}",
             "id": lambda: f"id {self.config.name} {self.config.number}",

@@ -24,11 +24,11 @@ from omnibot_driver.tools.calibrate.waypoints import square, visit
 PLAIN: Final = 0.005
 """The tool warns if a wheel's radius differs from the mean by more than this fraction."""
 INTRODUCTION: Final = (
-    "You need a tape measure, something to mark the floor with, and a plumb line or a point of"
-    " the robot's lowest deck under its centre. Before each drive, mark where the centre is and"
-    " where the front points. After the drive, enter where the robot stands relative to these"
-    " marks: forward and left are positive, back and right are negative. Do not push the robot or"
-    " correct its course."
+    "You need a tape measure and something to mark the floor with. Before each drive, mark the"
+    " floor under the robot's centre (use a plumb line, or a fixed point of the lowest deck), and"
+    " mark where the front points. After the drive, enter where the robot stands relative to"
+    " these marks: forward and left are positive, back and right are negative. Do not push the"
+    " robot or correct its course."
 )
 
 

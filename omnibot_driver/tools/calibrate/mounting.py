@@ -3,7 +3,7 @@
 """Find the mounting of the IMU from gravity in three postures of the robot.
 
 The postures are level, front raised, and left side raised. A turn to the left shows whether gyro
-and gravity agree. This module knows IMU readings; it does not know who holds the robot.
+and gravity agree. This module knows IMU readings; it does not know how the user is asked.
 """
 
 import math

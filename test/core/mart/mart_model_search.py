@@ -89,7 +89,7 @@ FOUND_MOVING: Final = (
 
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
-    """Search all reachable worlds, breadth first, up to the first one that must not occur."""
+    """Search the reachable worlds, breadth first; stop at the first one that must not occur."""
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0

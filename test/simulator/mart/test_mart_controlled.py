@@ -61,7 +61,7 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """During a move without a distance, SDR sets the distance from its start at which it ends.
+    """SDR ends a move without a distance at the given distance from the start of the move.
 
     Moves with a distance ignore SDR.
     """

@@ -144,7 +144,7 @@ def test_an_empty_datagram_ends_the_server() -> None:
 
 
 def test_a_server_that_was_started_again_meets_a_moving_robot() -> None:
-    """The server restarts while the robot moves. The stop SRM fails: no motion is in progress.
+    """The server restarts while the robot moves. SRM then fails: "no motion in progress".
 
     Only a power cycle of the controller stops the motors.
     """
