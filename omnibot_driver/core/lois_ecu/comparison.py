@@ -222,12 +222,17 @@ class Comparison:
             speed.note(duration_s)
 
     def _no_tick(self, duration_s: float, ticks: float) -> None:
-        """Correct the filter: since the last report, no wheel rolled more than ``ticks`` ticks."""
+        """Correct the filter: since the last report, no wheel rolled more than ``ticks`` ticks.
+
+        A wheel whose speed the firmware does not measure is an exception.
+        """
         motion = self._motion
         self.begin_odometry()
         variance = (ticks * motion.tick_m / max(duration_s, 0.01)) ** 2
         for index, wheel in enumerate(motion.wheels):
-            motion.filter.measure([(wheel.base + SPEED, 1.0)], -motion.speed_mps(index), variance)
+            speed = [(wheel.base + SPEED, 1.0)]
+            if not wheel.course.unmeasured:
+                motion.filter.measure(speed, -motion.speed_mps(index), variance)
 
     def _turn(
         self, told: Told, rate_mps: float, pause_s: float, duration_s: float, late_s: float

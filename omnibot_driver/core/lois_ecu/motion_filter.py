@@ -63,6 +63,11 @@ EXCESS_CHANGE: Final = (0.0, 0.15)
 In each pair, the first value is for the board's own controller gains, the second for the user's.
 """
 DUTY_STDDEV: Final = 0.3
+REVERSES_S: Final = 0.2
+"""Standard deviation, in s, of the time that a wheel needs to stop when its duty changes sign.
+
+The board measures the wheel's speed, but not when its direction changes.
+"""
 ROLLING_MPS: Final = 1e-6
 
 
@@ -246,6 +251,8 @@ class MotionFilter:
                 variance = (EXCESS_CHANGE[self.tuned] * part) ** 2
                 self.filter.disturb([(EXCESS + index, 1.0)], variance)
             late_m = LATE_PART * wheel.course.step_s * speed
+            if wheel.course.kind == "duty" and wheel.course.target_mps * speed < 0:
+                late_m = math.hypot(late_m, REVERSES_S * speed)
             self.filter.disturb(max(before, self._way_terms(index), key=len), late_m**2)
         kinds = (self.wheels[0].course.kind, self.wheels[1].course.kind)
         if kinds != self._kinds:

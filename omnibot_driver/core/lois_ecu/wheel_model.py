@@ -70,6 +70,11 @@ class WheelModel:
         return (self.hidden_mps > 0.0) - (self.hidden_mps < 0.0)
 
     @property
+    def unmeasured(self) -> bool:
+        """Whether a duty drives this wheel and the public firmware does not measure its speed."""
+        return self.kind == "duty" and bool(self.target_mps) and not self.measured_sign
+
+    @property
     def waiting(self) -> bool:
         """Whether a command has not taken effect yet."""
         return bool(self._effects)

@@ -162,12 +162,12 @@ class Wheel:
         base, dt, new = self.base, step.dt, step.new
         speed = new[base + SPEED]
         self.rolled_s += dt
-        if target_mps * speed < 0 and (
-            speed * self.rolled_mps <= 0 or self.rolled_s > ROLLED_OUT_S
-        ):
+        # A duty brakes a wheel that rolls the other way. An RPM target lets it coast first.
+        against = target_mps * speed < 0 and self.course.kind == "rpm"
+        if against and (speed * self.rolled_mps <= 0 or self.rolled_s > ROLLED_OUT_S):
             speed = new[base + SPEED] = new[base + PUSH] = 0.0  # no wheel starts the wrong way
         counts = self.counts(speed, signed=signed)
-        if not target_mps or target_mps * speed < 0 or (self.cut and speed):
+        if not target_mps or (speed and (against or self.cut)):
             self._coast(step, target_mps, holds=holds)
         elif self.course.kind == "duty":
             self._by_duty(step, target_mps)

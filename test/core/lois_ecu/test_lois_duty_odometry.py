@@ -1,0 +1,47 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Odometry of a LOIS robot that is driven by duty. The public firmware measures little of it."""
+
+from dataclasses import replace
+
+import pytest
+from lois_drives import Drive, Program, Rig, nominal, off_m
+
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.simulator.lois_ecu import MotorSettings
+
+pytestmark = pytest.mark.slow
+
+PUSH = (22.0, 22.0)
+BACK = (-22.0, -22.0)
+USUAL, SLOW = MotorSettings(), MotorSettings(time_constant_s=0.2)
+
+
+def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
+    """Drive a program on the public firmware. The driver commands its speeds as duties."""
+    settings = replace(nominal("firmware", seed), motors=(motor, motor))
+    return Rig(settings, LoisEcuSettings(drive_mode="duty")).drive(program)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
+    """A new board drives forward by duty. The public firmware counts no ticks, and 0x20 stands.
+
+    The driver does not take this for a robot at rest.
+    """
+    one = by_duty([(3.0, PUSH)], seed)
+    assert one.way_m > 0.7
+    assert off_m(one) < 0.25 * one.way_m
+    assert one.sigmas < 3.0
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_duty_of_the_other_sign_brakes_the_wheels(seed: int) -> None:
+    """The duty changes from backward to forward. The motors are slower than the driver assumes.
+
+    The wheels are braked by the new duty. They do not coast, and do not stop at once.
+    """
+    one = by_duty([(3.0, BACK), (3.0, PUSH)], seed, SLOW)
+    assert one.way_m > 1.4
+    assert off_m(one) < 0.05
+    assert one.sigmas < 2.0
