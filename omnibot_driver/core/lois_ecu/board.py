@@ -55,6 +55,7 @@ class LoisEcuBoard(Board):
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._ecu = LoisConversation(settings)
+        self._proof = StopProof(TRAITS.stands_after_s)
         self._once: Packets = NO_PACKETS
         self._rolled = Pose()
         self._leaving = False
@@ -226,7 +227,7 @@ class LoisEcuBoard(Board):
         if self._leaving:
             return NO_PACKETS
         once, self._once = self._once, NO_PACKETS
-        data = self._ecu.due(now)
+        data = self._ecu.due(now, proved=self._proof.proved)
         if now >= self._reset_at_s:
             data += joined(self._reset())
             self._say_reset_again(now)
@@ -236,6 +237,7 @@ class LoisEcuBoard(Board):
 
     def actuator(self, proof: StopProof) -> SetpointStream:
         """Return the stream that sends set-points, as RPM or as duty."""
+        self._proof = proof
         return SetpointStream(self, proof, heard=self._heard)
 
     def _heard(self, packets: Packets, now: float) -> None:

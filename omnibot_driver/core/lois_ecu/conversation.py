@@ -218,12 +218,13 @@ class LoisConversation:
 
     # Outbound
 
-    def due(self, now: float) -> bytes:
+    def due(self, now: float, *, proved: bool = True) -> bytes:
         """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
 
-        Called at the time ``wake_at``.
+        Called at the time ``wake_at``. ``proved``: whether displacements have proved that the
+        robot stands still. A terminal mode begins after this proof, because none arrive in it.
         """
-        data = self._upkeep.due(now, stands=bool(self.stands(now)))
+        data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal
         return data
 

@@ -10,6 +10,7 @@ import pytest
 from lois_bench import FIRMWARE, Bench, configure, told
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
+from omnibot_driver.core.events import Notice
 from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordFailed, TerminalLeft
@@ -44,6 +45,23 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     assert told(bench, TerminalLine)[-1].text.startswith("$HCHDT")
     assert bench.robot.stands
     bench.drive(0.0)
+
+
+@pytest.mark.slow
+@FIRMWARE
+@pytest.mark.parametrize("drive_s", [2.5, 2.56, 2.62, 2.68])
+def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
+    """The user sets a terminal mode during a drive. In this mode, the board reports no motion.
+
+    The driver has seen the robot stand before, so it does not report an unconfirmed stop.
+    """
+    bench = Bench(firmware)
+    bench.drive_on(0.3, drive_s)
+    configure(bench, GPS)
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    bench.run(3.0)
+    notices = [event.text for event in bench.events if isinstance(event, Notice)]
+    assert not [text for text in notices if "unconfirmed" in text]
 
 
 @pytest.mark.slow
