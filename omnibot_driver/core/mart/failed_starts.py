@@ -15,6 +15,9 @@ from omnibot_driver.core.mart.states import Motion
 
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed, before the driver tries again."""
+NO_STARTS: Final = 3
+"""Number of starts of B, R or L in a row that do not turn the right wheel. Then the driver gives
+up: each start may have turned the left wheel, and so the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 
@@ -54,13 +57,24 @@ class FailedStarts(Adjusting):
                     " the command ends"
                 )
         elif reply.reason == words.NO_START:
-            why = "no wheel has turned, so the driver tries again; check motors and power"
+            why = self._not_turned()
         else:
             why = self._obstacle(reply, self.motion)
         if word in (words.R, words.L) and reply.reason == words.UNSUPPORTED:
             self._turns.refused()
         failed = f"{word.text} failed ({reply.reason or 'no reason given'})"
         self._halt(now, f"{failed}: {why}", arrived=arrived)
+
+    def _not_turned(self) -> str:
+        """Count a start that did not turn the right wheel. Return what the driver does now."""
+        self._no_starts += 1
+        if self._no_starts < NO_STARTS:
+            return "the right wheel has not turned, so the driver tries again"
+        self._blocked, self._no_starts = self.motion, 0
+        return (
+            "the right wheel has not turned: it may be stuck or without power; this motion is"
+            " refused until the command ends"
+        )
 
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.

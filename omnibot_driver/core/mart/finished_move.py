@@ -96,6 +96,16 @@ class Done:
         return abs(self.way_m if self.is_straight else self.turned_rad)
 
     @property
+    def contradicts_the_server(self) -> bool:
+        """Whether the right wheel has turned much less or much more in a completed turn.
+
+        The server ends a turn by the gyro, so one of the wheels may be stuck or slip.
+        """
+        if self.is_straight or not self.completed or not self.is_large:
+            return False
+        return self._is_short or LEAST_LIKE * self._seen > max(self.asked, self.expected)
+
+    @property
     def may_have_run_twice(self) -> bool:
         """Whether the server may have run the move twice, from a duplicated datagram."""
         no_time = self.quiet_s < FULL * self.usual_s and not self.ended_late

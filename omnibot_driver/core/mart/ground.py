@@ -155,6 +155,7 @@ class Ground:
         self._present_s = self._served_s = -math.inf
         self._again_s = self._said_lost_s = self._estop_said_s = -math.inf
         self._blocked: Motion = Motion.NONE
+        self._no_starts = 0
         self._obstacle_told = False
         self._stray_s = self._swept_s = self._stood_s = -math.inf
         self._negative_sweep = self._rescue = False

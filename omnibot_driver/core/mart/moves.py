@@ -31,6 +31,10 @@ RAN_TWICE: Final = (
     "the network has delivered a controlled move twice; the driver has stopped the second run, and"
     " continues with an estimate of the first one: check the network"
 )
+CONTRADICTED: Final = (
+    "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"
+    " may be stuck or slip, so the heading is uncertain"
+)
 LEAST_STOP_S: Final = 0.3
 """Shortest time in s from a stop of a controlled move (SL or SS) until the server answers again."""
 
@@ -135,7 +139,11 @@ class Moves(Asking):
         move, self._last_move = self._last_move, None
         completed, self._moved_by = self._moved_by is not None, None
         if move is None:
-            self.odometry.rest()
+            wrong_rad = self.odometry.rest()
+            if wrong_rad and not self.conversation.disturbed(now):
+                spun_deg = math.degrees(self.odometry.turn.spun_rad)
+                told_deg = spun_deg - math.degrees(wrong_rad)
+                self._notice(CONTRADICTED.format(told_deg, spun_deg), halt=False)
             return
         done = self._done(move, now, completed=completed)
         stopped = self._may_have_stopped_a_copy(done, now)
@@ -153,6 +161,8 @@ class Moves(Asking):
             self._notice(RAN_TWICE, halt=False)
         elif completed and likely and doubtful and done.is_large:
             self._discard_goal()
+        elif done.contradicts_the_server and not self.conversation.disturbed(now):
+            self._stop_contradicted(done)
         elif completed and not (stopped and doubtful):
             self._learn_from(move, now)
 
@@ -179,6 +189,15 @@ class Moves(Asking):
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
         return done.stopped_again and not (done.completed and no_time)
+
+    def _stop_contradicted(self, done: Done) -> None:
+        """Discard the goal after a turn of which the right wheel shows another angle."""
+        self.odometry.doubt_turn(done.asked - abs(done.turned_rad))
+        if self._move is not None:
+            self._move.fail()
+        asked_deg, seen_deg = math.degrees(done.asked), math.degrees(abs(done.turned_rad))
+        discarded = "; the goal of cmd_pose is discarded: remove the cause, then send it again"
+        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + discarded, halt=True)
 
     def _discard_goal(self) -> None:
         """Discard the goal, because the network may have duplicated the last move to it."""

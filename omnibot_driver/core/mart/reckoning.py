@@ -165,16 +165,20 @@ class Reckoning:
         """Record that the robot was stopped; it may still coast."""
         self.stands, self._stood_s = True, now
 
-    def rest(self, longest: float = math.inf) -> None:
+    def rest(self, longest: float = math.inf) -> float:
         """End the motion, after the distance that the robot coasted was measured too.
+
+        Return by how much the server's angle of a turn on the spot is smaller than the wheel's, in
+        rad, if this is implausible; else 0.
 
         ``longest``: longest possible distance of a straight move in m, or turn in rad.
         """
+        wrong_rad = 0.0
         if self.motion is Motion.NONE:
-            return
+            return wrong_rad
         if self.on_the_spot:
             recorded = self.motion is Motion.TURN and not self.begins_in_move
-            self._correct_yaw(self.turn.end(may_be_recorded=recorded))
+            wrong_rad = self._end_turn(may_be_recorded=recorded)
             self.doubt.end_turn(self.turn.spun_rad, self.turn.told_rad)
         if self.motion is Motion.REFERENCE and self.heading.from_s < self._stood_s:
             self._doubt_unread_turn()
@@ -189,6 +193,23 @@ class Reckoning:
         self.wheel.rest()
         self.slowing_since_s = None
         self.speeds.forget()
+        return wrong_rad
+
+    def _end_turn(self, *, may_be_recorded: bool) -> float:
+        """End a turn on the spot.
+
+        If the server has reported an implausible angle, this may be the angle of another motion, or
+        only one of the wheels has turned. So the whole difference is a possible error.
+        """
+        wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
+        self._correct_yaw(wrong_rad)
+        self.doubt_turn(wrong_rad)
+        return wrong_rad
+
+    def doubt_turn(self, turn_rad: float) -> None:
+        """Add the error of a turn that may lack ``turn_rad``, about one of the wheels."""
+        turn_rad = min(abs(turn_rad), ANY_RAD)
+        self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)
 
     def run_before(self, is_straight: bool, amount: float) -> None:
         """Add the first of two runs of the last move to the pose. Only the second run was counted.

@@ -235,7 +235,7 @@ class Starts(FailedStarts):
             self.loop.started()
             self.health.reference_answers()
             self._obstacle_told = False
-        self.health.heading_changes = 0
+        self._no_starts, self.health.heading_changes = 0, 0
         self.state = WHILE[self.motion]
         self._begun_s = now
         copies_s = self._started_s + 2 * self._delay_s  # of RST IMU, whose reply is ok too

@@ -1,0 +1,79 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A wheel that is stuck in a turn on the spot, or in a drive backward.
+
+The controller reports the count of the right wheel only. It measures turns by the gyro.
+"""
+
+import math
+
+import pytest
+from honesty import nees
+from mart_bench import MartBench
+
+from omnibot_driver.simulator.mart.settings import Stuck
+
+WHEELS = pytest.mark.parametrize("stuck", ["left", "right"])
+MOST_NEES = 16.3
+"""In one of 1000 drives, NEES is larger if the covariance is right."""
+
+
+@pytest.mark.slow
+@WHEELS
+@pytest.mark.parametrize("first_s", [0.5, 1.0])
+def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
+    stuck: Stuck, first_s: float
+) -> None:
+    """A wheel gets stuck during a turn to a goal. The server ends the turn by the gyro.
+
+    The right wheel shows another angle. So the driver discards the goal, and the covariance covers
+    the difference.
+    """
+    bench = MartBench("source").ready()
+    bench.go_to(0.0, 0.0, 2.6)
+    bench.run(first_s)
+    bench.server.chassis.change(stuck=stuck)
+    bench.run(15.0)
+    assert any("one wheel may be stuck" in notice for notice in bench.notices)
+    assert abs(bench.truth.yaw_rad) < 2.8
+    assert nees(bench) < MOST_NEES
+
+
+@pytest.mark.parametrize("first_s", [0.0, 2.0])
+def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> None:
+    """The left wheel is stuck, so the robot turns by half the angle that the right wheel shows.
+
+    The reply to the stop has the true angle. The driver reports the difference, and the covariance
+    covers it.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.0, 0.6, first_s)
+    bench.server.chassis.change(stuck="left")
+    bench.command(0.0, 0.6, 8.0)
+    bench.command(0.0, 0.0, 3.0)
+    assert any("one wheel may be stuck" in notice for notice in bench.notices)
+    assert nees(bench) < MOST_NEES
+
+
+@pytest.mark.parametrize(("vx", "yaw_rate"), [(0.0, 0.6), (0.0, -0.6), (-0.3, 0.0)])
+def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
+    vx: float, yaw_rate: float
+) -> None:
+    """The right wheel is stuck, so each start turns the robot by the left wheel until it fails.
+
+    After three starts the driver refuses this motion until the command ends. A new command starts
+    it again.
+    """
+    bench = MartBench("source").ready()
+    bench.server.chassis.change(stuck="right")
+    bench.command(vx, yaw_rate, 10.0)
+    assert sum("start timedout" in notice for notice in bench.notices) == 3
+    assert "refused until the command ends" in bench.notices[-1]
+    assert abs(bench.truth.yaw_rad) < math.radians(90.0)
+    assert nees(bench) < MOST_NEES
+    bench.command(0.0, 0.0, 3.0)
+    bench.server.chassis.change(stuck="none")
+    refused_at = bench.truth
+    bench.command(vx, yaw_rate, 3.0)
+    moved = refused_at.way_to(bench.truth)
+    assert moved.way_m + abs(moved.yaw_rad) > 0.3
