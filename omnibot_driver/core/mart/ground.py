@@ -212,7 +212,10 @@ class Ground:
         return self.heard_s <= self._present_s + most_s
 
     def _hears(self, now: float) -> None:
-        """Record a reply, and whether it is the first one after an absence of the server."""
+        """Record a reply, and whether it is the first one after an absence of the server.
+
+        After replies of another server, the controller may have been started in its place.
+        """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
             most_s = ABSENT_BUSY_S  # the driver has waited for pieces of a file
@@ -222,7 +225,7 @@ class Ground:
             most_s = ABSENT_BUSY_S
         in_move = self._stopping is not None and self._stopping.move is not None
         busy = in_move or self.state in (State.MOVING, State.SERVING)
-        if now - self.heard_s > most_s and not busy:
+        if (now - self.heard_s > most_s and not busy) or self.health.stranger:
             self._appears(now)
         self.heard_s = now
 

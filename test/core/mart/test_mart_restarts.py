@@ -243,3 +243,29 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
     error, noise = bench.error, bench.odometry[-1].covariance
     assert abs(error.yaw_rad) < math.sqrt(noise.yaw_yaw)
     assert error.way_m < 2.0 * math.sqrt(max(noise.xx, noise.yy))
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 0.2, 0.4])
+def test_a_controller_that_is_started_in_place_of_another_server_is_given_time(
+    offset_s: float,
+) -> None:
+    """Another server answers at the controller's address. Then the controller is started there.
+
+    There is no silence between the two servers. The driver sends nothing that crashes a server that
+    is starting up.
+    """
+    bench = MartBench("source").ready()
+    seconds = 8.0 + offset_s
+    bench.server.restart(seconds)
+    answered = len(bench.written)
+    for _ in range(round(seconds / 0.01)):
+        requests = bench.written[answered:]
+        answered += len(requests)
+        for _, data in requests:
+            reply = b"ok toaster" if data == b"HELLO" else b"what?"
+            bench.session.inbound.receive(reply, bench.now, 0)
+        bench.run(0.01)
+    assert any("answers HELLO with 'toaster'" in notice for notice in bench.notices)
+    bench.command(0.3, 0.0, 8.0)
+    assert not bench.server.crashed
+    assert not bench.robot.stands
