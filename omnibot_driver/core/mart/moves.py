@@ -35,6 +35,11 @@ CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"
     " may be stuck or slip, so the heading is uncertain"
 )
+OFF_COURSE_RAD: Final = 0.5
+"""Standard deviation in rad of the turn in a move that fails because one wheel does not turn.
+
+The server does not report this turn.
+"""
 LEAST_STOP_S: Final = 0.3
 """Shortest time in s from a stop of a controlled move (SL or SS) until the server answers again."""
 
@@ -97,6 +102,8 @@ class Moves(Asking):
             self._notice(f"controlled move failed: {reason}{discarded}", halt=True)
             if reply.reason == words.IMU_LOST:
                 self.imu.lost()
+            elif reply.reason in (words.GYRO, words.NO_START):
+                self.odometry.doubt_turn(OFF_COURSE_RAD)
 
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn by how much a move that has ended goes beyond its target.

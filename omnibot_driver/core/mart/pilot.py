@@ -29,7 +29,13 @@ from omnibot_driver.core.mart.states import (
     State,
 )
 from omnibot_driver.core.mart.stopping import REPEAT_S
-from omnibot_driver.core.mart.stops import HALF_STUCK, LOST_REPEAT_S, STUCK
+from omnibot_driver.core.mart.stops import (
+    COASTS_S,
+    HALF_STUCK,
+    LOST_REPEAT_S,
+    STUCK,
+    STUCK_S,
+)
 from omnibot_driver.core.mart.words import Word
 from omnibot_driver.core.packets import NO_PACKETS, Packets
 
@@ -177,8 +183,10 @@ class Pilot(Hearing):
         if why := self._why_stop(now):
             if why is STUCK:
                 self._learn_standing()
+                self._doubt_the_left_wheel(STUCK_S)
             elif why is HALF_STUCK:
                 self._blocked = Motion.REFERENCE
+                self._doubt_the_left_wheel(COASTS_S)
             self._halt(now, "" if why == "wanted" else why)
             return self._keep_stopping(now)
         if now >= self._copy_stop_s:

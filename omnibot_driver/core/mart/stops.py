@@ -52,6 +52,13 @@ CREEP_MPS, CREEP_RADPS = 0.01, 0.02
 """Measured speeds in m/s and rad/s. A robot that exceeds either of them certainly moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand still in a drive before it is regarded as blocked."""
+STUCK_S, COASTS_S = 0.5, 0.2
+"""Times in s for which the left wheel, which has no encoder, may turn unseen.
+
+``STUCK_S``: before a stuck right wheel is noticed, if the server does not report the heading.
+
+``COASTS_S``: after a stop, if the right wheel stands already. The server then ends its measurement.
+"""
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
     Motion.REFERENCE: "RM",

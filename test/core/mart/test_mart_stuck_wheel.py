@@ -77,3 +77,33 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
     bench.command(vx, yaw_rate, 3.0)
     moved = refused_at.way_to(bench.truth)
     assert moved.way_m + abs(moved.yaw_rad) > 0.3
+
+
+@pytest.mark.parametrize(("vx", "first_s"), [(0.3, 2.0), (-0.3, 1.0)])
+def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
+    vx: float, first_s: float
+) -> None:
+    """The left wheel turns the robot, partly unseen, until the driver notices that it is stuck."""
+    bench = MartBench("source").ready()
+    bench.command(vx, 0.0, first_s)
+    bench.server.chassis.change(stuck="right")
+    bench.command(vx, 0.0, 3.0)
+    bench.command(0.0, 0.0, 3.0)
+    assert abs(bench.truth.yaw_rad) > math.radians(10.0)
+    assert nees(bench) < MOST_NEES
+
+
+@pytest.mark.slow
+@WHEELS
+@pytest.mark.parametrize(("x_m", "first_s"), [(2.0, 0.8), (2.0, 2.5), (-2.0, 4.0)])
+def test_a_wheel_that_gets_stuck_in_a_straight_move_makes_the_heading_uncertain(
+    stuck: Stuck, x_m: float, first_s: float
+) -> None:
+    """The server ends the move with a failure, and does not report by how much the robot turned."""
+    bench = MartBench("source").ready()
+    bench.go_to(x_m, 0.0, 0.0)
+    bench.run(first_s)
+    bench.server.chassis.change(stuck=stuck)
+    bench.run(15.0)
+    assert any("controlled move failed" in notice for notice in bench.notices)
+    assert nees(bench) < MOST_NEES
