@@ -2,10 +2,14 @@
 
 """Tests of the udev rules, the systemd unit and the container: well formed, and as documented."""
 
+import contextlib
+import os
 import re
 import shutil
 import signal
 import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -129,21 +133,50 @@ def test_the_first_process_of_a_container_outlives_the_guard() -> None:
 
     The container's first process lives longer than this, because its end kills the guard.
     """
-    (pause_s,) = re.findall(r"^sleep ([\d.]+)$", OUTLIVE.read_text(), re.MULTILINE)
+    (pause_s,) = re.findall(r"^time\.sleep\(([\d.]+)\)$", OUTLIVE.read_text(), re.MULTILINE)
     assert float(pause_s) > guard.TIMES * guard.PACE_S
     assert str(OUTLIVE.relative_to(ROOT)) in (ROOT / "docker/Dockerfile").read_text()
 
 
-def test_the_first_process_of_a_container_passes_a_stop_on() -> None:
+DRIVER = "trap 'exit 7' TERM; echo ready; {}; while :; do sleep 0.1; done"
+
+
+@pytest.mark.parametrize("stop", ["kill -TERM $PPID", "kill -INT $PPID"])
+def test_the_first_process_of_a_container_passes_a_stop_on(stop: str) -> None:
     """``docker stop`` sends SIGTERM to the first process, and the driver receives it.
 
     The exit code is that of the driver.
     """
-    driver = "trap 'exit 7' TERM; echo ready; while :; do sleep 0.1; done"
-    with subprocess.Popen(
-        [OUTLIVE, "bash", "-c", driver], stdout=subprocess.PIPE, text=True
-    ) as process:
-        assert process.stdout is not None
-        process.stdout.readline()
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(60.0) == 7
+    command = [sys.executable, OUTLIVE, "bash", "-c", DRIVER.format(stop)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (7, "ready\n", "")
+
+
+@pytest.mark.slow
+def test_a_stop_at_any_moment_of_the_start_ends_the_container() -> None:
+    """The first process receives SIGTERM while it starts the driver. Both end.
+
+    The first process ends before the driver runs, or passes SIGTERM on to it.
+    """
+    command = [sys.executable, OUTLIVE, "bash", "-c", DRIVER.format("true")]
+    containers = []
+    for number in range(40):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, process_group=0)
+        containers.append(process)
+        time.sleep(0.002 * number)  # the moments of a start have no events
+        process.terminate()
+    try:
+        assert {process.wait(60.0) for process in containers} <= {-15, 7, 128 + 15}
+        for process in containers:
+            with pytest.raises(ProcessLookupError):
+                os.killpg(process.pid, 0)
+    finally:
+        for process in containers:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def test_the_exit_code_of_a_killed_driver_is_that_of_a_shell() -> None:
+    """The driver is killed by SIGKILL. The container's exit code is 137."""
+    command = [sys.executable, OUTLIVE, "bash", "-c", "kill -KILL $$"]
+    assert subprocess.run(command, timeout=60.0, check=False).returncode == 137
