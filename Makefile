@@ -15,6 +15,9 @@ BOARD ?= omnibot
 # Folders without ROS; what is slow in them is marked so.
 QUICK := test/core test/simulator
 
+# A test that hangs for ten minutes ends the run, which then shows where it hangs.
+ENDS_HANGING := --max-worker-restart 0 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
+
 SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
 
 NO_WHEELS = There are no ROS 2 Jazzy wheels for this machine's Python (PyPI has them for CPython \
@@ -46,7 +49,7 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or 
 	@$(PY) -m omnibot_driver.demo --board $(BOARD)
 
 test: lint $(VENV)/.docs  ## run every check and test
-	$(PY) -m pytest -n 8 --dist loadfile --no-loadscope-reorder  # the longest files first: conftest.py
+	$(PY) -m pytest -n 8 --dist loadfile --no-loadscope-reorder $(ENDS_HANGING)  # the longest files first: conftest.py
 
 check: lint  ## check formatting, style and types, and run the quick tests (a minute if the computer is idle)
 	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)
