@@ -2,23 +2,28 @@
 
 """Dead reckoning: the robot's pose at the last encoder count.
 
-During a turn on the spot, the right wheel's encoder measures the angle. At its end, the server
-reports the angle in the reply to the stop, and this angle replaces the wheel's. This module knows
-counts, degrees and metres; it does not know commands. The caller passes the time.
+During a turn on the spot, the right wheel's encoder measures the angle. This module knows counts,
+degrees and metres; it does not know commands. The caller passes the time.
 """
 
 import math
 from typing import Final
 
 from omnibot_driver.core.geometry.se2 import Pose, roll
-from omnibot_driver.core.mart.doubt import CLOCK_S, SPREAD, Doubt
-from omnibot_driver.core.mart.mean_speeds import LEAST_S, MeanSpeeds
+from omnibot_driver.core.mart.corrected_pose import (
+    ANY_RAD,
+    UNHEARD_M,
+    UNHEARD_RAD,
+    CorrectedPose,
+)
+from omnibot_driver.core.mart.doubt import CLOCK_S, SPREAD
+from omnibot_driver.core.mart.mean_speeds import LEAST_S
 from omnibot_driver.core.mart.moment import Moment
 from omnibot_driver.core.mart.motors import UNEQUAL
 from omnibot_driver.core.mart.relative_heading import RelativeHeading
 from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import Motion
-from omnibot_driver.core.mart.turn_angle import TurnAngle, is_of_another
+from omnibot_driver.core.mart.turn_angle import is_of_another
 from omnibot_driver.core.mart.wheel_count import STRAY_COUNTS, WheelCount
 from omnibot_driver.core.readings import NOTHING_MEASURED, DisplacementReading
 
@@ -33,17 +38,6 @@ ACCELERATION_RADPS2: Final = 3.0
 """Standard deviation of the turn acceleration since the last count, in rad/s²."""
 FRESH_S: Final = 0.2
 """Largest age in s of the last heading with which the measured turn rate is still valid."""
-UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations, in m and rad, of a motion that is not measured while a connection is
-lost."""
-ANY_RAD: Final = 1.8
-"""Standard deviation of an unknown heading, in rad."""
-RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Errors of a controlled move whose size is estimated, not counted, as standard deviations.
-
-``RUN``: relative error of its distance or turn. ``END_RUN_M``, ``END_RUN_RAD``: additional errors
-of a distance in m, and of a turn in rad.
-"""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
 """Assumptions for the end of a drive whose heading is unread.
 
@@ -52,18 +46,14 @@ ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
 """
 
 
-class Reckoning:
+class Reckoning(CorrectedPose):
     """Dead reckoning by the encoder count and the relative heading.
-
-    ``pose``: pose at the last count.
 
     ``motion``: the motion whose counts are being processed.
 
     ``stands``: whether the robot was stopped; it may still coast.
 
     ``slowing_since_s``: time of this motion's first stop command, or None.
-
-    ``turn``: angle of the present or last turn on the spot.
 
     ``left_over_right``: expected wheel speed ratio (left / right) while the heading is unknown,
     else None.
@@ -74,30 +64,17 @@ class Reckoning:
     """
 
     def __init__(self, settings: MartSettings) -> None:
-        self._settings = settings
-        self.doubt = Doubt(settings)
+        super().__init__(settings)
         self.wheel = WheelCount()
         self.heading = RelativeHeading()
         self.motion, self.stands = Motion.NONE, True
-        self.rolled = Pose()
         self.left_over_right: float | None = None
         self.bend = UNEQUAL
         self._began_s = self._stood_s = -math.inf
         self.slowing_since_s: float | None = None
-        self.speeds = MeanSpeeds()
-        self.turn = TurnAngle()
         self._motion_rad = self.moved_m = 0.0
         self._guessed = False
         self.reset()
-
-    @property
-    def settings(self) -> MartSettings:
-        """The sizes and scales of the robot; may be replaced."""
-        return self._settings
-
-    @settings.setter
-    def settings(self, settings: MartSettings) -> None:
-        self._settings = self.doubt.settings = settings
 
     def reset(self) -> None:
         """Move the origin of the odometry frame to the robot's present pose."""
@@ -149,13 +126,6 @@ class Reckoning:
         if self.wheel.refused():
             self.lose_turn()
 
-    def lose_turn(self) -> None:
-        """Add the error of the turn since a restart of the server in a motion.
-
-        The motors keep their last command, and the server's relative heading begins at zero.
-        """
-        self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
-
     def stopping(self, now: float) -> None:
         """Record that a stop was sent to the robot."""
         if self.slowing_since_s is None:
@@ -179,7 +149,6 @@ class Reckoning:
         if self.on_the_spot:
             recorded = self.motion is Motion.TURN and not self.begins_in_move
             wrong_rad = self._end_turn(may_be_recorded=recorded)
-            self.doubt.end_turn(self.turn.spun_rad, self.turn.told_rad)
         if self.motion is Motion.REFERENCE and self.heading.from_s < self._stood_s:
             self._doubt_unread_turn()
         self.doubt.end()
@@ -194,37 +163,6 @@ class Reckoning:
         self.slowing_since_s = None
         self.speeds.forget()
         return wrong_rad
-
-    def _end_turn(self, *, may_be_recorded: bool) -> float:
-        """End a turn on the spot.
-
-        If the server has reported an implausible angle, this may be the angle of another motion, or
-        only one of the wheels has turned. So the whole difference is a possible error.
-        """
-        wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
-        self._correct_yaw(wrong_rad)
-        self.doubt_turn(wrong_rad)
-        return wrong_rad
-
-    def doubt_turn(self, turn_rad: float) -> None:
-        """Add the error of a turn that may lack ``turn_rad``, about one of the wheels."""
-        turn_rad = min(abs(turn_rad), ANY_RAD)
-        self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)
-
-    def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add the first of two runs of the last move to the pose. Only the second run was counted.
-
-        A duplicate of the request has started the second run. ``amount``: the expected distance of
-        a complete run in m, or its turn in rad.
-        """
-        if is_straight:
-            self.pose = self.pose.moved(Pose(amount, 0.0, 0.0))
-            self.rolled += Pose(amount, 0.0, 0.0)
-            self.doubt.add(END_RUN_M**2 + (RUN * amount) ** 2, 0.0)
-            self.doubt.end_straight()
-        else:
-            self._correct_yaw(amount)
-            self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def _doubt_unread_turn(self) -> None:
         """Add the error of the turn since the last heading of a drive, if rest ends it unread."""
@@ -339,33 +277,6 @@ class Reckoning:
         self._correct_yaw(wrong_rad)
         self._motion_rad += wrong_rad
         return wrong_rad
-
-    def spin_told(self, degrees: float) -> None:
-        """Correct the heading by the angle that the server reports after a turn on the spot.
-
-        ``degrees``: this angle, with the server's sign.
-        """
-        told_rad = math.radians(degrees) * self._settings.heading_sign
-        self._correct_yaw(self.turn.tell(told_rad))
-
-    def turn_recorded(self, degrees: float) -> bool:
-        """Correct the heading after a controlled turn by the angle that the server has recorded.
-
-        ``degrees``: this angle, with the server's sign. Return whether the angle was used.
-        """
-        told_rad = math.radians(degrees) * self._settings.heading_sign
-        spun_rad = self.turn.spun_rad
-        wrong_rad = self.turn.record(told_rad)
-        if wrong_rad is None:
-            return False
-        self._correct_yaw(wrong_rad)
-        self.doubt.turn_recorded(spun_rad, told_rad)
-        return True
-
-    def _correct_yaw(self, wrong_rad: float) -> None:
-        self.pose = Pose(self.pose.x_m, self.pose.y_m, self.pose.yaw_rad + wrong_rad)
-        self.rolled += Pose(0.0, 0.0, wrong_rad)
-        self.speeds.correct(wrong_rad)
 
     def _move(self, way_m: float, turn_rad: float, seconds: float, wheel_m: float) -> None:
         tangent = Pose(way_m, 0.0, turn_rad)

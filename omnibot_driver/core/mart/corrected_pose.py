@@ -1,0 +1,119 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""The pose in the odometry frame, and how later knowledge of a motion corrects it.
+
+After a turn on the spot, the server reports its angle, which replaces the wheel's. This module
+knows angles and distances; it does not know counts or times.
+"""
+
+import math
+from typing import Final
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.mart.doubt import Doubt
+from omnibot_driver.core.mart.mean_speeds import MeanSpeeds
+from omnibot_driver.core.mart.settings import MartSettings
+from omnibot_driver.core.mart.turn_angle import TurnAngle
+
+UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
+"""Standard deviations, in m and rad, of a motion that is not measured while a connection is
+lost."""
+ANY_RAD: Final = 1.8
+"""Standard deviation of an unknown heading, in rad."""
+RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
+"""Errors of a controlled move whose size is estimated, not counted, as standard deviations.
+
+``RUN``: relative error of its distance or turn. ``END_RUN_M``, ``END_RUN_RAD``: additional errors
+of a distance in m, and of a turn in rad.
+"""
+
+
+class CorrectedPose:
+    """The pose of the robot, and its covariance.
+
+    ``pose``: pose at the last count.
+
+    ``turn``: angle of the present or last turn on the spot.
+    """
+
+    def __init__(self, settings: MartSettings) -> None:
+        self._settings = settings
+        self.doubt = Doubt(settings)
+        self.speeds = MeanSpeeds()
+        self.turn = TurnAngle()
+        self.pose = self.rolled = Pose()
+
+    @property
+    def settings(self) -> MartSettings:
+        """The sizes and scales of the robot; may be replaced."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: MartSettings) -> None:
+        self._settings = self.doubt.settings = settings
+
+    def spin_told(self, degrees: float) -> None:
+        """Correct the heading by the angle that the server reports after a turn on the spot.
+
+        ``degrees``: this angle, with the server's sign.
+        """
+        told_rad = math.radians(degrees) * self._settings.heading_sign
+        self._correct_yaw(self.turn.tell(told_rad))
+
+    def turn_recorded(self, degrees: float) -> bool:
+        """Correct the heading after a controlled turn by the angle that the server has recorded.
+
+        ``degrees``: this angle, with the server's sign. Return whether the angle was used.
+        """
+        told_rad = math.radians(degrees) * self._settings.heading_sign
+        spun_rad = self.turn.spun_rad
+        wrong_rad = self.turn.record(told_rad)
+        if wrong_rad is None:
+            return False
+        self._correct_yaw(wrong_rad)
+        self.doubt.turn_recorded(spun_rad, told_rad)
+        return True
+
+    def run_before(self, is_straight: bool, amount: float) -> None:
+        """Add the first of two runs of the last move to the pose. Only the second run was counted.
+
+        A duplicate of the request has started the second run. ``amount``: the expected distance of
+        a complete run in m, or its turn in rad.
+        """
+        if is_straight:
+            self.pose = self.pose.moved(Pose(amount, 0.0, 0.0))
+            self.rolled += Pose(amount, 0.0, 0.0)
+            self.doubt.add(END_RUN_M**2 + (RUN * amount) ** 2, 0.0)
+            self.doubt.end_straight()
+        else:
+            self._correct_yaw(amount)
+            self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
+
+    def lose_turn(self) -> None:
+        """Add the error of the turn since a restart of the server in a motion.
+
+        The motors keep their last command, and the server's relative heading begins at zero.
+        """
+        self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
+
+    def doubt_turn(self, turn_rad: float) -> None:
+        """Add the error of a turn that may lack ``turn_rad``, about one of the wheels."""
+        turn_rad = min(abs(turn_rad), ANY_RAD)
+        self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)
+
+    def _end_turn(self, *, may_be_recorded: bool) -> float:
+        """End a turn on the spot, and return the correction of its angle in rad.
+
+        If the server has reported an implausible angle, this may be the angle of another motion, or
+        only one of the wheels has turned. So the whole difference is a possible error.
+        """
+        wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
+        self._correct_yaw(wrong_rad)
+        self.doubt_turn(wrong_rad)
+        self.doubt.end_turn(self.turn.spun_rad, self.turn.told_rad)
+        return wrong_rad
+
+    def _correct_yaw(self, wrong_rad: float) -> None:
+        self.pose = Pose(self.pose.x_m, self.pose.y_m, self.pose.yaw_rad + wrong_rad)
+        self.rolled += Pose(0.0, 0.0, wrong_rad)
+        self.speeds.correct(wrong_rad)
