@@ -64,6 +64,8 @@ ABSENT_BUSY_S: Final = 2.5
 
 A stop, for example, keeps the server busy.
 """
+RESTARTED_S: Final = 3.0
+"""Silence in s that shows a restart of a server whose stop port was hung."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 
@@ -212,9 +214,10 @@ class Ground:
         return self.heard_s <= self._present_s + most_s
 
     def _hears(self, now: float) -> None:
-        """Record a reply, and whether it is the first one after an absence of the server.
+        """Record the arrival of a reply.
 
-        After replies of another server, the controller may have been started in its place.
+        If the server was silent for long before it, or if another kind of server answered before,
+        a new server may have been started.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:
@@ -227,6 +230,8 @@ class Ground:
         busy = in_move or self.state in (State.MOVING, State.SERVING)
         if (now - self.heard_s > most_s and not busy) or self.health.stranger:
             self._appears(now)
+        if now - self.heard_s > RESTARTED_S:
+            self.health.outlived = False
         self.heard_s = now
 
     def _appears(self, now: float) -> None:
@@ -264,11 +269,11 @@ class Ground:
         return odometry.wheel.from_s >= self._rested_s and odometry.motion is Motion.NONE
 
     def _waits_for_heading(self) -> bool:
-        """Return whether to read the heading before the encoder. Report it if no heading comes.
+        """Return whether the driver must wait for a heading before it reads the encoder.
 
-        After a forward drive (RM), the last heading must come before the encoder count that ends
-        the motion. The driver waits for this heading for at most HEADING_S, plus HEADING_TRIPS
-        times the duration of a query.
+        This is so after a forward drive (RM). The odometry needs a heading that was measured at
+        rest before the count that ends the motion. The driver waits for at most HEADING_S, plus
+        HEADING_TRIPS times the duration of a query. Then it logs NO_HEADING once.
         """
         odometry = self.odometry
         by_reference = self.state is State.STILL and odometry.motion is Motion.REFERENCE

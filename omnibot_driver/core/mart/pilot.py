@@ -123,9 +123,10 @@ class Pilot(Hearing):
     def fell_silent(self) -> None:
         """Begin a new connection after a long silence, because the server may have been restarted.
 
-        Nothing changes during a motion or a job.
+        Nothing changes during a motion or a job. Nothing changes either if the server's stop port
+        may be hung, because a gap in the network does not repair it.
         """
-        if self.state in (State.STILL, State.UNKNOWN):
+        if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()
 
     @property

@@ -35,6 +35,11 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     bench.server.imu.alive = True
     bench.run(5.0)
     assert bench.robot.board.facts["stop_port_hung"]
+    bench.speaks = False
+    bench.run(2.0)
+    assert bench.session.state == "connecting"  # a gap in the network is not a restart
+    bench.speaks = True
+    bench.run(2.0)
     way_m = bench.server.chassis.way_m
     assert "restart the server" in bench.try_command(0.3, 0.0)
     bench.command(0.3, 0.0, 5.0)
