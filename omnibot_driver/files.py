@@ -46,6 +46,6 @@ def write_whole(
 
 
 def unused(path: Path) -> Path:
-    """Return ``path``, or the first of NAME-2, NAME-3 ... that does not exist."""
+    """Return ``path`` if it is free; otherwise the first of NAME-2, NAME-3 ... that is free."""
     numbered = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
     return path if not path.exists() else next(one for one in numbered if not one.exists())

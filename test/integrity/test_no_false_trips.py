@@ -11,9 +11,9 @@ from rough_drive import RoughDrive
 def test_a_robot_that_obeys_is_not_stopped_by_the_motion_monitor(
     seed: int, delta_period_s: float
 ) -> None:
-    """A robot obeys on a slope, with slip and delays, among people.
+    """A robot obeys its commands on a slope, with slip and delays.
 
-    The monitor does not stop it.
+    People push, bump, hold and carry it. The motion monitor does not stop it.
     """
     outcome = RoughDrive(seed, delta_period_s).go(60.0)
     assert outcome.trips == []

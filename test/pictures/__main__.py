@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Make all pictures for the README and the documents that a program can make: ``make pictures``.
+"""Make the pictures of the README and the documents, except those that no program can make.
 
-Each module's ``main(folder)`` writes pictures into that folder. Each module runs in its own
-process, two at the same time.
+``make pictures`` runs this program. Each module's ``main(folder)`` writes pictures into that
+folder. Each module runs in its own process, two at the same time.
 """
 
 import os

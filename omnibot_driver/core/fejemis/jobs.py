@@ -245,7 +245,10 @@ class Jobs:
         which = "both boards" if self.job in (Job.SAVE, Job.LOAD) else "the drive board"
         then = "call again"
         if self.job is Job.POWER_OFF:
-            then = "the board may still cut the power: call ~/start to prevent this, or call again"
+            then = (
+                "the board may still cut the power. To keep the power on, call ~/start. To switch"
+                " it off, call ~/power_off again"
+            )
         self._finish(False, f"{self.job.value} was not confirmed by {which}; {then}")
 
     def _finish(self, success: bool, message: str) -> None:

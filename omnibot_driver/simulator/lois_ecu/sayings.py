@@ -14,7 +14,7 @@ from omnibot_driver.simulator.lois_ecu.vehicle import Vehicle
 
 
 class Sayings:
-    """Encoder of the periodic messages of one board. A boot makes a new one.
+    """The periodic messages of one board, as lines. Each boot of the board creates a new instance.
 
     began_s: time of the boot, at which the board's clock in ns starts from zero.
     """

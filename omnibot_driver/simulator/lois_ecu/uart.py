@@ -4,7 +4,8 @@
 
 The board sends some data with interrupts off. During this time it can lose received characters.
 
-This module knows characters and steps of a millisecond. It does not know lines.
+This module handles single characters in steps of 1 ms. It does not know where a message begins or
+ends.
 """
 
 from collections import deque

@@ -42,7 +42,7 @@ def draw(figure: "Figure", wheels: "Sequence[WheelFound]", now: Gains, better: G
     command.set_ylabel("fraction of the step")
     command.legend(fontsize=7, loc="lower right")
     _draw_predictions(load, motors, now, better, command=0.0, load=1.0)
-    load.set_title("Predicted response to a load of 1 count per tick", fontsize=10)
+    load.set_title("Predicted: a load that would slow the wheel by 1 count per tick", fontsize=10)
     load.set_ylabel("counts per tick")
     load.set_xlabel("time after the control tick, in ms")
 

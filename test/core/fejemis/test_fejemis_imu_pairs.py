@@ -43,8 +43,8 @@ class Layout:
 
     ``apart_s``: time between the gyro line and the acceleration line, in s.
 
-    ``odd``: whether the other lines come with the odd sample numbers. If False, they come with the
-    even ones.
+    ``odd``: the lines other than gyro and acceleration come with every second sample: with odd
+    sample numbers if True, with even ones if False.
     """
 
     order: str

@@ -132,9 +132,10 @@ def test_two_wheels_that_roll_steadily_do_not_look_stalled() -> None:
 
 
 def test_two_wheels_that_are_as_much_too_fast_do_not_look_stalled() -> None:
-    """Both wheels roll backward steadily at 1.3 times their set-points, and neither looks stalled.
+    """The board reports both wheels at 1.3 times their set-points, so both roll.
 
-    If only one wheel is so fast, this wheel looks stalled.
+    If the board reports only one wheel so fast, this wheel looks stalled: the board may be
+    repeating the last speed of a wheel that is at rest.
     """
     assert not looks_stalled([(-39, -44)] * 14, targets=(-30, -33))
     assert looks_stalled([(-39, -36)] * 14, targets=(-30, -33))
