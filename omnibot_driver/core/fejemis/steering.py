@@ -125,14 +125,6 @@ def body_twist(outer_mps: float, geometry: Geometry, angle_rad: float) -> BodyTw
     return BodyTwist(rolled * math.cos(angle_rad), 0.0, rolled * across)
 
 
-def told_twist(
-    speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
-) -> BodyTwist:
-    """Return the body's twist if the drive board obeys an ``rc`` line with these numbers."""
-    outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
-    return body_twist(outer, geometry, angle_rad)
-
-
 def _allowed(
     wanted: BodyTwist, geometry: Geometry, target_rad: float, angle_rad: float, *, turning: bool
 ) -> float:

@@ -207,11 +207,6 @@ class LoisConversation:
         return self._suspicion.advice
 
     @property
-    def configured(self) -> bool:
-        """Whether all settings have been sent. Before that, the wheels do not turn in RPM mode."""
-        return self._upkeep.opened and self._upkeep.writer.done
-
-    @property
     def confirmed(self) -> bool:
         """Whether the board has answered, and sends its ticks with the requested period."""
         return self._upkeep.writer.confirmed

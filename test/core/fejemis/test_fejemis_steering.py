@@ -14,10 +14,10 @@ from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.fejemis.steering import (
     ALIGNED_RAD,
     Geometry,
+    body_twist,
     outer_mps,
     scale,
     steer,
-    told_twist,
 )
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -28,6 +28,14 @@ ROBOT = Geometry(track_m=0.4, wheelbase_m=0.5)
 speeds = st.floats(-1.0, 1.0)
 rates = st.floats(-2.0, 2.0)
 angles = st.floats(-math.pi / 2, math.pi / 2)
+
+
+def told_twist(
+    speed_mps: float, turn_radps: float, geometry: Geometry, angle_rad: float
+) -> BodyTwist:
+    """Return the body's twist if the drive board obeys an ``rc`` line with these numbers."""
+    outer = math.copysign(math.hypot(speed_mps, turn_radps), speed_mps or 1.0)
+    return body_twist(outer, geometry, angle_rad)
 
 
 def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:

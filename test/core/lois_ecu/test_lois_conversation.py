@@ -41,7 +41,6 @@ def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     assert rig.driver.mode is Mode.UNKNOWN
     rig.run(5.0)
     assert rig.driver.mode is Mode.NOMINAL
-    assert rig.driver.configured
     assert rig.driver.confirmed
     assert rig.board.wheels[0].controller.gains.kp == pytest.approx(0.5)
     rig.order(20, 20, 4.0)
