@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Byte streams of the simulated board, divided into frames by the manual's tables, and decoded."""
+"""Byte streams of the simulated board: divided into frames, and decoded.
+
+The division into frames is made according to the manual's tables.
+"""
 
 import struct
 from collections.abc import Callable, Iterable, Sequence
@@ -76,7 +79,7 @@ def ticks_of(name: str) -> tuple[bytes, ...]:
 
 
 def lengths_of(stream: bytes) -> list[int]:
-    """Return the lengths of the frames of an undamaged stream, found by the manual's tables."""
+    """Return the lengths of the frames of an undamaged stream, according to the manual's tables."""
     lengths, at = [], 0
     while at < len(stream):
         kind = stream[at + 1]

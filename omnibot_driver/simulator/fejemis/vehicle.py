@@ -157,7 +157,7 @@ class Vehicle:
 def wheel_speeds(
     speed: float, turn_radps: float, angle_deg: float, base_m: float, steer_m: float
 ) -> tuple[float, float]:
-    """Return the speeds of the left and the right wheel in m/s, by the manual's equations.
+    """Return the speeds of the left and the right wheel in m/s, according to the manual.
 
     In the equations, ``v`` is the speed, ``w`` the turn rate, ``theta`` the angle of the front
     wheel, ``B`` is ``base_m`` and ``f`` is ``steer_m``. Outer wheel: ``v2 = sqrt(v² + w²)`` with

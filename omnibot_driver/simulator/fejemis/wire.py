@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reads and writes lines of text as a Teensy does, by the manual and public programs.
+"""Reads and writes lines of text as a Teensy does, according to the manual and public programs.
 
 Checksum ``;NN``: 1 plus the sum, modulo 99, of all later characters from the space (0x20) upward.
 Numbers are parsed as by C's ``strtof``. This module must not know the meaning of a command.

@@ -39,7 +39,7 @@ def told_twist(
 
 
 def manual(v: float, w: float, theta_rad: float) -> tuple[float, float]:
-    """Return the robot's speed and turn rate by the manual's section Turning control."""
+    """Return the robot's speed and turn rate according to the manual (Turning control)."""
     b, f = 0.4, 0.5
     v2 = math.hypot(v, w) * (-1.0 if v < 0.0 else 1.0)
     if theta_rad == 0.0:

@@ -41,10 +41,10 @@ def test_wheel_rates_are_the_velocity_equations_of_the_manual(twist: BodyTwist) 
 def test_the_body_twist_is_the_odometry_matrix_of_the_manual(
     rates: tuple[float, float, float],
 ) -> None:
-    """The body twist is computed from wheel rates by the manual's odometry matrix, corrected.
+    """The body twist is computed from wheel rates with the corrected odometry matrix of the manual.
 
-    Its factor is 1/(2 cos 30°). The matrix that the manual prints in full is wrong by a factor of
-    4/3.
+    The factor of this matrix is 1/(2 cos 30°). The matrix that the manual prints in full is wrong
+    by a factor of 4/3.
     """
     a, b, c = (rate * 0.029 for rate in rates)
     one = 0.5773502691896258

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that the simulated Fejemis moves by the manual's equations.
+"""Tests that the simulated Fejemis moves according to the manual's equations.
 
 This motion differs from the one that ``rc`` commands.
 """
