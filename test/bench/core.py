@@ -138,8 +138,9 @@ def cold(ticks: int) -> str:
             taken[forgotten].append(passed)
     hot_us, cold_us = (1e6 * median(taken[forgotten]) for forgotten in (False, True))
     return (
-        f"One IMU frame, from its bytes to what is published: {short(hot_us)} µs right after"
-        f" another one, {short(cold_us)} µs after something else has used the processor's caches."
+        f"One IMU frame takes {short(hot_us)} µs from its bytes to the published message if another"
+        f" IMU frame was processed just before, and {short(cold_us)} µs if other code has used the"
+        " processor's caches before."
     )
 
 
@@ -167,9 +168,9 @@ def memory(hours: float = 1.0) -> str:
     resident_mb.append(_resident_mb())
     figures = ", ".join(f"{each:.1f}" for each in resident_mb)
     return (
-        f"Core: {short(hours)} hour of stream ({events:,} events) through decoder and session in"
-        f" {time.perf_counter() - begun:.0f} s; resident at the start and every sixth of it:"
-        f" {figures} MB."
+        f"Core: {short(hours)} hour of stream ({events:,} events) went through decoder and"
+        f" session in {time.perf_counter() - begun:.0f} s. Resident memory at the start and after"
+        f" each sixth: {figures} MB."
     )
 
 

@@ -52,15 +52,15 @@ def measure(*, quick: bool) -> tuple[list[Figure], list[str]]:
     figures += core.decoding(1 if quick else 5)
     say("split")
     sections = ["", "Processor time of the driver by stage:", "", *system.split(5 if quick else 20)]
-    sections += ["", "The same by thread:", "", *threads.table(5 if quick else 20)]
+    sections += ["", "Processor time by thread:", "", *threads.table(5 if quick else 20)]
     say("step by step")
     sections += ["", "From the floor to the driver, by ratios:", "", *system.steps(windows)]
     sections += ["", core.cold(200 if quick else 2000)]
     say("many drivers")
     scale = system.scale(SCALES[:2] if quick else SCALES, 3 if quick else 10)
-    sections += ["", "Drivers side by side on this machine, each with a board:", "", *scale]
+    sections += ["", "Several drivers on this machine, each with a board:", "", *scale]
     say("small computer")
-    sections += ["", "One core, and a part of it for each of driver and floor:", ""]
+    sections += ["", "One core, and a part of it (driver and floor have a part each):", ""]
     sections += small.table(*(((1.0, 0.25), 3.0) if quick else ()))
     say("linearity")
     sections += ["", "Time to decode, by the length of the stream:", "", *core.linearity()]

@@ -96,9 +96,9 @@ def measurements(adapter: str, windows: int) -> tuple[list[Figure], str]:
     delivered = [sum(map(len, column)) for column in zip(*windowed, strict=True)]
     minutes = (marks[-1] - marks[0]) / 60
     memory = (
-        f"Node: resident {resident_mb[0]:.1f} MB at first, {resident_mb[-1]:.1f} MB after"
-        f" {minutes:.1f} minutes of {adapter}, in which {delivered[0]:,} IMU frames came through"
-        f" (floor: {delivered[1]:,}) of {100 * (marks[-1] - marks[0]):,.0f}."
+        f"Node: resident memory was {resident_mb[0]:.1f} MB at first, and {resident_mb[-1]:.1f} MB"
+        f" after {minutes:.1f} minutes of {adapter}. In this time, {delivered[0]:,} of"
+        f" {100 * (marks[-1] - marks[0]):,.0f} IMU frames arrived (floor: {delivered[1]:,})."
     )
     return figures, memory
 

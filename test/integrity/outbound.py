@@ -121,7 +121,7 @@ def table(scores: Scores) -> tuple[list[str], bool]:
 
 def _by_rate(scores: Scores) -> tuple[list[str], bool]:
     lines = [
-        "While the driver only drives, on the worst receiver (and on the best):",
+        "Drives without a stop, on the worst receiver (in parentheses: on the best):",
         "",
         "| loss | commands a second | frames a second | uncommanded, of the time |"
         " longer than 2 ms, of the frames | longest | |",
@@ -149,7 +149,7 @@ def _by_rate(scores: Scores) -> tuple[list[str], bool]:
 
 
 def _by_scene(scores: Scores) -> Iterator[str]:
-    yield "The same by scene, all receivers together (stray motion; still driving):"
+    yield "Trials with stray motion, and trials still driving, by scene (all receivers together):"
     yield ""
     yield "| scene | " + " | ".join(LOSSES) + " |"
     yield "|---" * (len(LOSSES) + 1) + "|"
@@ -165,7 +165,7 @@ def _by_scene(scores: Scores) -> Iterator[str]:
 
 
 def _others(scores: Scores) -> Iterator[str]:
-    yield "What has no bound, all receivers together, and the most on one of them:"
+    yield "These faults have no bound. All receivers together (in parentheses: the worst of them):"
     yield ""
     yield (
         "| fault | trials with stray motion | longest | still driving when due | at the end"
@@ -210,8 +210,8 @@ def main() -> int:
     lines, all_hold = table(scores)
     number = sum(score.trials for score in scores.values())
     heading = (
-        f"{number:,} trials of {chosen.scripts} scripts for each scene; the session was rehearsed"
-        f" {rehearsals:,} times for them:"
+        f"{number:,} trials of {chosen.scripts} scripts for each scene. For these trials, the"
+        f" session ran {rehearsals:,} times:"
     )
     figures = "\n".join([heading, "", *lines])
     print(figures)

@@ -84,7 +84,7 @@ def table(ours: Scores, plain: Scores) -> tuple[list[str], bool]:
         totals = [over_chunkers(ours, fault, scenario) for scenario in SCENARIOS]
         cells = [f"{rate(total)}; {total.delivered_share:.2%}" for total in totals]
         lines.append(f"| {fault} | " + " | ".join(cells) + " |")
-    lines += ["", "Of the texts of a paused board that arrived intact, these came out:", ""]
+    lines += ["", "Delivered share of the texts of a paused board that arrived intact:", ""]
     lines += ["| fault | texts delivered |", "|---|---|"]
     for fault in FAULTS:
         total = over_chunkers(ours, fault, WITH_TEXTS)

@@ -114,11 +114,11 @@ def lines_and_events(seconds: float, seeds: int) -> None:
         if event != undisturbed
     }
     lines = [
-        f"{seeds} streams of {seconds:g} s in each cell; the worst, and the median:",
+        f"The worst of {seeds} streams of {seconds:g} s in each cell (in parentheses: the median):",
         "",
         *table("line | bytes lost | mode", plain),
         "",
-        "The same with one byte in a thousand lost, and something that happens half-way:",
+        "One byte in a thousand is lost, and an event happens half-way:",
         "",
         *table("event | line | mode", disturbed),
     ]
@@ -131,7 +131,7 @@ def busy_readers(seconds: float, seeds: int) -> None:
     found = measured(cells, seconds, seeds)
     rows = {f"{line} | {n:g} | {mode}": figures for (line, n, mode, _), figures in found.items()}
     lines = [
-        f"{seeds} streams of {seconds:g} s in each cell; the worst, and the median:",
+        f"The worst of {seeds} streams of {seconds:g} s in each cell (in parentheses: the median):",
         "",
         *table("reader | bytes lost | mode", rows),
     ]
