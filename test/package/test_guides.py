@@ -76,7 +76,7 @@ STATES = {"disconnected", "connecting", "paused", "nominal", "imu_only"}
 
 @pytest.mark.parametrize("sentence", sorted(set(SENTENCES) - STATES))
 def test_the_driver_still_says_it(sentence: str) -> None:
-    """The troubleshooting guide quotes a message of the driver. The code contains its parts.
+    """The troubleshooting guide quotes a message of the driver. Each part of it is in the code.
 
     Gaps ("…") and colons separate the parts.
     """

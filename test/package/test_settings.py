@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the configuration for other packages: it has only topics and values of the driver."""
+"""Tests of the files in config/ and rviz/ for other packages, for example Nav2 and RViz.
+
+Their topics, frames and limits agree with the driver's.
+"""
 
 import ast
 import json

@@ -74,9 +74,9 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Terminal) -> None:
-    """The kernel keeps 15 bytes of the owner's name, which end within a two-byte letter here.
+    """The kernel keeps only 15 bytes of a process's name. They end within a two-byte letter here.
 
-    The error still names the owner.
+    The error still names the process that has locked the port.
     """
     own = Path("/proc/self/comm")
     before = own.read_bytes()

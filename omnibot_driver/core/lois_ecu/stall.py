@@ -115,8 +115,8 @@ class StallWatch:
     def _repeats(self, wheel: int, told: tuple[float, float] | None) -> bool:
         """Return whether the board keeps reporting an old speed for ``wheel``.
 
-        A repeated speed is old if the other wheel's speed has changed meanwhile, or if it is far
-        above its set-point.
+        An unchanged speed of ``wheel`` is old if the other wheel's speed has changed meanwhile, or
+        if the unchanged speed is far above the set-point of ``wheel``.
         """
         if told is None or self._told is None:
             return False

@@ -253,7 +253,7 @@ class Jobs:
         elif came > self._size or len(set(whole)) < len(whole):
             self._finish(False, f"pieces of {self._name} came twice; {again}")
         elif swapped:
-            self._finish(False, f"pieces of {self._name} came in another order; {again}")
+            self._finish(False, f"pieces of {self._name} arrived in the wrong order; {again}")
         else:
             content = b"".join(self._pieces)
             ended = "; the server has ended and must be started again" if self.ended else ""

@@ -35,6 +35,7 @@ CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"
     " may be stuck or slip, so the heading is uncertain"
 )
+DISCARDED: Final = "; the goal of cmd_pose is discarded: remove the cause, then send the goal again"
 OFF_COURSE_RAD: Final = 0.5
 """Standard deviation in rad of the turn in a move that fails because one wheel does not turn.
 
@@ -95,9 +96,7 @@ class Moves(Asking):
             discarded = ""
             if self._move is not None:
                 self._move.fail()
-                discarded = (
-                    "; the goal of cmd_pose is discarded: remove the cause, then send it again"
-                )
+                discarded = DISCARDED
             reason = reply.reason or "the server gives no reason"
             self._notice(f"controlled move failed: {reason}{discarded}", halt=True)
             if reply.reason == words.IMU_LOST:
@@ -203,8 +202,7 @@ class Moves(Asking):
         if self._move is not None:
             self._move.fail()
         asked_deg, seen_deg = math.degrees(done.asked), math.degrees(abs(done.turned_rad))
-        discarded = "; the goal of cmd_pose is discarded: remove the cause, then send it again"
-        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + discarded, halt=True)
+        self._notice(CONTRADICTED.format(asked_deg, seen_deg) + DISCARDED, halt=True)
 
     def _discard_goal(self) -> None:
         """Discard the goal, because the network may have duplicated the last move to it."""

@@ -74,7 +74,7 @@ def _linear(server: "MartServer", text: str) -> str | None:
 
 
 def _spin(server: "MartServer", text: str) -> str | None:
-    if text[0] == "L" and _joined(server):
+    if text[0] == "L" and _refuses_left_spin(server):
         return CONFLICT
     word = text[2:] if text[1:2] == " " else ("NORMAL" if len(text) == 1 else "")
     custom = word == "CUSTOM" and server.quirks.undocumented_commands
@@ -84,7 +84,7 @@ def _spin(server: "MartServer", text: str) -> str | None:
     return None
 
 
-def _joined(server: "MartServer") -> bool:
+def _refuses_left_spin(server: "MartServer") -> bool:
     """Return whether the server refuses the spin L.
 
     It refuses L during a motion, a recording or direct control of the motors (MCS). With the quirk

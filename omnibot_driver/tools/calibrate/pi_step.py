@@ -120,7 +120,7 @@ class _Bench:
     def steps(self, rpm: Sequence[float]) -> Records:
         """Record several steps of the set-point from rest to the wheel speeds ``rpm``.
 
-        Return the times between ticks of each step.
+        Return, for each step, the times between the ticks.
         """
         rates = [one * 2 * np.pi / 60 for one in rpm]
         return self.record("wheel_cmd", rates, self._responses)

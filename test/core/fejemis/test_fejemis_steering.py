@@ -152,8 +152,8 @@ COMMANDS = [
 def test_the_simulated_body_moves_as_commanded(v: float, w: float) -> None:
     """The robot is commanded for 2.5 s. Its speed and its turn rate are then as commanded.
 
-    The tolerances are 1.2 % and 3 % of the outer wheel's speed (for the turn rate, this speed is
-    divided by the track width).
+    The speed may be off by 1.2 % of the outer wheel's speed. The turn rate may be off by 3 % of the
+    outer wheel's speed divided by the track width.
     """
     bench = nominal()
     bench.drive_on(v, w, 2.5)

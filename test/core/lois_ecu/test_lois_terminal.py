@@ -53,7 +53,8 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
 def test_a_terminal_mode_begins_after_the_proof_of_the_stop(firmware: str, drive_s: float) -> None:
     """The user sets a terminal mode during a drive. In this mode, the board reports no motion.
 
-    The driver has seen the robot stand before, so it does not report an unconfirmed stop.
+    So the driver first stops the robot, and writes the mode only after the standstill is proved. It
+    then logs no unconfirmed stop.
     """
     bench = Bench(firmware)
     bench.drive_on(0.3, drive_s)

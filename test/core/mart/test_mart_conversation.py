@@ -213,9 +213,10 @@ def test_the_reply_of_the_start_is_not_that_of_the_stop() -> None:
 
 
 def test_two_copies_of_one_reply_do_not_prove_a_stop() -> None:
-    """Two stops follow a start. The first stop may have overtaken the start.
+    """The driver sends a start, then a stop, then a second stop.
 
-    For 0.6 s, both replies may be copies of the reply to the first stop, so they prove nothing.
+    The first stop may arrive before the start, so its reply proves nothing. For 0.6 s after the
+    first stop, each reply may be a copy of this reply. The driver believes only a later reply.
     """
     stop = stopping(Motion.REVERSE, started_s=9.9)
     assert stop.due(10.0) == (words.SM,)
