@@ -78,9 +78,9 @@ def test_after_the_second_trip_within_a_minute_only_start_helps() -> None:
 
 
 def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
-    """A stop by the motion monitor counts as a first one if the last was over a minute ago.
+    """The motion monitor stops the robot over a minute after the last stop, or after ~/start.
 
-    It also counts as a first one if ~/start was called since the last.
+    This stop counts as a first one: motion is allowed again without ~/start.
     """
     interlock = MotionInterlock()
     for now in (0.0, 61.0):
@@ -95,7 +95,7 @@ def test_after_a_minute_the_next_trip_is_a_first_one_again() -> None:
 def test_on_a_board_without_start_the_release_of_the_estop_ends_the_refusal() -> None:
     """The board has no ~/start. The motion monitor stops the robot a second time within a minute.
 
-    The release of the e-stop ends the refusal. After a first stop, it has no effect.
+    The release of the e-stop ends the refusal. After a first stop, such a release has no effect.
     """
     interlock = MotionInterlock(starts=False)
     interlock.trip(0.0)

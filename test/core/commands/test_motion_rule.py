@@ -103,9 +103,9 @@ def test_no_motion_frame_reaches_a_board_that_has_restarted() -> None:
 
 @pytest.mark.parametrize("request_", [Request.PAUSE, Request.RESET])
 def test_from_a_request_on_no_motion_frame_goes_out(bench: Bench, request_: Request) -> None:
-    """The user requests a pause or a reset, which the board does not receive, so it drives on.
+    """The user requests a pause or a reset while the robot drives. The board does not receive it.
 
-    From the request on, the driver sends no motion frame.
+    The robot drives on. From the request on, the driver sends no motion frame.
     """
     bench.drive(0.4)
     start = len(bench.written)
@@ -202,9 +202,9 @@ def test_a_flood_of_stops_to_a_board_that_is_not_heard_keeps_the_pace(bench: Ben
 def test_after_a_cut_in_both_directions_the_robot_is_stopped_before_anything_else(
     bench: Bench,
 ) -> None:
-    """The line is cut in both directions while the robot drives, so it drives on.
+    """The line is cut in both directions while the robot drives.
 
-    When the line works again, the driver stops the robot.
+    The robot receives nothing and drives on. When the line works again, the driver stops the robot.
     """
     bench.drive(0.5)
     bench.run(0.1)

@@ -125,8 +125,8 @@ def test_a_letter_that_goes_out_while_driving_is_followed_by_the_command(
 ) -> None:
     """A letter, such as S (start), is sent while the robot drives. Zeros precede the letter.
 
-    The zeros may complete a damaged frame in the board to a wrong command. So the driver sends the
-    command again after the letter.
+    If the board has received part of a damaged frame, the zeros may complete it, and the board
+    obeys a wrong command. So the driver sends the right command again after the letter.
     """
     order(stream, GO, 1.0)
     stream.write(1.0)

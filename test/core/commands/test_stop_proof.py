@@ -145,9 +145,9 @@ def test_a_paused_board_has_its_motors_off(proof: StopProof) -> None:
 def test_whatever_came_before_standing_for_long_enough_proves_it(
     before: list[float], speed_mps: float, rate_radps: float
 ) -> None:
-    """The robot has moved in any way before.
+    """Four displacements in a row that are close to zero prove rest.
 
-    Four displacements in a row that are close to zero prove rest.
+    It does not matter how the robot has moved before.
     """
     proof = StopProof()
     proof.stopped(10.0)
