@@ -34,8 +34,8 @@ frames: st.SearchStrategy[Frame] = st.one_of(imu_frames, delta_frames, pose_fram
 def believable(frame: Frame) -> bool:
     """Return whether an undamaged board may send ``frame``.
 
-    A pose is at most 1e7, in mm or mrad. An acceleration word of -6 has the bytes of a header. It
-    is excluded if the acceleration is below 0.5 g.
+    A pose is at most 1e7, in mm or mrad. An acceleration word of -6 has the bytes of a header. A
+    frame with such a word is excluded if its acceleration is below 0.5 g.
     """
     if isinstance(frame, PoseFrame):
         return max(abs(frame.x), abs(frame.y), abs(frame.theta)) <= 1e7

@@ -131,8 +131,8 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
     """Each delta is rounded by up to 0.05 mrad in the same direction, so the errors add up.
 
-    The next pose differs from the deltas by this sum. The difference has no cost, but one of more
-    than twice this size has.
+    The next pose differs from the deltas by this sum, which has no cost. A difference of more than
+    twice this sum has a cost.
     """
     schedule = Schedule(period_s)
     expectation, deltas = Expectation(16384.0, schedule), schedule.deltas_per_pose

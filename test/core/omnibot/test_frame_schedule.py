@@ -40,7 +40,10 @@ def test_damaged_bytes_tell_how_many_imu_frames_they_were(
 
 
 def test_a_damaged_pose_is_not_an_imu_frame() -> None:
-    """Where a pose of 15 bytes is due, 14 damaged bytes come. No lost IMU frame is counted."""
+    """A pose of 15 bytes is due, but 14 damaged bytes come, as many as an IMU frame has.
+
+    No lost IMU frame is counted.
+    """
     rhythm = nominal(0)
     for _ in range(5):
         for kind in (ImuFrame, ImuFrame, ImuFrame, ImuFrame, DeltaFrame):

@@ -43,7 +43,8 @@ def test_the_next_count_is_not_a_gap_however_late_it_comes(count: int, late_s: f
 def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
     """The board is paused, and then continues with the next count. No delta is lost.
 
-    The duration of the first delta is unknown. A count of 0 after 255 is regarded as a restart.
+    The duration of the first delta is unknown. A restarted board begins at 0. So if the next count
+    is 0 (after 255), it is regarded as a restart.
     """
     sequence = begun(count)
     sequence.pause()
@@ -104,9 +105,10 @@ def test_a_gap_of_3029_deltas_of_a_fast_board_is_counted() -> None:
 
 @pytest.mark.parametrize("wraps", [0, 1, 3])
 def test_a_supposed_restart_is_withdrawn_after_any_wraps(wraps: int) -> None:
-    """A false delta has a count near zero, as after a restart. The next true delta refutes this.
+    """A false delta has a count near zero, as after a restart.
 
-    The supposed restart is withdrawn, also if the counter has wrapped before.
+    The next true delta continues the old count, so the board has not restarted. The supposed
+    restart is withdrawn, even if the counter has wrapped before.
     """
     sequence = begun(88)
     passed = 1 + 256 * wraps
