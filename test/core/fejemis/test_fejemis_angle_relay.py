@@ -32,7 +32,8 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 def test_every_angle_is_told_within_half_a_degree() -> None:
     """Every relayed angle is right within 0.5°.
 
-    Usually the steps are 0.1°. They are larger where the checksum would not detect damage.
+    Usually, an angle is rounded to 0.1°. It is rounded more where the checksum would not detect
+    damage.
     """
     off = [abs(float(relayed(angle_deg)[4:]) - angle_deg) for angle_deg in EVERY]
     assert max(off) < 0.51

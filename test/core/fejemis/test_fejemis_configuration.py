@@ -83,7 +83,7 @@ def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
 def test_the_order_of_the_steering_geometry_is_found_out() -> None:
     """The line ``confs`` contains track width and wheelbase, in either order.
 
-    The driver finds the order by the track width in ``conf``.
+    The driver finds the order, because the line ``conf`` contains the track width too.
     """
     for turned in (False, True):
         configuration = Configuration("drive", {})

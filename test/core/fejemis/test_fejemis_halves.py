@@ -299,7 +299,7 @@ def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("ahead_s", [0.4, -0.4, 5.0])
 def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) -> None:
-    """The front board's clock is ``ahead_s`` seconds ahead, and the boards change their ports.
+    """The front board's clock is ``ahead_s`` seconds ahead. Then the boards exchange their ports.
 
     The driver does not use the front board's clock for the stamps of the drive board.
     """

@@ -269,8 +269,8 @@ def test_no_pair_has_lines_of_two_samples(
 ) -> None:
     """Lines are lost, arrive twice or arrive late. No pair has lines of two samples.
 
-    A pair with lines of two samples is found only if its lines are late, and no pose follows in the
-    same read. Nothing in the stream shows such an error.
+    There is one exception: lines are late, and no pose follows in the same read. Nothing in the
+    stream then shows that the two lines are of different samples.
     """
     lines = damaged(layout.lines(3.0), chance, lost, twice)
     reads = reads_with_stalls(lines, chance, stalls)

@@ -170,7 +170,7 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """A lift line has 60 to 100 % of the requested voltage.
 
-    If the line loses characters, the lift gets at most 12 V, and no longer time.
+    If the line loses characters, the lift gets at most 12 V, and runs no longer than requested.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -203,7 +203,8 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
     """A motion line without a checksum loses one character.
 
-    The outer wheel becomes faster only if this is a decimal point or a digit of the speed.
+    The outer wheel becomes faster only if this character is a decimal point or a digit of the
+    speed.
     """
     for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
         text = plain_drive_line(speed, turn)

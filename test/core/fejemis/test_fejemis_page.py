@@ -178,7 +178,7 @@ def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
 
 
 def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
-    """Diagnostics show each message that the driver does not subscribe to as a stream.
+    """The driver subscribes to some messages as streams. The diagnostics show all other messages.
 
     An example is the front board's battery message, ``bat``.
     """

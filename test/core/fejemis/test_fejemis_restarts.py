@@ -171,7 +171,7 @@ def test_the_robot_is_not_nominal_while_a_restart_cannot_be_ruled_out(
 ) -> None:
     """A board was silent, so it may have restarted.
 
-    The state becomes ``nominal`` only after a heartbeat has shown whether it has.
+    The state becomes ``nominal`` only after a heartbeat has shown whether the board has restarted.
     """
     bench = nominal()
     bench.speaks = {FRONT if half == "drive" else DRIVE}

@@ -330,7 +330,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
 
 
 def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
-    """The drive board restarts after a request to power off, which cancels the power off.
+    """After a request to power off, the drive board restarts. The restart cancels the power off.
 
     The driver accepts motion again.
     """

@@ -114,9 +114,10 @@ def test_a_board_that_is_stopped_when_the_driver_comes_is_started_or_left_alone(
 
 
 def test_boards_that_stay_silent_are_not_said_to_be_read_late() -> None:
-    """Both boards lose their power, and the ports stay open.
+    """Both boards lose their power, and the ports stay open. Motion commands are refused.
 
-    At first the driver may have read late. Later the reason is the boards.
+    At first, the driver's reads may be late, so the refusal says that nothing was read. Later, it
+    says that the boards send no data.
     """
     bench = nominal()
     bench.drive_on()

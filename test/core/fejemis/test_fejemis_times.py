@@ -111,7 +111,7 @@ def test_a_board_that_restarts_soon_after_its_start_is_noticed() -> None:
 
 @pytest.mark.parametrize("waited_s", [0.012, 0.03, 0.2])
 def test_a_clock_that_began_with_a_late_line_recovers(waited_s: float) -> None:
-    """The first line waited for the host. Then every read brings two lines, sent 20 ms apart.
+    """The first line is read late. Afterwards, every read brings two lines, sent 20 ms apart.
 
     Compared with the first line, the newer line of each read seems to arrive early. The clock
     rejects the board times of at most three lines, and is right afterwards.
