@@ -83,10 +83,10 @@ def test_a_busy_computer_that_reads_several_reports_at_once_uses_all_of_them(see
 
 
 def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differs() -> None:
-    """In a turn, the backward wheel stops and is detected. The board's heading differs by far.
+    """In a turn, the wheel that turns backward stops, and the driver detects this.
 
-    The heading is wrong, because the board computes it from the wheel's old speed. The wheel's
-    estimated speed stays zero.
+    The board still computes its heading from the wheel's old speed, so this heading is far from the
+    true one. The driver does not conclude from this heading that the wheel rolls.
     """
     one = motion(wrong("firmware", 328), "place right", LoisEcuSettings(), reads_s=LATE_READS_S)
     assert abs(one.error.yaw_rad) < math.radians(40)

@@ -109,10 +109,9 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """The board's clock in ns jumps by at most 0.2 s, the length of a late read. It also wraps.
+    """All reads are in time. Then the board's clock jumps by up to 0.2 s, as long as a late read.
 
-    As all reads were in time, the delay of the next tick report is irregular. It is not irregular
-    without a jump.
+    The delay of the next tick report is irregular. It would not be irregular without the jump.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

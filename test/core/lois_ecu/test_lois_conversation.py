@@ -169,10 +169,10 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
 
 
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
-    """The robot drives at 30 RPM and is stopped. Here, no RPM 0/0 follows the Stop.
+    """The robot drives at 30 RPM and is stopped. In this test, no RPM 0/0 follows the Stop.
 
-    The firmware therefore keeps the last measured speed. Without feed-forward, a set-point of 8 RPM
-    does not start the wheels.
+    RPM 0/0 would clear the last measured speed, which the firmware now keeps. So a set-point of 8
+    RPM, without feed-forward, does not start the wheels.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings())
     rig.run(5.0)

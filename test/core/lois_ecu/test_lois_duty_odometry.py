@@ -25,9 +25,10 @@ def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(seed: int) -> None:
-    """A new board drives forward by duty. The public firmware counts no ticks, and 0x20 stands.
+    """After the board's start, the robot drives forward by duty.
 
-    The driver does not take this for a robot at rest.
+    The public firmware counts no ticks, and its own odometry (0x20) does not change. The driver
+    does not take this for a robot at rest.
     """
     one = by_duty([(3.0, PUSH)], seed)
     assert one.way_m > 0.7

@@ -177,7 +177,10 @@ def test_a_board_that_restarts_ends_the_motion_in_odom(
 
 
 def test_other_wheels_count_from_the_next_group_on() -> None:
-    """The user changes the wheel radius. The new radius is used only for distances after this."""
+    """The user changes the wheel radius.
+
+    The new radius is used only for distances after the change.
+    """
     ours = LoisEcuSettings()
     ecu = LoisConversation(ours)
     ecu.wrote(encode_command(SetRpm(20, 20)), -2.0)

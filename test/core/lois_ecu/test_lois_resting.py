@@ -89,9 +89,10 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed, the board reports no speed. Then one wheel is slower.
+    """While both wheels have the same speed, the board reports none. The driver estimates 28 RPM.
 
-    The speed estimated before shows that the reported speed has fallen.
+    Then the board reports 14 RPM several times. Compared with the estimate, the speed has fallen,
+    so the wheel is at rest.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):

@@ -111,9 +111,10 @@ def test_false_headings_at_north_are_refused() -> None:
 
 
 def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
-    """The yaw is reset at a compass heading of 120°, which is also the usual false heading.
+    """The odometry is reset at a compass heading of 120°. Later headings of 120° are accepted.
 
-    Later headings of 120° are still accepted. (False headings come near north.)
+    Near north, a heading of 120° is usually false, and the driver rejects it. After the reset, the
+    yaw is zero, but the driver still knows that the robot does not face north.
     """
     ecu = LoisConversation(LoisEcuSettings())
     headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)

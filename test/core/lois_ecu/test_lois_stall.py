@@ -182,11 +182,13 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     right_rpm: int,
 ) -> None:
-    """A wheel keeps its speed beside one that swings, and is too fast to have come to rest.
+    """A wheel keeps its speed while the other wheel's speed varies, so it may be at rest.
 
-    The driver sends RPM 0/0. The odometry keeps the distance that the wheel has rolled.
+    Its speed is so high that it may also still roll. The driver sends RPM 0/0 to start the wheel
+    anew, and the odometry keeps the distance that the wheel has rolled.
 
-    ``right_rpm``: −68 instead of −31 if a saturated controller keeps full power.
+    ``right_rpm``: reported speed of the wheel, near its set-point of −31 RPM, or far above it if a
+    saturated controller keeps full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False
