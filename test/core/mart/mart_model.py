@@ -41,7 +41,7 @@ class Driver(NamedTuple):
 
     ``moved``: whether the last motion was a controlled move.
 
-    ``counted``: whether the encoder was read after the stop, without harmful copies left.
+    ``counted``: whether the encoder was read after the stop, when no late command could do harm.
 
     ``greeted``: whether the driver has stopped the server once.
 

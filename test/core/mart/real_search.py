@@ -81,7 +81,7 @@ class Trial(NamedTuple):
 
     ``away_s``: duration of a first interruption of the network, from the start on.
 
-    ``back_s``: time from its end to a second interruption, of 1 s.
+    ``back_s``: time from the end of the first interruption to a second one, which lasts 1 s.
 
     ``ways``: the directions that are interrupted.
     """

@@ -114,9 +114,10 @@ def test_no_late_ok_proves_the_imu() -> None:
 
 
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
-    """The ok to another command may still be on its way, and could be taken for that to RST IMU.
+    """The ok to another command may come late, and could be taken for the ok to RST IMU.
 
-    So the driver sends RST IMU, the check of the IMU, only when its reply must come after that ok.
+    So the driver sends RST IMU, the check of the IMU, only when the reply to this check must come
+    after the other ok.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)

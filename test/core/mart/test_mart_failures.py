@@ -86,7 +86,7 @@ def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_af
 
 
 def test_an_rm_that_failed_before_a_good_one_does_not_make_a_push_a_defect() -> None:
-    """The server rejects one forward drive (RM) and obeys the next. The driver stops it.
+    """The server rejects one forward drive (RM) and obeys the next. The driver stops this drive.
 
     Then the robot moves without a command. The driver does not regard the server as defective, so
     motion stays allowed.
@@ -227,9 +227,10 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
 
 
 def test_a_server_whose_rm_fails_although_it_moves_is_stopped_and_refused() -> None:
-    """The server rejects a forward drive (RM) although the robot moves. The stop finds no motion.
+    """The server rejects a forward drive (RM), but the robot moves.
 
-    The driver switches the motors off, and then refuses motion.
+    The driver sends a stop, but the server knows of no motion. So the driver switches the motors
+    off, and then refuses motion.
     """
     bench = MartBench(reference_start_fails=True).ready()
     bench.command(0.3, 0.0, 8.0)

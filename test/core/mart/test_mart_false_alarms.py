@@ -23,9 +23,9 @@ Its wheels still turn when the server no longer waits for the end of a stop.
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
-    """The first heading of a drive comes late. It does not show that the heading was constant.
+    """One heading cannot show that the heading is constant. The first one of a drive comes late.
 
-    The time without a change is counted from this heading on.
+    So the time without a change of the heading begins with this first heading.
     """
     heading = RelativeHeading()
     heading.begin(10.0, anew=True)
@@ -97,7 +97,8 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
 def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
     """A motor is stuck, so the turn of a goal does not begin. The driver discards the goal.
 
-    For a turn of a heavy robot, the server gives the same failure text, but the goal continues.
+    For a turn of a heavy robot, the server reports the same failure, but the driver then continues
+    to the goal.
     """
     bench = MartBench(motor_lag_s=HEAVY_S).ready()
     bench.server.chassis.change(stuck=stuck)
@@ -110,7 +111,8 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
     """An obstacle stops a move of a heavy robot. The server reports only that the stop was long.
 
-    The driver learns nothing from this short move. The next move then finds the obstacle.
+    The driver learns nothing from this short move. The reply to the next move shows the obstacle.
+    For a later goal, the driver requests the usual distance.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)
@@ -133,10 +135,10 @@ def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer
 def test_a_turn_that_is_begun_anew_has_other_units(
     faults: NetworkFaults, robot: dict[str, float], seed: int
 ) -> None:
-    """A turn has a wrong rate, so the driver begins it anew. The stop before that yields no angle.
+    """A turn has a wrong rate, so the driver stops it and begins it anew.
 
-    The stop takes long, or its reply is late. The driver learns from the wheel nevertheless, so the
-    new turn has other motor units.
+    The stop takes long, or its reply is late, so the reply gives no angle. The driver learns from
+    the wheel instead, so the new turn has other motor units.
     """
     bench = MartBench("source", faults, seed=seed, motor_inequality=-0.05, **robot).ready()
     since = len(bench.written)

@@ -264,7 +264,7 @@ def test_a_move_that_an_obstacle_ends_does_not_make_the_next_one_longer() -> Non
 def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
     """The dock ends a move early.
 
-    For the next goal, behind, the driver requests the usual distance.
+    For the next goal, which is behind the robot, the driver requests the usual distance.
     """
     bench = MartBench(dock_m=0.2).ready()
     assert bench.job(Job.DOCK, "DOCK", 40).success
@@ -275,8 +275,8 @@ def test_a_move_that_the_dock_ends_does_not_make_the_next_one_longer() -> None:
 def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the_way() -> None:
     """The server executes a move, and then a late copy of the move, which the driver stops.
 
-    The encoder counts only the copy. The driver knows from an earlier move how far a complete one
-    goes. It adds this distance, and continues to the goal.
+    The encoder then shows only the distance of the copy. The driver knows from an earlier move how
+    far a complete move goes. It adds this distance, and continues to the goal.
     """
     bench = MartBench().ready()
     bench.go_to(0.8, 0.0, 0.0)
@@ -296,7 +296,10 @@ def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the
 
 @pytest.mark.parametrize("x_m", [1e4, 1e9, 1e60, 1e308, -1e300])
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
-    """A goal is 1e60 m away. Its command would be longer than a request, which ended the driver."""
+    """A goal is more than 1000 m away, and its command could be too long for a request.
+
+    The driver refuses the goal. A later goal still moves the robot.
+    """
     bench = MartBench().ready()
     with pytest.raises(CommandRefused, match="the limit is 1000 m"):
         bench.session.command_pose(Pose(x_m, 0.0, 0.0), bench.now)

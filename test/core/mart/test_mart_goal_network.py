@@ -77,7 +77,10 @@ def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
-    """Let the network deliver the next move with this command twice. Return a list of it."""
+    """Let the network deliver the next move with this command twice, the copy ``later_s`` later.
+
+    Return a list to which the move is added when it is sent.
+    """
     path = bench.robot.network[0].to_board
     real, moves = path.send, list[bytes]()
 
@@ -97,7 +100,10 @@ def twice_once(bench: MartBench, word: bytes, later_s: float) -> list[bytes]:
 def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
     degrees: float, delay_s: float, firmware: Firmware
 ) -> None:
-    """The server runs a turn twice. The driver stops the second run, or comes too late for it."""
+    """The server runs a turn twice. The driver stops the second run, or comes too late for it.
+
+    In both cases, the covariance covers the error of the heading.
+    """
     settings = Settings(network_delay_s=delay_s)
     bench = MartBench(firmware, settings=settings).ready()
     bench.robot._good = False
@@ -219,10 +225,10 @@ def test_a_lost_count_after_a_move_does_not_end_the_goal(firmware: Firmware) -> 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
 def test_a_suspected_copy_that_the_count_excludes_does_not_end_the_goal(firmware: Firmware) -> None:
-    """No reply arrives for 0.3 s after a turn, so the driver stops a suspected copy of the turn.
+    """No reply arrives for 0.3 s after a turn. A copy of the turn may be running.
 
-    The encoder then shows the whole turn. In this short time, a copy would have turned less. So
-    there was no copy, and the robot reaches the goal.
+    So the driver sends a stop. Then the encoder shows a whole turn. A copy that was stopped so soon
+    would have turned less. So there was no copy, and the driver continues to the goal.
     """
     bench = on(NetworkFaults(), firmware)
     pilot = bench.board._pilot

@@ -220,7 +220,7 @@ def test_a_job_ends_when_the_port_is_lost(job: Job) -> None:
 
 
 def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
-    """A stop interrupts the download of the log, for which EXIT has ended the server.
+    """A download of the log sends EXIT, which ends the server. A stop then interrupts the download.
 
     The job's result asks the user to copy the file from the controller.
     """
@@ -240,7 +240,8 @@ def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() 
 def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
     """After a straight drive, the heading is often exactly zero, as after a restart.
 
-    The log can still be downloaded.
+    A restart would lose the log. The driver does not assume a restart, so the log can be
+    downloaded.
     """
     for seed in range(6):
         bench = MartBench(firmware, seed=seed).ready()
@@ -285,7 +286,8 @@ def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
 def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
     """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
 
-    The heading is not zero, so the server was not restarted. The log can still be downloaded.
+    A restart would lose the log. But the heading is not zero, so the server was not restarted, and
+    the log can still be downloaded.
     """
     bench = MartBench("source").ready()
     assert bench.job(Job.LOG).success
@@ -335,7 +337,8 @@ def test_the_clock_is_set_while_the_robot_stands() -> None:
 def test_after_a_drive_a_correct_clock_is_not_set_back(now_s: float) -> None:
     """After a drive, the driver never sets a correct clock back.
 
-    The server ignores the seconds, so the driver sends the next full minute.
+    The server ignores the seconds, so the clock can only be set to a full minute. The driver sends
+    the next full minute shortly before it begins.
     """
     fields = clock_fields(now_s, may_set_back=False)
     assert (fields is None) is (int(now_s) % 60 not in (56, 57, 58))

@@ -58,10 +58,10 @@ def twice(path: Any, copied: Any, later_s: float) -> None:
 
 
 def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
-    """At the end of a turn, the stop overtakes an encoder query. So the count follows the angle.
+    """At the end of a turn, the stop overtakes an encoder query.
 
-    The count is far from the expected angle. The driver does not use it as the angle, nor learn the
-    motors' speed from it.
+    So the angle in the reply to the stop comes before the count. The count is far from the expected
+    angle. The driver does not use it as the angle, nor learn the motors' speed from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board

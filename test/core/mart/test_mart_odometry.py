@@ -89,9 +89,9 @@ def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
 
 
 def reversed_by_1000() -> MartOdometry:
-    """Return the odometry of a robot that reversed by 1000 counts, as its second motion begins.
+    """Return the odometry of a robot that has reversed by 1000 counts and begins a second motion.
 
-    The encoder count is still the old one.
+    The last encoder count is still that of the first motion.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

@@ -193,9 +193,10 @@ def test_turns_on_the_spot_get_their_speed_again_from_a_restarted_server(
 def test_odometry_goes_on_if_the_server_is_restarted_while_the_robot_drives(
     boot_s: float, motion: tuple[float, float], firmware: Firmware
 ) -> None:
-    """The server restarts in a drive, and knows of no motion when it is to stop it.
+    """The server restarts in a drive. It then answers the driver's stop with "no motion".
 
-    The driver took the start for lost, and added the whole drive to the pose once more.
+    The driver does not conclude that the start of the drive was lost. It adds the drive to the pose
+    only once.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)
@@ -214,7 +215,7 @@ def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
 ) -> None:
     """The controller loses its power for a second. Its count and heading begin at zero again.
 
-    The driver took this for a drive back to the start: with 5 s of driving, 1 m within 50 ms.
+    The driver does not take this for a drive back to the start, so the pose does not jump.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)
@@ -238,7 +239,8 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
 ) -> None:
     """The server restarts in a curve. The motors keep their last command for some seconds.
 
-    The restarted server's relative heading begins at zero, so ``odom`` is wrong by up to 80°.
+    The restarted server's relative heading begins at zero, so ``odom`` is wrong by up to 80°. The
+    covariance covers this error.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 5.0)

@@ -93,9 +93,10 @@ def test_a_driver_that_does_not_wait_for_late_copies_is_found(
 def test_a_driver_that_sweeps_again_behind_the_stop_port_is_found(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A modelled driver sends the stop SRM after SL, which has used the stop port.
+    """A modelled driver uses the stop port (SL), and then sends the usual stop, SRM.
 
-    It does not first find out whether a motion continues. The search finds that the server hangs.
+    Before SRM, it does not find out whether a motion continues. The search finds that the server
+    hangs.
     """
 
     def sweeps(world: World) -> model.Step:

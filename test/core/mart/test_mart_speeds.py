@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 
 def driven(bench: MartBench, vx: float, yaw_rate: float, *, samples: int) -> tuple[float, float]:
-    """Return the robot's mean speed and turn rate from two seconds after the command's begin.
+    """Return the robot's mean speed and turn rate, measured from 2 s after the command begins.
 
     ``samples``: number of samples, ten a second.
     """
@@ -210,9 +210,10 @@ def test_a_speed_below_one_unit_is_driven_with_one_unit() -> None:
 
 @pytest.mark.parametrize("unequal", [0.05, -0.05])
 def test_with_their_balance_a_first_curve_backward_is_as_commanded(unequal: float) -> None:
-    """The first drive is a curve backward, where the server reports no heading.
+    """The first drive is a curve backward, in which the server reports no heading.
 
-    The balance of the motors comes from the user's setting.
+    So the driver cannot measure the balance of the motors. It uses the user's setting, and the turn
+    rate is as commanded.
     """
     settings = MartSettings(motor_balance=(1.0 + unequal / 2) / (1.0 - unequal / 2))
     bench = MartBench("source", settings=settings, motor_inequality=unequal).ready()
@@ -264,7 +265,7 @@ def test_a_scale_that_is_changed_while_the_robot_is_at_rest_leaves_its_speed_as_
 ) -> None:
     """The user changes a scale at rest.
 
-    The driver converts what it has learned about the motors.
+    The driver converts what it has learned about the motors, so the next drive has the right speed.
     """
     bench = MartBench("source", dead_zone_units=3.0).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.1, 0.0), (0.0, 0.5)):

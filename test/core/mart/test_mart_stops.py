@@ -216,7 +216,8 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
 ) -> None:
     """One motion follows another. The new one has its speed within 1.5 s.
 
-    "No motion" after a repeated stop does not mean a restart.
+    The driver may repeat the stop between them, and the server answers "no motion". The driver does
+    not take this answer for a sign of a restart.
     """
     bench = MartBench(firmware, dead_zone_units=2.0).ready()
     bench.command(0.3, 0.3, 4.0)

@@ -83,7 +83,10 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
 def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
     vx: float, first_s: float
 ) -> None:
-    """The left wheel turns the robot, partly unseen, until the driver notices that it is stuck."""
+    """The right wheel is stuck, so the left wheel turns the robot until the driver notices this.
+
+    The driver does not measure the whole turn. The covariance covers the error.
+    """
     bench = MartBench("source").ready()
     bench.command(vx, 0.0, first_s)
     bench.server.chassis.change(stuck="right")
@@ -99,7 +102,10 @@ def test_a_right_wheel_that_gets_stuck_in_a_drive_makes_the_heading_uncertain(
 def test_a_wheel_that_gets_stuck_in_a_straight_move_makes_the_heading_uncertain(
     stuck: Stuck, x_m: float, first_s: float
 ) -> None:
-    """The server ends the move with a failure, and does not report by how much the robot turned."""
+    """A wheel gets stuck in a straight move, so the robot turns. The server reports only a failure.
+
+    The driver does not know how far the robot has turned. The covariance covers the error.
+    """
     bench = MartBench("source").ready()
     bench.go_to(x_m, 0.0, 0.0)
     bench.run(first_s)

@@ -163,7 +163,11 @@ def test_a_motion_that_follows_at_once_needs_no_switch_off() -> None:
 def test_a_motion_that_never_began_does_not_replace_a_switch_off(
     word: bytes, twist: tuple[float, float]
 ) -> None:
-    """The start of the next motion is lost, so it has written no motor. Then the user stops."""
+    """After a straight move, a motor is still on. The start of the next motion is lost.
+
+    So this motion has not switched the motor off. After the user's stop, the driver switches it
+    off.
+    """
     bench = creeping()
     lost = drops(bench.robot.network[0].to_board, lambda data: data.startswith(word))
     bench.command(*twist, 1.2)
@@ -178,7 +182,7 @@ def test_a_motion_that_never_began_does_not_replace_a_switch_off(
 def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply: bytes) -> None:
     """A server answers MCS and MSM by a text of its own, or not at all.
 
-    The driver tries a few times, reports it once, and then starts motions.
+    The driver tries a few times, reports once that there is no answer, and then starts motions.
     """
     bench = MartBench("documented")
     bench.robot._good = False
@@ -224,7 +228,7 @@ def test_a_false_refusal_of_the_switch_off_does_not_block_the_server() -> None:
 def test_an_estop_after_a_drive_switches_the_motor_off_too() -> None:
     """The e-stop is latched after a straight move, before the driver has switched the motors off.
 
-    The driver still sends MCS and MSM, which do this, and continues to send stops.
+    The driver still switches them off (MCS, MSM), and continues to send stops.
     """
     bench = creeping()
     since = len(bench.written)
