@@ -41,7 +41,8 @@ def test_a_left_turn_on_the_spot_rolls_left_back_and_right_forward() -> None:
 def test_about_a_centre_one_metre_to_the_left_the_wheels_run_on_two_circles() -> None:
     """The robot turns left at 0.5 rad/s about a point 1 m to its left, so it moves at 0.5 m/s.
 
-    The left wheel runs on a circle of 0.8 m at 0.4 m/s, the right wheel on 1.2 m at 0.6 m/s.
+    The left wheel runs on a circle with a radius of 0.8 m at 0.4 m/s. The right wheel runs on a
+    circle with a radius of 1.2 m at 0.6 m/s.
     """
     assert triple(ROBOT.body_twist((4.0, 6.0))) == pytest.approx((0.5, 0.0, 0.5))
 
@@ -77,7 +78,10 @@ def test_body_and_back_is_the_same_wheels(
 def test_each_wheel_rolls_about_the_instantaneous_centre(
     robot: DifferentialKinematics, wheel_rates: tuple[float, float]
 ) -> None:
-    """A robot turns about a point. A rim's speed is the yaw rate times its distance from it."""
+    """A robot turns about a point.
+
+    The speed of each rim is the yaw rate times the wheel's distance from this point.
+    """
     twist = robot.body_twist(wheel_rates)
     if abs(twist.yaw_rate_radps) < 1e-3:
         return

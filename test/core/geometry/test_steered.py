@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Kinematics of a steered wheel before a driven axle, checked with turns worked out by hand."""
+"""Kinematics of a steered wheel in front of a driven axle, checked with turns computed by hand."""
 
 import math
 
@@ -43,7 +43,7 @@ def test_the_wheel_is_steered_across_the_line_to_the_centre_of_rotation(
 
 
 def test_what_the_steered_wheel_does_to_the_body() -> None:
-    """The steered wheel is 0.5 m before the axle, moves at 1 m/s and is steered to 45°.
+    """The steered wheel is 0.5 m in front of the axle, moves at 1 m/s and is steered to 45°.
 
     The robot then moves at 0.707 m/s and turns at 1.41 rad/s.
     """
