@@ -178,7 +178,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
     """The user switches ``auto_gyro_bias`` on. After 15 s at rest, half of the bias is found.
 
-    Before the switch, and while the robot turns, the assumed bias does not change.
+    While ``auto_gyro_bias`` is off, or while the robot turns, the assumed bias does not change.
     """
     bench = running(gyro_bias_dps=PLANTED_DPS)
     bench.run(15.0)

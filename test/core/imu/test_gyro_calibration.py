@@ -157,7 +157,7 @@ def test_readings_before_the_request_do_not_count() -> None:
 
 
 def test_a_gap_begins_anew_and_too_few_readings_are_an_answer_too() -> None:
-    """A gap in the readings restarts a calibration. Several gaps come, until its time is over.
+    """A gap in the readings restarts a calibration. Gaps come until the calibration's time is over.
 
     The calibration fails and leaves the bias as it was.
     """
