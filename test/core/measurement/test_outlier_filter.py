@@ -104,7 +104,10 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, values of another frame replace the gyro's values. It is rejected."""
+    """In one reading, values of another frame replace the gyro's values.
+
+    This reading is rejected.
+    """
     leaps = {2: -8.5, 3: 3.8, 4: 0.2, 5: 3.8}
     readings, through = row(60, {50: leaps}), gate()
     came = admitted(readings, through)
@@ -137,9 +140,9 @@ def test_a_knock_beyond_the_scale_is_none_of_its_bits() -> None:
 
 @pytest.mark.parametrize(("scale_g", "leap"), [(4, 19.613), (16, 4.903), (16, 78.45)])
 def test_a_bit_is_worth_more_where_the_scale_is_larger(scale_g: int, leap: float) -> None:
-    """A reading jumps by the value of a high bit, and is rejected.
+    """The value of a bit depends on the scale of the sensor (``full_scale_mps2``).
 
-    With a larger scale of the sensor (``full_scale_mps2``), this bit has a larger value.
+    A reading jumps by the value that a high bit has at the given scale. The reading is rejected.
     """
     through = OutlierFilter(MotionLimits(full_scale_mps2=scale_g * G), TICK_S)
     came = admitted(row(60, {50: {1: leap}}), through)
@@ -229,7 +232,7 @@ def test_poses_do_not_wait_for_a_displacement_that_never_comes() -> None:
 
 
 def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> None:
-    """A displacement is rejected that reports a restart of the board, or has an unknown duration.
+    """A rejected displacement reports a restart of the board, or has an unknown duration.
 
     The next displacement is released with this restart or this unknown duration.
     """
