@@ -95,7 +95,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(
     phase: int, speed_mps: float
 ) -> None:
-    """Displacements come every 0.1 s. The robot reverses within one of them, which is near zero.
+    """Displacements come every 0.1 s. One is near zero, because the robot reverses within it.
 
     The monitor does not mistake this for a robot that is held. It stops the robot within 0.3 s.
     """
@@ -117,7 +117,8 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
     """The board's switch is set to position control, so a commanded velocity is taken for a goal.
 
     The small numbers of a slow velocity are a goal near the board's origin. The robot is 3 m in
-    front of it, and drives backward although forward is commanded. The driver stops it within 5 cm.
+    front of this origin, so it drives backward although forward is commanded. The driver stops it
+    within 5 cm.
     """
     bench = on_the_wrong_switch(frame)
     before = bench.board.truth.x_m
@@ -133,7 +134,7 @@ def test_a_switch_that_stands_on_position_is_noticed_within_0_3_s(frame: str) ->
 def test_wheel_commands_are_watched_as_well(board: dict[str, object]) -> None:
     """The user commands wheel rates, and the robot does not obey them.
 
-    The monitor compares its motion with the twist that results from these rates.
+    The monitor compares the robot's motion with the twist that results from these rates.
     """
     bench = started(BoardSettings(running=True, **board))  # type: ignore[arg-type]
     assert stopped_after_s(bench, (0.3, 0.0, 0.0), by_wheels) <= WITHIN_S

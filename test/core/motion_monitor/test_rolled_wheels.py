@@ -37,10 +37,10 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str
 ) -> None:
-    """Odometry sums all displacements along the robot's axes (``rolled``), to compute wheel angles.
+    """Wheel angles are computed from ``rolled``, the sum of the robot's displacements.
 
-    Each displacement is the motion of a constant twist over its period. The wheel angles, converted
-    back, give the same turn of the body.
+    The board reports displacements along the axes of the earth or of the robot. In both cases, the
+    sum is right, and the wheel angles, converted back, give the same turn of the body.
     """
     odometry, board = Odometry(OdometrySettings(), signs), Pose(3.0, -2.0, 1.0)
     for _ in range(2):
