@@ -79,7 +79,7 @@ def omnibot() -> tuple[Board, Any]:
 class LoisRobot:
     """The simulated LOIS ECU.
 
-    ``late_s``: time in s by which its robot starts late.
+    ``late_s``: delay in s with which its robot follows a command.
     """
 
     # 0.5 s until a wheel turns, then another 0.5 s until the wheel has its speed.

@@ -62,7 +62,7 @@ def test_the_first_pose_must_be_confirmed_too() -> None:
 
 
 def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> None:
-    """The board was paused, so the first displacement after it has an unknown duration.
+    """The board was paused, so the first displacement after the pause has an unknown duration.
 
     The first estimate of the odometry still has a covariance of zero.
     """
@@ -72,9 +72,9 @@ def test_a_board_that_was_paused_leaves_no_doubt_where_the_odometry_begins() -> 
 
 
 def test_a_single_pose_in_the_first_second_is_better_than_none() -> None:
-    """The board sends one pose, and the next pose is lost. Two poses that agree are usually needed.
+    """The odometry usually waits until two poses agree. Here, the board's second pose is lost.
 
-    After a second without another pose, the first pose is accepted.
+    After a second without another pose, the odometry accepts the first one.
     """
     odometry = Odometry(SETTINGS)
     odometry.settle(heading(math.pi / 2))
@@ -115,7 +115,11 @@ def test_a_pose_that_comes_after_all_is_believed_when_confirmed() -> None:
 
 @given(st.floats(0.15, 6.1), headings)
 def test_a_surprising_pose_must_be_confirmed(surprise: float, initial: float) -> None:
-    """Two poses in a row have the same unexpected heading. So the board has a new earth frame."""
+    """One pose with an unexpected heading changes nothing.
+
+    If two poses in a row have the same unexpected heading, the board has a new earth frame. Odom
+    then continues without a jump.
+    """
     odometry, trip = Odometry(SETTINGS), Trip(initial)
     attach(odometry, trip.pose)
     x, y, yaw = trip.board
@@ -248,7 +252,8 @@ def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
 def test_the_heading_is_known_while_poses_of_the_board_say_it() -> None:
     """The heading is known once two poses of the board agree.
 
-    It is unknown before that, while heading 0 is assumed, and after a gap of 20 displacements.
+    After a gap of 20 displacements, it is unknown again. If the odometry only assumes heading 0,
+    the heading is unknown too.
     """
     odometry = Odometry(SETTINGS)
     assert not odometry.heading_known

@@ -141,7 +141,7 @@ EVENTS: dict[str, Callable[[AnyBench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: AnyBench, event: Callable[[AnyBench], object]
 ) -> None:
-    """A stall or an e-stop ends a drive. The command from before has no effect any more.
+    """A reconnect, a stall or an e-stop ends a drive. The drive's command is discarded.
 
     Only a command that arrives afterwards moves the robot.
     """

@@ -63,9 +63,9 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:
-    """A request comes while received data is not processed yet. This data does not confirm it.
+    """A request comes while older data is not processed yet.
 
-    Only data that is received after the request confirms it.
+    The older data does not confirm the request. Only data that is received after the request does.
     """
     session, board = opened(), SimulatedBoard(BoardSettings(running=True))
     for tick in range(200):

@@ -78,9 +78,10 @@ def test_a_lost_p_is_said_again(bench: Bench) -> None:
 def test_a_pause_whose_p_crosses_a_notice_says_so_only_when_the_board_is_paused(
     bench: Bench,
 ) -> None:
-    """Another program pauses the board. Older data makes the driver send P, which resumes it.
+    """Another program pauses the board while older data is still on its way to the driver.
 
-    The «Paused» text of the first pause arrives late. It does not confirm the driver's pause, so
+    The user requests a pause. The older data makes the driver send P, which resumes the board. Then
+    the «Paused» text of the first pause arrives late. It does not confirm the driver's pause, so
     the driver sends P again.
     """
     data = bench.board.step()
