@@ -4,7 +4,7 @@
 
 The driver and the floor (the smallest program with the same output, without any checks) have a
 simulated controller each, on UDP. The driver sends a speed only after the reply to its current
-query, but a stop at once.
+query. It sends a stop at once.
 """
 
 import time

@@ -131,7 +131,7 @@ def by_signal_while_a_call_is_pending(rig: Rig) -> None:
 def by_signal_before_a_lost_port_is_open_again(rig: Rig) -> None:
     """Send SIGINT after the cable was plugged in again, before the driver has opened the port.
 
-    The robot still follows its last command. The driver must stop it before the driver ends.
+    The robot still follows its last command. The driver must stop the robot, and then end.
     """
     rig.unplug()
     rig.probe.wait_for_state("disconnected")

@@ -57,9 +57,9 @@ class Board(SimulatedMart):
 
     @property
     def received(self) -> bytes:
-        """Always empty, so that the last bytes from the driver are not compared with a stop.
+        """Always empty, so the campaign does not require that the driver's last bytes are a stop.
 
-        A driver of a MART still sends queries after its last stop.
+        After its last stop, a driver of a MART still sends queries.
         """
         return b""
 
@@ -189,9 +189,9 @@ def estop_through_a_restart(rig: Rig) -> None:
 
 
 def another_client(said: bytes, rig: Rig) -> None:
-    """Let another client start a motion with the datagram ``said``. The driver must end the motion.
+    """Let another client start a motion while the robot is at rest. The driver must end the motion.
 
-    The robot is at rest before.
+    ``said``: the datagram with which the client starts the motion.
     """
     rig.wait_ticks(350)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as client:
@@ -204,7 +204,8 @@ def another_client(said: bytes, rig: Rig) -> None:
 def imu_dies(rig: Rig) -> None:
     """Let the IMU fail while the robot drives by the command RM, which starts both motors.
 
-    The robot must stop. The stop makes the controller's server hang, so the case restarts it.
+    The robot must stop. The stop makes the controller's server hang, so the case restarts the
+    server.
     """
     rig.drive()
     rig.wait_ticks(100)

@@ -36,9 +36,9 @@ def sent_imu_key(frame: bytes) -> Key | None:
 
 
 def odom_key(message: Odometry) -> Key | None:
-    """Return speed and yaw rate in 0.1 mm and 0.1 mrad per 40 ms. None means unmeasured.
+    """Return the speed in 0.1 mm per 40 ms, and the yaw rate in 0.1 mrad per 40 ms.
 
-    Both are independent of the robot's heading.
+    These two do not depend on the robot's heading. None means that they were not measured.
     """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE

@@ -123,7 +123,7 @@ class Judge:
     def frame(self, frame: ControlFrame, at_s: float) -> str:
         """Record a control frame that the board understands.
 
-        Return the name of the error if this frame is one, else "".
+        Return the name of the error that this frame causes, such as "stray motion", or "".
         """
         if at_s > self._stands_from_s + BYTE_S / 2:
             self.no_setpoint(at_s)
@@ -145,9 +145,11 @@ class Judge:
         return "uncommanded"
 
     def letter(self, letter: int, at: int) -> str:
-        """Record a letter on which the board acts. Return "false letter" if it was not sent, or "".
+        """Record a letter on which the board acts. Return "false letter" or "".
 
-        ``at``: position of the letter in the write. It is negative if the line added or changed it.
+        The letter is false if it is a byte of the write that was not sent as a letter. ``at``:
+        position of the letter in the write. A letter that the line added or changed has a negative
+        position.
         """
         if at < 0:
             self.score.added_letters += 1

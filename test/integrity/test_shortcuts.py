@@ -202,9 +202,9 @@ def test_a_shock_within_a_block_takes_the_quick_loop(monkeypatch: pytest.MonkeyP
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
 def test_what_was_known_is_what_weighing_every_frame_says(scenario: str) -> None:
-    """The decoder can restore its state after any frame.
+    """The decoder can restore the state that it had after any earlier frame of a run.
 
-    To restore it, the decoder evaluates at most 6 frames again.
+    To restore this state, the decoder evaluates at most 6 frames again.
     """
     data, expectation = bytes(TRUTHS[scenario].data), Expectation(16384.0)
     at, context, walk = 0, NOTHING_KNOWN, Walk(NOTHING_KNOWN)
