@@ -243,10 +243,10 @@ def test_the_parameter_file_is_that_of_the_board(
 def test_a_given_board_is_obeyed_beside_a_file_that_names_none(
     launch: Callable[..., Started], tmp_path: Path, file: str
 ) -> None:
-    """The user gives the argument ``board``, and a parameter file without a board.
+    """The user gives the argument ``board``, and a parameter file that does not name a board.
 
-    The argument selects the board. Otherwise the robot of another board would get the OmniBot's
-    frames.
+    The argument selects the board. Otherwise, a robot with another board would get the frames of
+    the default board, the OmniBot.
     """
     own = tmp_path / "own.yaml"
     own.write_text("/**:\n  ros__parameters:\n    max_linear_speed: 0.3\n")

@@ -75,9 +75,9 @@ DRIVER = driver_names()
 
 
 def test_the_drivers_names_are_found() -> None:
-    """The driver's topics and services are found in its code.
+    """The function ``driver_names`` finds the driver's topics and services in the driver's code.
 
-    The other tests compare names with them.
+    The other tests compare the names in config/ and rviz/ with these.
     """
     assert {"odom", "imu/data_raw", "cmd_vel", f"{NODE}/estop_active", f"{NODE}/estop"} <= DRIVER
 

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 DESCRIPTION = Path(__file__).parents[2] / "urdf" / "omnibot.urdf.xacro"
 WIDTH, HEIGHT, BAND, FINER = 800, 560, 20, 2
 """``WIDTH``, ``HEIGHT``: size of the picture in pixels. ``BAND``: pixel rows that are computed at
-once. ``FINER``: number of rays for each pixel, in each of both directions."""
+once. Each pixel has ``FINER`` times ``FINER`` rays."""
 EYE_M, LOOK_M, HALF_VIEW_RAD = np.array([0.62, 0.30, 0.42]), np.array([0.0, 0.0, 0.088]), 0.2138
 FLOOR_M, FADE_M = 0.2, 0.35
 LAMPS, LAMP_SIZE = 6, 0.06

@@ -65,7 +65,7 @@ def test_a_port_that_cannot_be_had_names_the_parameter_to_set(path: str) -> None
 def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
     """A second program opens a port that is in use.
 
-    The error names the owner. It is found in the kernel's list of locks.
+    The error names the process that uses the port. The kernel's list of locks shows this process.
     """
     port = SerialPort(terminal.path, 115200)
     with pytest.raises(LinkError, match=rf"in use by another program \(process {os.getpid()}, "):
@@ -107,9 +107,9 @@ def test_closing_a_port_does_not_hang_up(terminal: Terminal) -> None:
 def test_a_real_terminal_is_exclusive_until_it_is_closed(
     terminal: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A port makes a real terminal exclusive until it is closed, but never a pseudo-terminal.
+    """A real terminal is exclusive while its port is open: then only root can open the terminal.
 
-    So programs that use no locks are refused, too.
+    Programs that use no locks are refused, too. A pseudo-terminal is never made exclusive.
     """
 
     def exclusive() -> bool:

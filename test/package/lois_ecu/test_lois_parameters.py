@@ -11,7 +11,8 @@ from omnibot_driver.core.errors import ParameterError
 def test_commands_are_slow_in_a_terminal_mode() -> None:
     """In a terminal mode, a command rate above 25 Hz is refused.
 
-    The public firmware passes commands on to a compass at 4800 baud.
+    In such a mode, the public firmware forwards each command to a sensor, for example a compass at
+    4800 baud. With more commands, the board would receive a stop late or never.
     """
     with pytest.raises(ParameterError, match="at most 25 Hz"):
         PARAMETERS.check_all({"terminal_mode": "compass", "command_rate": 30.0})
