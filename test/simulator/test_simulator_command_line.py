@@ -54,8 +54,9 @@ def test_a_signal_ends_it_cleanly(tmp_path: Path, number: signal.Signals) -> Non
 def test_in_the_background_it_leaves_the_terminal_to_other_programs() -> None:
     """A user starts the program with ``&``, and types in the same terminal.
 
-    The kernel would suspend the program if it read what the user types. A suspended program would
-    not end at SIGTERM.
+    The program does not read what the user types, and ends at SIGTERM. If the program read from
+    the terminal, the kernel would suspend the program. A suspended program would not end at
+    SIGTERM.
     """
     user, terminal = os.openpty()
     os.write(user, b"quit\n")

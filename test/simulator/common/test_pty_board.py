@@ -184,7 +184,7 @@ def test_a_dead_link_is_replaced(tmp_path: Path) -> None:
 def test_a_link_that_was_taken_over_is_left_alone(tmp_path: Path) -> None:
     """A second simulator replaces the link of the first one.
 
-    The first one ends and keeps the link.
+    Then the first one ends. It does not remove the link, which leads to the second one's terminal.
     """
     link = tmp_path / "board"
     with PtyBoard(Ticker(), str(link)):

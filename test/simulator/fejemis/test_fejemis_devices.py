@@ -114,9 +114,9 @@ def test_the_yaw_of_the_imu_follows_the_robot() -> None:
 def test_the_yaw_of_the_imu_has_the_offset_of_a_configuration_that_was_just_loaded(
     loads: str,
 ) -> None:
-    """``eer`` or ``setid 0`` loads a configuration after a calibration of the gyro.
+    """After a calibration of the gyro, ``eer`` or ``setid 0`` loads a configuration.
 
-    The configuration has no gyro offset, so the yaw drifts.
+    This configuration has no gyro offset. It replaces the calibrated offset, so the yaw drifts.
     """
     rig = Rig(gyro_bias_dps=(0.0, 0.0, 3.0), gyro_noise_dps=0.0).booted()
     rig.say(DRIVE, "gyroc")

@@ -91,7 +91,7 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 ) -> None:
     """A half ignores input until its boot ends. Some firmware then sends a start line.
 
-    The time in its lines begins with the boot.
+    The time in the lines of a half counts from the beginning of its boot.
     """
     rig = Rig(firmware=Firmware(sums=False, says_start=says_start), boot_s=boot_s).booted()
     began = rig.now
@@ -110,7 +110,7 @@ def test_a_boot_has_a_duration_and_its_last_line_can_be_left_out(
 
 
 def test_front_that_restarts_switches_brush_and_lift_off() -> None:
-    """The front half restarts. Brush and lift are off, and it sends no angle.
+    """The front half restarts. Brush and lift are off, and the half sends no angle.
 
     The drive half keeps the last angle.
     """
@@ -155,9 +155,9 @@ def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
 
 
 def test_sums_can_begin_and_end_in_each_half() -> None:
-    """One half begins to send checksums while it runs, and ends them later.
+    """While it runs, one half begins to send checksums, and later stops sending them.
 
-    The other half does not.
+    The other half sends no checksums.
     """
     rig = Rig().booted()
     rig.board.befall("front", "sums-begin")
@@ -180,7 +180,7 @@ def test_faults_can_be_planned() -> None:
 
 
 def test_ports_can_be_swapped_and_ids_be_others() -> None:
-    """The two ports are swapped, or a half has another id. The heartbeats show it."""
+    """The two ports are swapped, or a half has another id. The ids in the heartbeats show this."""
     rig = Rig(swapped=True)
     rig.run(1.0)
     assert any(port == FRONT and " 90 " in text for _, port, text in rig.lines)

@@ -29,9 +29,9 @@ SUMS = Firmware(sums=True)
     ],
 )
 def test_sums_are_those_of_the_public_hosts(line: str) -> None:
-    """Lines with checksums are copied from the public host programs.
+    """A line with a checksum is copied from one of the public host programs.
 
-    The simulator agrees with them.
+    The simulator computes the same checksum.
     """
     assert wire.checked(line)[0] is wire.Check.GOOD
     assert wire.line(line[3:], sums=True, carriage_return=False) == line.encode() + b"\n"
@@ -213,7 +213,10 @@ def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: flo
 
 
 def test_lines_end_with_or_without_a_carriage_return() -> None:
-    """The manual does not show line ends. A carriage return is accepted, and can also be sent."""
+    """A half accepts lines with and without a carriage return. The manual does not show line ends.
+
+    A setting of the firmware determines whether a half sends carriage returns.
+    """
     rig = Rig().booted()
     rig.board.receive(b"stop\r\n", 0.0, DRIVE)
     rig.run(0.01)
@@ -225,7 +228,10 @@ def test_lines_end_with_or_without_a_carriage_return() -> None:
 
 
 def test_variants_of_messages() -> None:
-    """Some firmware adds a time to the wheel speeds, adds a tilt to the pose, or measures in g."""
+    """Some firmware adds a time to the wheel speeds, or a tilt to the pose.
+
+    Some firmware sends accelerations in g instead of m/s².
+    """
     usual = Rig(accel_noise_mps2=0.0, accel_bias_mps2=(0.0, 0.0, 0.0)).booted()
     assert len(usual.ask(DRIVE, "veli")[0].split()) == 3
     assert len(usual.ask(DRIVE, "posei")[0].split()) == 5

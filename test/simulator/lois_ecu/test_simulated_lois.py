@@ -245,9 +245,9 @@ def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
 
 @pytest.mark.parametrize(("quirks", "unit_s"), [(DOCUMENTED, 1e-9), (FIRMWARE, 1e-3)])
 def test_a_reboot_restarts_the_clock(quirks: Quirks, unit_s: float) -> None:
-    """The board reboots after 3 s. The time in its ticks is then the time since the reboot.
+    """The board reboots after 3 s. The times in its reports of ticks then count from the reboot.
 
-    The GPS receiver's time goes on.
+    The time of the GPS receiver is not reset.
     """
     rig = Rig(quirks, running=True)
     rig.run(3.0)

@@ -61,9 +61,9 @@ def test_tf_0_or_a_word_is_unlimited_motion(text: str) -> None:
 
 
 def test_sdr_limits_an_unlimited_move_alone() -> None:
-    """SDR ends a move without a distance at the given distance from the start of the move.
+    """A move without a distance ends at the distance that SDR gives, counted from its start.
 
-    Moves with a distance ignore SDR.
+    A move with a distance ignores SDR.
     """
     rig = Rig()
     rig.say("TF 0")

@@ -23,7 +23,10 @@ def test_rm_answers_in_71_ms() -> None:
 
 
 def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
-    """The drive F first measures the bias of the gyro. Its reply takes longer than the spin R's."""
+    """The reply to F, a drive, comes later than the reply to R, a spin.
+
+    F first measures the bias of the gyro.
+    """
     rig = Rig()
     assert rig.ask("F") == "ok"
     assert rig.took_s == pytest.approx(0.22, abs=0.015)
@@ -35,7 +38,8 @@ def test_f_answers_in_220_ms_and_r_in_61_ms() -> None:
 def test_a_build_that_answers_fail_to_rm_moves_all_the_same() -> None:
     """Some servers answer the start of a drive (RM) with a failure although the robot moves.
 
-    They cannot stop this motion. Only a write to the motors stops the robot.
+    For such a server no motion is in progress, so its stops fail. Only MCS, the direct control of
+    the motors, stops the robot.
     """
     rig = Rig(reference_start_fails=True)
     assert rig.ask("RM 30") == "fail "

@@ -60,7 +60,7 @@ def test_without_an_imu_rm_r_and_l_start_the_motors_and_nothing_stops_them(
 def test_the_start_timeout_is_dead_without_an_imu(text: str) -> None:
     """The IMU is dead and the motors are stuck.
 
-    The server does not notice it and keeps the power on.
+    The server does not notice that the motors are stuck, and keeps their power on.
     """
     rig = Rig(imu_dies_s=0.0, stuck="both")
     assert rig.ask(text) is None

@@ -161,7 +161,7 @@ def empty_datagram_ends(quirks: Quirks) -> bool:
 
 
 def exit_is_silent(quirks: Quirks) -> bool:
-    """Return whether EXIT, which ends the server, is not answered without a log."""
+    """Return whether EXIT, which ends the server, is not answered if no log was started."""
     return Rig(quirks).ask("EXIT") is None
 
 

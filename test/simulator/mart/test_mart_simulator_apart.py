@@ -16,7 +16,7 @@ MODULES = sorted(Path(mart.__file__).parent.glob("*.py"))
 def test_no_module_imports_the_core(path: Path) -> None:
     """No module of the simulated controller imports the driver's core.
 
-    With a shared parser, no test could find a misread manual.
+    If simulator and driver used the same parser, no test could detect a misread manual.
     """
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):

@@ -44,7 +44,7 @@ def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
 def test_a_paused_board_counts_once_a_second() -> None:
     """A paused board sends a text once a second.
 
-    Its number counts up from 0 to 255 and then wraps.
+    The number in the text counts up to 255 and then continues with 0.
     """
     board = booted(BoardSettings())
     assert run(board, 2.0) == b"Paused: 1 \nPaused: 2 \n"

@@ -112,7 +112,7 @@ def test_letters_may_act_anywhere_and_the_frame_around_them_goes_on() -> None:
 
 @every_kind
 def test_letters_within_a_control_frame_act_where_frames_are_not_obeyed(kind: ReceiverKind) -> None:
-    """A board obeys only letters. P, R and S act even within a motion frame."""
+    """A paused board obeys only letters, so P, R and S act even within a motion frame."""
     frame = "FF FE 01 00 50 00 52 00 53"
     assert understood(frame, kind=kind, control_frames=False) == [PAUSE, RESET, START]
 
@@ -177,9 +177,9 @@ def test_a_pause_of_less_than_five_milliseconds_is_not_an_idle_gap() -> None:
 
 
 def test_a_window_acts_on_a_short_stop_too_and_finds_the_next_frame() -> None:
-    """The window receiver completes a stop that lost a byte with the next frame's FF.
+    """A stop has lost a byte. The window receiver completes it with the FF of the next frame.
 
-    The same FF begins the next frame.
+    This FF also begins the next frame, so the receiver finds both frames.
     """
     assert understood("FF FE 02 00 00 00 00 00", "FF FE 02 00 00 00 00 00 00", kind=WINDOW) == [
         ControlFrame(0x02, (0, 0, 255)),
