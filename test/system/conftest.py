@@ -55,7 +55,7 @@ def start_driver(stack: ExitStack) -> Callable[..., Driver]:
 def probe_of(stack: ExitStack) -> Callable[[Driver], Probe]:
     """Return a function that starts a probe: a ROS node that observes and commands one driver.
 
-    If a stall of the driver makes it refuse the probe's newest message, the probe publishes this
+    If the driver refuses the probe's newest message because of a stall, the probe publishes the
     message again.
     """
 

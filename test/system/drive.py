@@ -176,7 +176,7 @@ def compare(
 def trace(
     sent: Sequence[object], got: Sequence[object], stamps_s: Sequence[float]
 ) -> list[int | None]:
-    """Return, for each IMU message, the index of the frame with the same values; None without one.
+    """Return for each IMU message the index of the frame with the same values, or None.
 
     Noise makes each frame unique. ``sent``: values of the frames. ``got``, ``stamps_s``: values and
     timestamps of the messages.
@@ -222,8 +222,8 @@ def board_poses(
     """Return three lists, with an element for each delta in a board's frames.
 
     The lists contain the delta, the pose after the delta, and the index of the last IMU frame
-    before it. After every fifth delta, the pose is the exact one that the board sends. In between,
-    up to four rounded deltas are added to it.
+    before the delta. After every fifth delta, the pose is the exact one that the board sends. After
+    the other deltas, it is the last exact pose plus the rounded deltas since then.
     """
     deltas: list[tuple[int, int, int]] = []
     poses: list[Triple] = []

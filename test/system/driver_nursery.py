@@ -165,7 +165,7 @@ def reap(statuses: dict[int, int]) -> None:
 def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
     """Run the driver in this forked process. End without the exit handlers of libraries.
 
-    One of them, of LTTng, would try to stop a thread that does not exist in a forked process.
+    The handler of LTTng would try to stop a thread that does not exist in a forked process.
     """
     from omnibot_driver import driver
 

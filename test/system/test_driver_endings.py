@@ -47,7 +47,8 @@ driver.LONGEST_END_S = 50.0
 """
 """Code that sets longer time limits for the driver's end.
 
-A busy computer delays the board's report of a standstill. The limits do not delay a test.
+On a busy computer, the board's report of a standstill comes late. The driver waits no longer than
+necessary, so the limits do not delay a test.
 """
 
 

@@ -126,7 +126,7 @@ def test_the_bias_is_what_was_set_last(
 ) -> None:
     """The driver has refined the gyro bias at rest, and the user sets ``gyro_bias``.
 
-    The user's value is used, even if the parameter already has it.
+    The user's value is used, even if the parameter had the same value before.
     """
     board = start_board(gyro_bias_dps=PLANTED_DPS, running=True)
     probe: Probe = probe_of(start_driver(board.path, auto_gyro_bias=True))
@@ -248,7 +248,7 @@ def test_measurements_wait_for_simulated_time_and_it_is_said(
 ) -> None:
     """With ``use_sim_time``, measurements wait until /clock has a time.
 
-    A simulated board waits, too, because its own time differs from /clock.
+    The measurements of a simulated board wait, too, because the board's time differs from /clock.
     """
     driver = start_driver("sim://", use_sim_time=True)
     probe = probe_of(driver)

@@ -195,7 +195,7 @@ def test_a_parameter_file_for_another_node_is_told(
 
 
 def test_integers_are_taken_for_real_numbers(start_board: Start, start_driver: Start) -> None:
-    """The driver accepts an integer for a real parameter, as in ``max_linear_speed: 1``."""
+    """The driver accepts an integer for a parameter of type double: ``max_linear_speed: 1``."""
     board = start_board()
     driver: Driver = start_driver(board.path, max_linear_speed=1)
     driver.wait_for_line("state: nominal")
@@ -248,9 +248,10 @@ def test_tuning_changes_while_running_and_identity_does_not(
 def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
     start_driver: Start, probe_of: Start, name: str, kind: int, message: str
 ) -> None:
-    """A client sets a parameter of another name, of another board, or to a value of no type.
+    """A client sets an unknown parameter, one of another board, or a value of an unknown type.
 
-    rclpy raised an exception for such a value, which ended the driver.
+    The driver refuses the change with a reason, and continues. Earlier, a value of an unknown type
+    led to an exception in rclpy, which ended the driver.
     """
     driver: Driver = start_driver("sim://")
     probe: Probe = probe_of(driver)
@@ -311,8 +312,8 @@ def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
 ) -> None:
     """A user sets ``max_linear_speed`` above ``fastest_linear_speed``, the limit of odometry.
 
-    The driver refuses this, and also the same for the angular speeds. A request that raises both
-    parameters together is accepted.
+    The driver refuses this. It also refuses the same for the angular speeds. A request that raises
+    both parameters together is accepted.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))

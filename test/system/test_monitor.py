@@ -155,7 +155,7 @@ def test_a_monitor_that_is_ended_stops_what_it_steered(
 ) -> None:
     """A held key moves the robot. The monitor ends by SIGTERM, or its window is closed.
 
-    The monitor stops the robot. Its commands are stamped.
+    The monitor stops the robot. In this test, the monitor sends stamped commands.
     """
     driver = start_driver(board.path, enable_stamped_cmd_vel=True, cmd_vel_timeout=10.0)
     probe_of(driver).wait_for_state("nominal")

@@ -88,7 +88,7 @@ def test_its_sensors_are_published(
 
 
 def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: Probe) -> None:
-    """A user sets the real parameter ``tof_maximum`` to 2. ``ros2 param set`` sends an integer.
+    """A user sets ``tof_maximum``, whose type is double, to 2. ``ros2 param set`` sends an integer.
 
     The driver accepts the integer and publishes the new maximum.
     """

@@ -22,14 +22,15 @@ RAW: Final = [
     f"omnibot_driver/raw_{way}/{name}" for way in ("rx", "tx") for name in ("drive", "front")
 ]
 RECOGNISED: Final = 100
-"""Number of packets after which a replay has recognised both Teensys. They take about 1 s.
+"""Number of packets, about 1 s of a recording, after which a replay has recognised both Teensys.
 
-A recording may lack the answers to the driver's first questions.
+A recording may lack the answers to the driver's first questions. A replay then recognises the
+Teensys by later packets.
 """
 
 
 def test_a_recorded_drive_of_both_lines_is_replayed(tmp_path: Path) -> None:
-    """A drive is recorded and replayed. Both end at the same place in odom, within 1 cm."""
+    """A drive is recorded and replayed. The replay ends at the same place in odom, within 1 cm."""
     with ExitStack() as stack:
         driver = stack.enter_context(Driver(port="sim://", board="fejemis", publish_raw="true"))
         probe = stack.enter_context(Probe(driver.namespace))

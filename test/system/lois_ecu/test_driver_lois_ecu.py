@@ -49,7 +49,7 @@ def test_it_drives_and_odometry_tells_how_far(
 ) -> None:
     """The robot drives 1 m and stops when the commands end. Odometry is within 4 cm of the truth.
 
-    The board's own gains would cause a swerve.
+    The driver sets other controller gains, because the robot would swerve with the board's own.
     """
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")

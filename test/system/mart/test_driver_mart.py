@@ -231,10 +231,10 @@ def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
 def test_ranges_and_docking_follow_parameters_that_change_while_it_runs(
     mart: Mart, probe: Probe
 ) -> None:
-    """A user changes ``range_maximum``, by an integer, and ``dock_distance``, to 0.1 m.
+    """A user sets ``range_maximum`` to the integer 4, and ``dock_distance`` to 0.1 m (3.9 inches).
 
-    The driver publishes the new range. It requests only 2 inches, because the robot may drive 1.6
-    times as far as requested.
+    The driver publishes the new maximum. To dock, it requests a move of only 2 inches, because the
+    robot may drive 1.6 times as far as requested.
     """
     ranges = probe.listen(Range, "range/front")
     whole = ParameterValue(type=ParameterType.PARAMETER_INTEGER, integer_value=4)
