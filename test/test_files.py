@@ -11,7 +11,7 @@ from omnibot_driver.files import unused, write_whole
 
 
 def test_a_file_replaces_an_older_one_with_its_very_characters(tmp_path: Path) -> None:
-    """A file is written over an older one, in a folder that does not exist before.
+    """A file is written into a new folder, and is then replaced by a newer version.
 
     Line ends and characters beyond ASCII are kept, and no other file is left.
     """
@@ -39,7 +39,10 @@ def test_a_write_that_fails_or_is_not_wanted_leaves_the_old_file(tmp_path: Path)
 
 
 def test_an_unused_name_is_numbered_if_the_name_is_taken(tmp_path: Path) -> None:
-    """The first name is free, then it is taken by a file, and then its first number by a folder."""
+    """A free name is returned unchanged. If a file has this name, the name gets the number 2.
+
+    If a folder already has the name with the number 2, the number is 3.
+    """
     path = tmp_path / "move.csv"
     assert unused(path) == path
     path.touch()

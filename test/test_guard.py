@@ -232,9 +232,10 @@ def test_words_that_were_replaced_are_the_last_ones(line: Line) -> None:
 
 
 def test_beats_and_words_are_told_apart_however_they_are_read() -> None:
-    """The guard process separates heartbeats and stop bytes from one pipe, wherever a read ends.
+    """Heartbeats and stop bytes come through one pipe. The guard process distinguishes them.
 
-    A lone ``e`` is a heartbeat with a latched e-stop. Stop bytes may contain an ``e``, too.
+    A read may end anywhere. A lone ``e`` is a heartbeat with a latched e-stop. Stop bytes may
+    contain an ``e``, too.
     """
     assert guard.parted(b"..e") == (b"..e", b"", b"")
     assert guard.parted(b".=3:beef 3:00\n.e") == (b"..e", b"3:beef 3:00", b"")

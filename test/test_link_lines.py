@@ -171,7 +171,10 @@ def test_a_line_that_is_lost_stops_the_robot_and_its_return_does_not_move_it(
 
 
 def test_a_robot_without_its_drive_is_not_driven(lines: Lines) -> None:
-    """The drive line of a board is missing, so motion is refused. Its measurements still arrive."""
+    """The line ``drive`` of a board is missing, so motion is refused.
+
+    The measurements from the other line, ``sense``, still arrive.
+    """
     lines.connect()
     missing = lines.openers[0] = partial(SerialPort, str(lines.name) + "-not", 115200)
     lines.link.start()

@@ -77,7 +77,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
 def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.MonkeyPatch) -> None:
     """The computer is suspended during a drive. When it resumes, the driver stops the robot.
 
-    The driver notices the suspension by a clock that counts it.
+    The driver notices the suspension by a clock that also runs while the computer is suspended.
     """
     suspended_s = 0.0
     monkeypatch.setattr(

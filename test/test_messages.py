@@ -148,7 +148,8 @@ def test_odometry_has_its_numbers_where_rep_103_wants_them() -> None:
 def test_a_twist_that_is_not_known_is_zero_with_a_variance_that_says_so() -> None:
     """An unknown twist is published as zero with a large variance.
 
-    After a pause, for example, the first displacement has all motion of the pause.
+    For example, the twist is unknown after a pause, because the first displacement contains all
+    motion during the pause.
     """
     message = messages.odometry_message(
         OdometryEstimate(0.0, Pose(), None, Covariance()), STAMP, SETTINGS

@@ -75,7 +75,8 @@ with UnblockedOutput():
 def test_what_is_printed_at_the_end_is_not_held_up_either(lines: int) -> None:
     """The output is not read. At the program's end, Python prints a message, and does not block.
 
-    The pipe is exactly full after 16 lines. 100 lines are more than it can hold.
+    There are two cases: the program has filled the pipe exactly (with 16 blocks of 4096 bytes), or
+    has printed more than the pipe can hold (100 blocks).
     """
     program = f"""
 import contextlib, os, time

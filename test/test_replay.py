@@ -148,10 +148,10 @@ def test_the_pace_makes_no_difference() -> None:
 
 
 def test_time_passes_as_it_did() -> None:
-    """The recording has a silence of 2 s. The replay is faster, but also has the silence of 2 s.
+    """A recording has a silence of 2 s. In the replay, the silence also has 2 s of recorded time.
 
-    Its state is ``connecting`` during the silence, and ``disconnected`` at the end of the
-    recording.
+    The state of the replay is ``connecting`` during the silence, and ``disconnected`` at the end of
+    the recording.
     """
     heard = play(Tape(simulated(600, silent=range(200, 400))))
     assert heard.states == [

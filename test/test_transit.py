@@ -116,7 +116,7 @@ def test_a_command_that_waited_in_our_own_queue_is_refused_even_if_it_is_the_fir
 ) -> None:
     """A sender's first command waits in the driver's own queue. It is refused.
 
-    The driver needs only its own clock for this.
+    The driver measures this wait by its own clock, so it need not know the sender's clock.
     """
     delay = Receiver().hear(Sender(-HOUR_S), 100.0, 0.01, waited_s)
     assert refused(delay)
@@ -221,7 +221,7 @@ def test_a_late_command_does_not_pass_for_that_of_another_sender() -> None:
 def test_each_command_of_a_sender_that_sends_one_is_heard() -> None:
     """A sender sends a single command, like ``ros2 topic pub --once``. The driver accepts it.
 
-    Its clock may be behind.
+    This is also so if the sender's clock is behind.
     """
     receiver = Receiver()
     for number in range(20):

@@ -59,7 +59,7 @@ def test_without_the_updater_it_is_done_without(monkeypatch: pytest.MonkeyPatch)
 def test_with_the_updater_each_status_is_a_task_of_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """diagnostic_updater gets one task for each status, which fills in the newest values.
+    """diagnostic_updater gets one task for each status. The task fills in the newest values.
 
     The library sets the period of the reports.
     """

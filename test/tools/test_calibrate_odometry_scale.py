@@ -112,7 +112,8 @@ class Encoder(TwoWheels):
 def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
     """The driver has the parameter ``metres_per_count``. The tool finds it and ``linear_scale``.
 
-    The user measures only two lines, because this driver has no scales for its odometry.
+    The user measures only two straight drives and no turns, because this driver has no scales for
+    its odometry.
     """
     robot = Encoder()
     console = Console(
@@ -149,7 +150,7 @@ def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
 
 
 def test_a_line_that_was_misread_is_told() -> None:
-    """The user measures two lines of equal length, and misreads the tape on one of them.
+    """The user measures two straight drives of equal length, and misreads the tape once.
 
     A note gives the difference of the two results.
     """

@@ -46,7 +46,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` each time, from ``AFTER_S`` after the start on."""
+    """Return a callback that calls ``action`` at each call from ``AFTER_S`` seconds on."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 

@@ -287,9 +287,10 @@ def test_traits_of_an_answer_are_read_off_it() -> None:
 
 
 def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> None:
-    """The times of a record have overflowed. The tool refuses the record.
+    """The times of a record have overflowed, so they are unknown. The tool refuses the record.
 
-    A usual time between ticks overflows in the manual's unit, 100 ns.
+    The times are in the manual's unit, 100 ns. In this unit, the usual times between ticks are too
+    long for the record.
     """
     record = Record(RecordKind.RPM, (0xFFFF,) * 50, (0xFFFF,) * 50)
     path = tmp_path / "rpm.csv"
