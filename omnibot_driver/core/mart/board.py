@@ -58,7 +58,7 @@ the driver that the server answers. A moving robot is measured more often.
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
 FARTHEST_M: Final = 1000.0
-"""Largest distance to a goal, in m. The server might read more digits as another distance."""
+"""Largest distance to a goal, in m. The server might misread a distance with more digits."""
 
 
 class MartBoard(Board):

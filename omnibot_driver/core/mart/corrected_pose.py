@@ -2,8 +2,8 @@
 
 """The pose in the odometry frame, and how later knowledge of a motion corrects it.
 
-After a turn on the spot, the server reports its angle, which replaces the wheel's. This module
-knows angles and distances; it does not know counts or times.
+After a turn on the spot, the server reports the angle of the turn. This angle replaces the one that
+the wheel measured. This module knows angles and distances; it does not know counts or times.
 """
 
 import math
@@ -21,10 +21,10 @@ lost."""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Errors of a controlled move whose size is estimated, not counted, as standard deviations.
+"""Standard deviations of the distance or turn of a controlled move that was not counted.
 
-``RUN``: relative error of its distance or turn. ``END_RUN_M``, ``END_RUN_RAD``: additional errors
-of a distance in m, and of a turn in rad.
+Such a distance or turn is estimated. ``RUN``: its relative error. ``END_RUN_M``, ``END_RUN_RAD``:
+additional errors of a distance in m, and of a turn in rad.
 """
 
 
@@ -97,15 +97,20 @@ class CorrectedPose:
         self.doubt.add(UNHEARD_M**2, ANY_RAD**2)
 
     def doubt_turn(self, turn_rad: float) -> None:
-        """Add the error of a turn that may lack ``turn_rad``, about one of the wheels."""
+        """Add the error of a turn from which an angle ``turn_rad`` may be missing.
+
+        One of the wheels may have stood still. The robot has then turned about this wheel, so that
+        its centre has moved too.
+        """
         turn_rad = min(abs(turn_rad), ANY_RAD)
         self.doubt.add((turn_rad * self._settings.track_m / 2) ** 2, turn_rad**2)
 
     def _end_turn(self, *, may_be_recorded: bool) -> float:
         """End a turn on the spot, and return the correction of its angle in rad.
 
-        If the server has reported an implausible angle, this may be the angle of another motion, or
-        only one of the wheels has turned. So the whole difference is a possible error.
+        If the server has reported an implausible angle, there are two possible causes: it is the
+        angle of another motion, or only one of the wheels has turned. So the whole difference
+        between this angle and the wheel's angle is added as a possible error.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

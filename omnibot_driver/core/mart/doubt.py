@@ -168,8 +168,9 @@ class Doubt:
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
         """Replace the heading error of the last turn by a smaller one.
 
-        The odometry has used the wheel's angle so far, and now uses the gyro's, which the server
-        has recorded. Call this before the position changes.
+        Until now, the odometry has used the angle that the wheel measured. From now on, it uses the
+        angle that the server has recorded, which comes from the gyro. Call this before the position
+        changes.
         """
         self.add(0.0, _by_gyro(told_rad) - _by_wheel(spun_rad))
 

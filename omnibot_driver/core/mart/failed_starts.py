@@ -16,8 +16,9 @@ from omnibot_driver.core.mart.states import Motion
 AGAIN_S: Final = 1.0
 """Pause in s after a start that failed, before the driver tries again."""
 NO_STARTS: Final = 3
-"""Number of starts of B, R or L in a row that do not turn the right wheel. Then the driver gives
-up: each start may have turned the left wheel, and so the robot."""
+"""The driver gives up after this number of starts in a row that do not turn the right wheel. Only
+starts of a backward drive (B) or a turn (R, L) are counted. Each of them may have turned the left
+wheel, and so the robot."""
 REFERENCE_FAILS: Final = 2
 """Number of failed starts of RM (forward drive) in a row after which the driver gives up.
 

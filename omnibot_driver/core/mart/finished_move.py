@@ -42,7 +42,8 @@ class Done:
 
     ``expected``: distance in m, or turn in rad, of a complete run, as learned from earlier moves.
 
-    ``stopped_again``: whether the driver has sent a stop after that, against a possible second run.
+    ``stopped_again``: whether the driver has sent a stop after the move, to end a possible second
+    run.
     """
 
     request: Request
@@ -131,7 +132,7 @@ class Done:
     def ended_early(self) -> bool:
         """Whether the reply came before the end of a complete run, so it answers another request.
 
-        If the driver has then sent a stop against a second run, it has stopped the first run
-        itself.
+        If the driver has sent a stop after this reply, to end a second run, the stop has ended the
+        first run.
         """
         return self.lasted_s < FULL * self.usual_s

@@ -41,8 +41,8 @@ WORTH_DEG: Final = 1.0
 WIDER: Final = 0.5
 """How much each turn since the last straight move increases the allowed heading error.
 
-It is a fraction of the initial allowed error. Without it, the robot could turn to and fro, because
-turns overshoot.
+It is a fraction of the initial allowed error. Without it, the robot could turn back and forth,
+because turns overshoot.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. After them, the driver gives the goal up."""
@@ -83,9 +83,10 @@ class Surplus:
         return asked if abs(asked + surplus - wanted) < wanted - WORTH_DEG else 0
 
     def is_known(self, request: Request) -> bool:
-        """Return whether the size of a complete move is known: a turn's is, by the server's gyro.
+        """Return whether the distance or turn of a complete move is known.
 
-        The server drives straight by time, so one such move must have been measured.
+        A turn is always known, because the server ends a turn by its gyro. The server ends a
+        straight move by time, so the distance is known only after such a move was measured.
         """
         return request.word in (MCR, MCL) or (b"SLOW" in request.data.split()) in self._learned
 

@@ -201,7 +201,7 @@ class Ground:
 
     @property
     def _absent_s(self) -> float:
-        """Silence in s after which a server that need not be busy is regarded as absent."""
+        """Silence in s after which the server is regarded as absent, if nothing keeps it busy."""
         return ABSENT_S + ABSENT_TRIPS * self.conversation.answered_trip_s
 
     @property
@@ -216,8 +216,8 @@ class Ground:
     def _hears(self, now: float) -> None:
         """Record the arrival of a reply.
 
-        If the server was silent for long before it, or if another kind of server answered before,
-        a new server may have been started.
+        A new server may have been started if there was a long silence before this reply, or if
+        another kind of server has answered until now.
         """
         most_s = self._absent_s
         if self.heard_s <= self._served_s:

@@ -166,7 +166,7 @@ class Health:
     def reference_failed(self, now: float) -> None:
         """Record that RM (forward drive) has failed.
 
-        It gave no reason, or reported that no wheel has turned.
+        The server gave no reason, or reported that no wheel has turned.
         """
         self.reference_fails += 1
         self._reference_failed_s = now

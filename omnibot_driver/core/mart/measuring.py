@@ -66,7 +66,8 @@ class Measuring(Starts):
         """Return whether the present heading is exactly zero because the server was restarted.
 
         A restarted server reports zero until its first forward drive (RM). A heading that only
-        passes through zero was near zero before. ``before_rad``: the heading before, or None.
+        passes through zero was near zero before. ``before_rad``: the previous heading, or
+        None.
         """
         if self.state is not State.STILL or not self.odometry.heading.is_zero:
             return False

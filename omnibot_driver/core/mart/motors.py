@@ -93,7 +93,7 @@ class Motors:
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
-        """Return the ratio of both motors' speeds (left / right), each with ``units``.
+        """Return the ratio of the motors' speeds (left / right) if both motors have ``units``.
 
         Lost or duplicate speed changes can make the motor lines wrong. So the ratio is limited
         to ``motor_balance`` ± MOST_UNEQUAL.

@@ -22,7 +22,7 @@ from omnibot_driver.core.mart.stopping import SLOW_STOP
 from omnibot_driver.core.mart.words import Request
 
 UNLIKELY: Final = 1 / 3
-"""Assumed error of the odometry if the server may, but probably did not, run a move twice.
+"""Assumed error of the odometry if a second run of a move is possible, but improbable.
 
 It is a standard deviation, as a fraction of the move. A second run would then be an error of three
 standard deviations.
@@ -188,16 +188,16 @@ class Moves(Asking):
     def _may_have_stopped_a_copy(self, done: Done, now: float) -> bool:
         """Return whether the stops after a controlled move may have stopped a second run of it.
 
-        The result is False only after a complete move, if no second run can explain what came after
-        it. The server has answered sooner than it can end a motion, and there was no time for a
-        second run to end by itself.
+        The result is False if the driver has sent no stop after the move. It is also False after a
+        complete move if there was no time for a second run: the server has answered the stop sooner
+        than it can end a motion, and a second run could not have ended by itself before.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s
         return done.stopped_again and not (done.completed and no_time)
 
     def _stop_contradicted(self, done: Done) -> None:
-        """Discard the goal after a turn of which the right wheel shows another angle."""
+        """Discard the goal, because right wheel and server disagree on the angle of a turn."""
         self.odometry.doubt_turn(done.asked - abs(done.turned_rad))
         if self._move is not None:
             self._move.fail()

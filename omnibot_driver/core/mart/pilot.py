@@ -47,10 +47,10 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
-"""Longest time in s between two voltage queries (VOLTS) that unanswered requests can cause.
+"""Time in s after a voltage query (VOLTS) from which unanswered requests do not delay the next one.
 
 VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
-the driver delays VOLTS.
+the driver delays VOLTS after such a request.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.
@@ -227,7 +227,8 @@ class Pilot(Hearing):
     def _suspects_copy(self) -> bool:
         """Whether the server may be executing a duplicate of the last controlled move.
 
-        It does not answer during a move, so a reply that came after the move would exclude this.
+        The server does not answer during a move. So a reply that came after the last move shows
+        that no duplicate of this move is running.
         """
         counted = self.odometry.wheel.from_s >= self._rested_s
         return self._moved_last and not counted and not self._port_is_free
@@ -250,8 +251,8 @@ class Pilot(Hearing):
     def _may_ask_volts(self, now: float) -> bool:
         """Return whether the query of the battery voltage (VOLTS) may be sent now.
 
-        VOLTS crashes a server that is starting up. So it also waits after an unanswered request,
-        because the server may have been restarted.
+        VOLTS crashes a server that is starting up. So the driver does not send VOLTS soon after an
+        unanswered request, because the server may have been restarted.
         """
         quiet_s = min(
             self.conversation.missed_s + STARTS_UP_S, self._polls.asked_s(words.VOLTS) + VOLTS_S

@@ -33,7 +33,7 @@ PERIODS: Final[Mapping[State, Mapping[Word, float]]] = {
 }
 """Period in s of each query, by state, the most urgent query first.
 
-In the other states the command port is busy: no queries are sent.
+In states that are not listed here, the command port is busy: no queries are sent.
 """
 SONARS, SONARS_APART_S = (SFC, SRC), 0.4
 """The two sonars, and the least time in s between their queries.
@@ -84,7 +84,8 @@ class Polls:
     def missed(self, word: Word) -> None:
         """Make a query without an answer due at once.
 
-        If its repetition has no answer either, it waits for its turn, so that the others are sent.
+        If the repeated query has no answer either, it waits for its turn, so that the other queries
+        are sent.
         """
         if word not in self._repeated:
             self._repeated.add(word)

@@ -138,8 +138,8 @@ class Reckoning(CorrectedPose):
     def rest(self, longest: float = math.inf) -> float:
         """End the motion, after the distance that the robot coasted was measured too.
 
-        Return by how much the server's angle of a turn on the spot is smaller than the wheel's, in
-        rad, if this is implausible; else 0.
+        After a turn on the spot, the server may have reported an implausible angle. In this case,
+        return the wheel's angle minus the server's angle, in rad. Otherwise return 0.
 
         ``longest``: longest possible distance of a straight move in m, or turn in rad.
         """
@@ -165,7 +165,10 @@ class Reckoning(CorrectedPose):
         return wrong_rad
 
     def _doubt_unread_turn(self) -> None:
-        """Add the error of the turn since the last heading of a drive, if rest ends it unread."""
+        """Add the error of the turn since the last heading of a forward drive (RM).
+
+        Called at the end of a drive if no heading was read after the robot was stopped.
+        """
         unread_s = max(0.0, self._stood_s + ROLLS_S - max(self.heading.told_s, self._began_s))
         most_rad = min(math.pi, MOST_RADPS * unread_s)
         turn_rad = min(

@@ -41,7 +41,7 @@ class RelativeHeading:
 
     ``told_s``: time of the last accepted heading.
 
-    ``from_s``: earliest possible time of the last heading that is certainly a reply to RMRA.
+    ``from_s``: earliest possible time of the last heading that certainly answers its query, RMRA.
 
     ``changed_s``: time of the last change of heading.
 

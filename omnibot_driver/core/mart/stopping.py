@@ -175,8 +175,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop, or None.
 
-        None if at most as many doubtful replies came as earlier replies were missing. Otherwise the
-        result is the last reply with a plausible value.
+        Each missing reply to an earlier request may explain one doubtful reply. If this explains
+        all doubtful replies, the result is None. Otherwise it is the last doubtful reply, if
+        possible one with a plausible value.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -143,8 +143,8 @@ class Stops(Ground, ABC):
     def _halt(self, now: float, why: str = "", *, arrived: bool = False) -> None:
         """Begin to stop any motion in progress.
 
-        ``why``: the fault, for a notice to the user; empty without a fault. The notice discards the
-        command, unless the direction of the motion is already refused.
+        ``why``: the fault, for a notice to the user; empty without a fault. A fault also discards
+        the command, unless the direction of the motion is already refused.
 
         ``arrived``: whether the server has certainly received the start command.
         """

@@ -87,8 +87,8 @@ class SwitchOff:
     def missed(self, word: Word) -> bool:
         """Record that MCS or MSM was not answered; return whether the driver gives MCS up.
 
-        After MOST_MISSES of them, the driver starts motions again. If MCS is in progress
-        nevertheless, the server refuses the next motion, and MSM follows.
+        After MOST_MISSES unanswered requests in a row, the driver starts motions again. If MCS is
+        still in progress, the server refuses the next motion, and the driver then sends MSM.
         """
         self._misses += 1
         if self._misses < MOST_MISSES:

@@ -48,10 +48,10 @@ class WheelCount:
     ``last``: last accepted count. ``told_s``, ``from_s``: its most probable and its earliest
     possible time.
 
-    ``certain``: whether the last reply is certainly the reply to ENC.
+    ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last count, if it equals the one before the start, so that the start may be lost;
-    else 0.
+    ``maybe``: the last count, if it equals the count before the start command. This command may
+    then be lost. Otherwise 0.
     """
 
     def __init__(self) -> None:
@@ -78,11 +78,11 @@ class WheelCount:
         self._confirmed = True
 
     def refused(self) -> bool:
-        """Record that the server knows of no motion; return whether it was restarted since then.
+        """Record that the server knows of no motion; return whether the server was restarted.
 
-        Ignored if the server has acknowledged the motion. If its counts have come, they are in the
-        pose already, so the server was restarted. Otherwise the motion did not begin, and the count
-        continues from its last value.
+        Ignored if the server has acknowledged the motion. If counts of the motion have come, the
+        motion has begun, so the server was restarted. These counts are in the pose already.
+        Otherwise the motion did not begin, and the count continues from its last value.
         """
         if self._confirmed:
             return False
