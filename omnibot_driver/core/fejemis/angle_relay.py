@@ -20,9 +20,9 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Largest tolerated wrong angle to the left, in degrees, that a board may read instead of an angle
-to the right, after damage that the checksum does not detect. A text that could become a larger one
-is avoided."""
+"""Limit in degrees. A text for an angle to the right may be damaged so that the checksum does not
+detect this. A board may then read an angle to the left. The driver avoids a text with which this
+wrong angle could reach the limit."""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

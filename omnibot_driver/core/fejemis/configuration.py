@@ -149,7 +149,7 @@ class Configuration:
         """Track B and wheelbase F in m, as the board uses them.
 
         If the board has not reported them, they are the user's values, or None if the user has set
-        none. If both are equal except for rounding, the user's values are returned.
+        none. If the board's values equal the user's except for rounding, the user's are returned.
         """
         told, wanted = self.told.get("confs"), self.written.get(Written.STEERING)
         if wanted and (told is None or _near(told, wanted) or _near(told[::-1], wanted)):

@@ -2,8 +2,8 @@
 
 """Checks that the front wheel follows its commanded angle, and refuses motion if it does not.
 
-After a first fault, motion is refused until the wheel moves; after a second within 60 s, until
-~/start.
+After a first fault, motion is refused until the wheel moves. After a second fault within 60 s,
+motion is refused until the user calls ~/start.
 
 The module knows angles and times; it does not know lines or speeds.
 """
@@ -12,7 +12,7 @@ import math
 from typing import Final
 
 FOLLOWS_WITHIN_S: Final = 1.0
-"""Longest time in s for which the front wheel may come no nearer to its commanded angle."""
+"""If the front wheel comes no nearer to its commanded angle for this time in s, it has a fault."""
 NEARER_RAD: Final = math.radians(1.0)
 FOLLOWS_RAD: Final = math.radians(12.0)
 """Tolerated deviation of the front wheel from its commanded angle, in rad, while the robot drives.

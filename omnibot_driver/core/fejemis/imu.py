@@ -20,10 +20,10 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Interval between two arrivals, in periods. If two samples arrive farther apart, and both are late
-by about a period or more, a sample before them was lost.
+"""Interval between two arrivals, in periods, that shows why two successive samples are both late.
 
-If none was lost, they are late because they waited for a stalled host, and so arrive together.
+If both are late by about a period or more, and arrive farther apart than this, a sample before them
+was lost. If they arrive closer together, no sample was lost: both have waited for a stalled host.
 """
 CYCLE_S: Final = 0.0015
 """Longest assumed time in s in which the board sends all lines of one control cycle."""

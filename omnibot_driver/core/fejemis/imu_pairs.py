@@ -24,8 +24,8 @@ PERIOD_S: Final = 0.01
 # One kind remains undetected: both lines are late, but close together, and no later pose is in the
 # read.
 PAIR_WITHIN_S: Final = 0.005
-"""Time in s between the two lines of a pair from which on the pair must wait for the next pose,
-because it may be false."""
+"""If the second line of a pair arrives this time in s or more after the first line, the pair may be
+false. It must then wait for the next pose."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """``KNOWN_S``: difference in s that shows which line of a sample comes first. It is the sum of the
@@ -36,7 +36,7 @@ MARKED_S: Final = PERIOD_S
 arrives in this pause. Such a pause is probably between two samples."""
 PATIENCE: Final = 60
 """After this many pauses, it is decided which line of a sample comes first, even if the difference
-is below ``KNOWN_S``. It stays small if the two lines are half a period apart."""
+is below ``KNOWN_S``. The difference stays small if the two lines are half a period apart."""
 MOST: Final = 10
 """Largest magnitude of a counter that shows whether lines of another kind usually come between
 pairs (positive) or within pairs (negative). Each kind has its own counter."""
@@ -53,7 +53,7 @@ class Pair:
 
     ``pose_s``: the board's time of the last pose before the pair.
 
-    ``skipped``: how many incomplete samples were left out since the pair before.
+    ``skipped``: how many incomplete samples were left out since the previous pair.
 
     ``doubtful``: whether the pair may be false, and so must wait for the next pose.
     """
@@ -112,8 +112,8 @@ class ImuPairs:
     def other(self, kind: str) -> None:
         """Receive a line that is neither a gyro nor an acceleration line; ``kind``: its keyword.
 
-        A line may be waiting for the second line of its pair. Unless this ``kind`` usually comes
-        within pairs, the second line is regarded as lost.
+        If the first line of a pair has arrived, but not the second, the second is regarded as lost.
+        The exception is a ``kind`` that usually comes within pairs.
         """
         self._between.add(kind)
         if self._waiting is not None and self._outside.get(kind, 0) >= 0:

@@ -27,8 +27,8 @@ ANGLE_COST: Final = 1e4
 """Cost of a line that sets the front wheel to an angle 1 rad away from the commanded angle. For
 comparison: a speed that is wrong by a factor of 2.7 (e) costs 1."""
 SLOWEST: Final = 30.0
-"""Largest ratio of the outer wheel's speed to the linear speed that is written in the drive board's
-line. Smaller linear speeds are not tried, except 0 for a drive that is not backward."""
+"""The linear speed in the drive board's line is at least the outer wheel's speed divided by this
+number. Smaller linear speeds are not tried, except 0 for a drive that is not backward."""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """

@@ -26,7 +26,7 @@ def numerals(*, negative: bool) -> tuple[list[float], list[str]]:
     """Return all numbers that can be sent safely, in rising order, and the text of each number.
 
     ``negative``: whether the line has a minus sign. Its numbers must then not contain ``6``,
-    because the checksum would not detect the loss of both characters.
+    because the checksum does not detect the loss of a ``-`` together with a ``6``.
     """
     # Each motion line contains a ``2``, so no ``1``; it can contain ``0`` and ``.``, so no ``3`` or
     # ``5``.

@@ -15,8 +15,8 @@ from omnibot_driver.core.geometry.se2 import Pose, log_of, roll
 from omnibot_driver.core.readings import DisplacementReading, PoseReading
 
 DRAWN: Final = 0.25
-"""Fraction of the difference between a pose and the wheels' motion that one displacement corrects,
-if rounding of the pose explains the difference."""
+"""If rounding of the pose can explain the difference between a pose and the wheels' motion, one
+displacement corrects this fraction of the difference."""
 ROUNDINGS: Final = 1.5
 """Largest difference that rounding of the poses explains, in units of their last digit. Each of two
 poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
@@ -34,8 +34,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""How many rejected poses in a row show that the board has begun a new coordinate frame, if each
-agrees with the pose before it."""
+"""If this number of poses in a row are rejected, but each agrees with the pose before it, the board
+has begun a new coordinate frame."""
 
 
 class PoseOdometry:

@@ -45,7 +45,7 @@ def harmless(text: str) -> bool:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum of this text detects the loss of two characters at two places.
+    """Return whether the checksum of this text detects the loss of two characters of these kinds.
 
     One character is a line end or a digit of the checksum. The other is ``;`` or part of a number.
     """

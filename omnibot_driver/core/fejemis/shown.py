@@ -12,8 +12,8 @@ from omnibot_driver.core.fejemis.translation import Translation
 from omnibot_driver.core.fejemis.upkeep import Upkeep
 
 SHOWN: Final = 3
-"""Diagnostics show lines from the driver that the firmware does not know: at most this many, the
-latest ones."""
+"""Largest number of lines that the diagnostics show: the latest lines from the driver that the
+firmware does not know."""
 SUMS: Final = {True: "on", False: "off", None: "unknown"}
 
 

@@ -28,8 +28,8 @@ times in a row. They must arrive over at least ``AGAIN_AFTER_S``, in s. Since th
 board time and arrival time must have advanced equally, within ``AGREE_S``, in s."""
 EARLIES_WITHIN_S: Final = 1.0
 """Time in s. If three lines (``AGAIN``) within this time seem to arrive early, the clock began with
-a late line, so it begins again. Other lines may come between the three, because they may be late as
-well, and so seem right."""
+a late line, and must begin again. The three lines need not come in a row: a line between them may
+seem right, because it is late too."""
 SMALLEST_STEP_S: Final = 1e-6
 """Smallest step in s between two timestamps of one kind of reading.
 
@@ -143,8 +143,8 @@ class StampedReadings:
     """The readings that one call of the board returns, with their timestamps.
 
     The class is a ``ReadingClock``, the interface that gives readings their timestamps. Timestamps
-    of one kind of reading increase by ``SMALLEST_STEP_S`` at least. They are later than the call
-    only if this step requires it.
+    of one kind of reading increase by ``SMALLEST_STEP_S`` at least. A timestamp is later than the
+    time of the call only if this step requires it.
     """
 
     skew_ppm = 0.0
@@ -179,7 +179,7 @@ class StampedReadings:
     ) -> list[float]:
         """Return the timestamps of the added readings.
 
-        If ``readings`` are not as many as were added, return ``now`` for each of them.
+        If the number of ``readings`` is not that of the added ones, return ``now`` for each.
         """
         return self._stamps if len(self._stamps) == len(readings) else [now] * len(readings)
 

@@ -22,7 +22,7 @@ UNHEARD_S: Final = 3.0
 """Silence in s after which the user is notified that the board at an opened port is missing."""
 UNREAD_S: Final = 0.03
 """If no line of either board was read for this time in s, missing data is not blamed on one board.
-Each board sends every 15 ms or more often, so the driver reads late, or both are cut off."""
+Each board sends at least every 15 ms. So the driver has read late, or both boards are cut off."""
 UNREAD: Final = (
     "the driver has read nothing from either board for a moment; reduce the load of the computer,"
     " or check the USB hub"
@@ -83,7 +83,7 @@ class Watch:
 
     @property
     def front_unheard_at(self) -> float:
-        """Time in s at which brush and lift must be off, unless a front angle arrives before."""
+        """Time in s at which brush and lift must be off, unless a front angle arrives earlier."""
         front = self._ports.half("front")
         return -math.inf if front is None else front.came_at("fwl") + NO_ANGLE_S + SLACK_S
 
