@@ -38,7 +38,7 @@ class BoardKind:
         self._lone_ticks, self._uncounted_m = 0, 0.0
 
     def took_ticks(self, counts: tuple[int, int]) -> None:
-        """Record a tick report. ``counts``: new ticks of each wheel since the report before."""
+        """Record a tick report. ``counts``: new ticks of each wheel since the last report."""
         self._lone_ticks += 1
         if min(counts) < 0:
             self._motion.signed = self._seen_signed = True
@@ -61,7 +61,7 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        It does if the board's odometry shows a wheel that rolls backward, and no count decreases.
+        The board does so if its odometry shows a wheel that rolls backward, and no count decreases.
 
         ``told``: changes in the board's odometry since its last report, None if unknown.
         """

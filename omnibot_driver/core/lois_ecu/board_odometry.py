@@ -38,7 +38,7 @@ class Told:
 
 
 class OdometryReader:
-    """Comparison of each odometry report with the one before.
+    """Comparison of each odometry report with the previous one.
 
     ``rpm_mps``: speed of a wheel's rim at 1 RPM, in m/s.
     """

@@ -64,8 +64,8 @@ SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
 speed. It is added to the effect of ``SWINGING_M``."""
 LATE_PART: Final = 0.6
-"""Standard deviation of the error that a late report causes in a wheel's distance without counted
-ticks, as a fraction of what the wheel rolls in the delay."""
+"""A late report causes an error in a wheel's distance without counted ticks. This is the standard
+deviation of the error, as a fraction of the distance that the wheel rolls in the delay."""
 EQUAL_RPM: Final = 3.0
 """Standard deviation, in RPM, of the true difference of two wheel speeds if the board's odometry
 shows that they are equal."""
@@ -97,8 +97,8 @@ class Comparison:
     def unforeseen(self, index: int, ticks: int, late_s: float) -> tuple[float, bool]:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
-        Also return whether it is too large for an error of the filter. The difference is 0 while
-        the board does not count. The filter is not corrected.
+        Also return whether the difference is too large for an error of the filter. The difference
+        is 0 while the board does not count. The filter is not corrected.
 
         ``ticks``: reported ticks since the last report.
 

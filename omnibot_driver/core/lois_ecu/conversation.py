@@ -170,9 +170,9 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the robot is at rest after a Stop. None if the ticks do not show it.
+        """Return whether the robot is at rest after a Stop. None if the ticks do not show this.
 
-        They do not show it if they are old, and after a backward command or RPM 0/0.
+        This is so if the ticks are old, and after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -217,7 +217,8 @@ class LoisConversation:
         """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
 
         Called at the time ``wake_at``. ``proved``: whether displacements have proved that the
-        robot stands still. A terminal mode begins after this proof, because none arrive in it.
+        robot stands still. A terminal mode begins after this proof, because no displacements
+        arrive in a terminal mode.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal

@@ -38,10 +38,10 @@ QUIET_S: Final = 0.05
 sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group. It is this fraction of the time from the marker line of the group
-before to that of the group.
+"""Longest pause within a group, as a fraction of the time between two marker lines: that of this
+group, and that of the previous group with the same command byte.
 
-The pause is at least ``QUIET_S`` and at most ``LATE_S``.
+The longest pause is at least ``QUIET_S`` and at most ``LATE_S``.
 """
 
 # Lines after the marker. The public firmware sends odometry (6 lines) with the command byte of the

@@ -56,8 +56,8 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. Reports that were read together with
-        its ticks may still show the motion before it."""
+        """Whether no time has passed since the last estimate. If so, a report may still show motion
+        from before the estimate, because it was read together with the ticks of the estimate."""
         self._may_roll_mps = [0.0, 0.0]
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -150,9 +150,9 @@ class LoisOdometry:
     def only_a_restart_explains(self, ticks: Ticks, now: float, late_s: float) -> bool:
         """Return whether only a restart of the board explains that the counts are near zero.
 
-        This is the case if they differ from the prediction by more than the wheels can have rolled.
-        A robot at rest is an exception, because a push may have changed its counts. If it has
-        restarted, its counts are at most 1. Larger counts do not show a restart.
+        This is so if the counts differ from the prediction by more than the wheels can have rolled.
+        For a robot at rest, the counts must also be at most 1, as after a restart. Larger counts
+        may come from a push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """

@@ -73,8 +73,8 @@ class ReportedSpeed:
     def come_to_rest(self) -> None:
         """Record that the wheel is at rest, and subtract the distance added since it stopped.
 
-        It is assumed at rest since its reported speed last changed, or since a later command to
-        start, which it did not obey.
+        The wheel is assumed to be at rest since its reported speed last changed, or since a later
+        command to start that the wheel did not obey.
         """
         motion, wheel, tick_m = self._motion, self._wheel, self._motion.tick_m
         if wheel.rests:

@@ -3,7 +3,7 @@
 """Probability that a wheel is at rest while the board keeps reporting the same speed for it.
 
 When a wheel stops, the public firmware keeps reporting the last speed that it measured. This speed
-is usually between 5 and 17 RPM, and lower than the reported speed before.
+is usually between 5 and 17 RPM, and lower than the speed that was reported before it.
 
 This module works on reported speeds and the time between them.
 """
@@ -43,7 +43,7 @@ values were counted on the public firmware:
 ``NEAR``: after a smaller fall.
 
 ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. These values were
-not counted, but assumed. Such a speed is wrong if the board noticed the last tick but one late.
+not counted, but assumed. Such a speed is wrong if the board noticed the second-to-last tick late.
 
 ``TUNED``: after any fall, if the user set the gains.
 """

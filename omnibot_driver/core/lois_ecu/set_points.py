@@ -74,7 +74,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` put RPM 0/0 before the next set-points again, as after a Stop."""
+        """Make ``wheels`` return RPM 0/0 before the next set-points, as it does after a Stop."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

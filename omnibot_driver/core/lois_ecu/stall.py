@@ -57,7 +57,7 @@ class StallWatch:
         self._pose: tuple[float, float, float] | None = None
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
-        """Record a set-point. A duty bypasses the speed controller, so no wheel stalls by it."""
+        """Record a set-point. A wheel with a duty is never regarded as stalled."""
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]

@@ -52,9 +52,9 @@ the wheels may have rolled back to them."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels are assumed to have rolled back, if the unit of the board's
-clock is unknown again. Without the unit, the clock cannot confirm the time since the last tick
-report."""
+"""Longest time in s for which wheels are assumed to have rolled back since the last tick report, if
+the unit of the board's clock was known, but is not known any more. Without the unit, the clock
+cannot confirm how long ago that report came."""
 
 
 class Translation:
@@ -190,8 +190,8 @@ class Translation:
     def _age_s(self, ticks: Ticks, duration_s: float) -> float | None:
         """Return how long ago the board's clock began at zero, in s. None if unknown.
 
-        The clock begins at zero when the board starts. A clock in ns also does every 4.3 s, so the
-        age is known only if the clock began after the last tick report.
+        The clock begins at zero when the board starts. A clock in ns also begins at zero every
+        4.3 s, so its age is known only if the clock began after the last tick report.
 
         ``duration_s``: time since that report.
         """
