@@ -5,8 +5,8 @@
 A cost is about -ln(probability). Unusual content costs less than damage, so the frames of a real
 shock are accepted.
 
-This module knows what boards send and lines damage; it does not know the search (``trellis``) or
-the acceptance (``decoder``).
+This module knows what boards send, and how lines damage it; it does not know the search
+(``trellis``) or the acceptance (``decoder``).
 """
 
 from math import ceil, floor
@@ -37,7 +37,7 @@ HEADER_BYTE: Final = 7.5
 """Cost of a frame that lost one of its two header bytes."""
 HEADER_IN_PLACE: Final = 4.0
 """Extra cost of a frame that seems to have gained bytes, if another header begins where the frame
-would end without them."""
+would end without the gained bytes."""
 BAD_RUN: Final = 6.0
 """Cost of beginning a run of unexplained bytes (a bad run).
 
@@ -80,7 +80,7 @@ frame."""
 # Content that the board sends. A true IMU frame costs 6.5 at most, a delta or a
 # pose 4.5.
 LEAPS: Final[tuple[float, ...]] = (0.0, 3.0, 3.5, 4.0, 4.0, 4.0, 4.0)
-"""Cost of an IMU frame. Index: number of its words that differ much from the frame before.
+"""Cost of an IMU frame. Index: number of its words that differ much from the previous frame.
 
 A single word is most likely damaged. A shock changes several words, so more words add little.
 """
@@ -108,8 +108,8 @@ At 25 Hz, four IMU frames and five deltas are expected.
 """
 
 CONTRADICTED: Final = 1.5
-"""Cost of a pose that contradicts the deltas: its heading has changed by another angle than the sum
-of their turns."""
+"""Cost of a pose that contradicts the deltas: the change of its heading is not the sum of the turns
+in the deltas."""
 
 IMU_HEADER_WORD: Final = -6
 """The IMU header FF FA, read as a signed word."""
@@ -144,7 +144,7 @@ class Context(NamedTuple):
     deltas: int = 0
     """Number of deltas since the last pose."""
     shaken: bool = False
-    """Whether the last IMU frame had an unusual norm, or differed much from the frame before."""
+    """Whether the last IMU frame had an unusual norm, or differed much from the one before it."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
@@ -276,7 +276,7 @@ def may_be_lent(frame: Frame, before: Context) -> bool:
     """Return whether the frame's last byte may be the first byte of the next header instead.
 
     The byte must occur in headers. If it is not FF and ends an IMU frame, the last word must also
-    differ from that of the IMU frame before.
+    differ from that of the previous IMU frame.
     """
     if isinstance(frame, ImuFrame):
         lent = frame.gyro[2] & 0xFF in LENT

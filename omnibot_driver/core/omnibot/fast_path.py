@@ -57,7 +57,7 @@ class Walk:
 
     * ``ends``: the position in the bytes after each frame.
     * ``lessons``: IMU frames from which the usual scatter is learned. Each entry: number of frames
-      before it, the frame, and the IMU frame before.
+      before the IMU frame, the IMU frame itself, and the previous IMU frame.
     * ``known``: what was known at some places. Each entry: number of frames before the place, and
       the fields of ``Context`` there.
     """

@@ -49,7 +49,8 @@ class InterFrameGaps:
     * ``byte_s``: time in s that the line takes for a byte.
     * ``sharp``: whether the first byte after a pause normally begins a frame.
     * ``between``: whether a frame normally begins somewhere in the read after a pause.
-    * ``certain``: whether enough pauses have confirmed both, so that further ones are not counted.
+    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. Further pauses
+      are then not counted.
     * ``at_pace``: whether the line was not idle before the last read's bytes.
     * ``collected``: whether an adapter collected the last read's bytes for more than a tick.
     """
@@ -69,7 +70,7 @@ class InterFrameGaps:
     def read(self, pause_s: float, arrived: int, place: int, now: float) -> None:
         """Record a read of ``arrived`` bytes, and the pause before it if the line was idle.
 
-        ``pause_s``: time in s since the read before. ``place``: position of the first new byte
+        ``pause_s``: time in s since the previous read. ``place``: position of the first new byte
         among the bytes held. ``now``: time of the read in s.
         """
         idle_s = pause_s - arrived * self._byte_s
@@ -94,7 +95,7 @@ class InterFrameGaps:
         """Learn from a read of complete frames that this line pauses between frames.
 
         Nothing is learned if the line was not idle before the read. ``pause_s``: time in s since
-        the read before. ``arrived``: number of bytes in the read.
+        the previous read. ``arrived``: number of bytes in the read.
         """
         if self.stands_out(pause_s, arrived):
             self._trust(sharp=True, between=True)
@@ -102,7 +103,7 @@ class InterFrameGaps:
     def stands_out(self, pause_s: float, arrived: int) -> bool:
         """Return whether the line was idle for longer than ``GAP_S`` before these bytes.
 
-        ``pause_s``: time since the read before. ``arrived``: number of bytes.
+        ``pause_s``: time since the previous read. ``arrived``: number of bytes.
         """
         return pause_s - arrived * self._byte_s > GAP_S
 

@@ -45,8 +45,8 @@ PUNCTUAL_S: Final = 1e-3
 """The delays of two punctual reads differ by at most this time, in s, even with a USB adapter."""
 PACE_S: Final = 2e-4
 """Tolerance in s when the time in which bytes arrived is compared with the time that the line needs
-for them. Within it, the bytes arrived at the pace of the line, so they had not waited to be
-read."""
+for them. If the two times differ by less, the bytes arrived at the pace of the line, so they had
+not waited to be read."""
 FEW_BYTES: Final = 2
 """The pace at which bytes arrive can be measured only with more bytes than this."""
 TICKS_TO_PROVE: Final = 2

@@ -2,7 +2,7 @@
 
 """A lower bound for the cost of interpreting the remaining bytes, found from headers alone.
 
-The headers show how many frames at least are damaged.
+The headers show the least number of damaged frames.
 
 Input: bytes; output: for each place, the least possible cost of the bytes after it. This module
 does not know the search (``trellis``), which uses the bound.

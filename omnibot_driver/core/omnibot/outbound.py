@@ -26,15 +26,15 @@ MAX_WORD: Final = 32767
 ZEROS: Final = bytes(8)
 """Zeros before Stop, the emergency stop or a letter.
 
-If the frame before lost its end, seven zeros complete it. One more is sent, because one may be
-lost. Three zeros wake a board.
+If the previous frame lost its end, seven zeros complete it. An eighth zero is sent, because one may
+be lost. Three zeros wake a board.
 """
 # Send no zeros after a motion frame: they would complete a damaged frame at once, even in a parser
 # that discards incomplete frames after a pause.
 ZEROS_BEFORE_MOTION: Final = bytes(4)
 """Zeros before a motion frame.
 
-If the frame before lost its end, the zeros may complete it as a wrong command. They are few, so
+If the previous frame lost its end, the zeros may complete it as a wrong command. They are few, so
 that the motion frame soon replaces this command.
 """
 

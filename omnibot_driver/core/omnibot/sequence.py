@@ -149,7 +149,7 @@ class Sequence:
         return Step(missing)
 
     def _take_back(self, count: int, now: float) -> None:
-        """Withdraw a supposed restart if ``count`` continues the counter from before it."""
+        """Withdraw a supposed restart if ``count`` continues the earlier count, not the new one."""
         left, self._left = self._left, None
         if left is not None:
             was, at, anew = left

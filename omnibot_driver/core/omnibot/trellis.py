@@ -108,7 +108,7 @@ def read(
 ) -> list[Segment]:
     """Return the complete frames of the best interpretation of ``data``.
 
-    ``in_step``: an accepted frame ended right before. ``closed``: no more bytes follow.
+    ``in_step``: an accepted frame ended right before ``data``. ``closed``: no more bytes follow.
     """
     search = _Search(data, context, expectation, pauses, pose_byte_order)
     search.run(in_step, closed)
@@ -141,7 +141,8 @@ class _Search:
     def run(self, in_step: bool, closed: bool) -> None:
         """Find the best interpretation, and all others that cost at most ``SURE`` more.
 
-        ``in_step``: an accepted frame ended right before. ``closed``: no more bytes follow.
+        ``in_step``: an accepted frame ended right before the bytes. ``closed``: no more bytes
+        follow.
         """
         self._least = [0.0] * (self._end + 1) if closed else least_costs(self._data)
         step = STEP
