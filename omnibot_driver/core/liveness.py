@@ -33,8 +33,8 @@ class Liveness:
     def stalled(self, now: float) -> None:
         """Count the board's silence from ``now`` on, because this process has stalled until now.
 
-        During the stall it could not receive, so the board may have sent data. A silence that was
-        reported before the stall is not reported again.
+        During the stall, the driver could not receive, so the board may have sent data. A silence
+        that was reported before the stall is not reported again.
         """
         if self._silent_since == self.heard_at:
             self._silent_since = now

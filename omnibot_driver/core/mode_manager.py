@@ -32,7 +32,7 @@ IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command or a notice of a paused board takes to arrive.
 
 A notice that comes within this time after a command may be older than the command, so it proves
-nothing. The same holds for a notice that data follows within this time.
+nothing. A notice also proves nothing if data arrive within this time after the notice.
 """
 LAST_STOPS: Final = 3
 """Number of copies of Stop sent at once before the port is closed, because one can be lost."""
@@ -186,7 +186,7 @@ class ModeManager:
 
     @property
     def at_rest(self) -> bool:
-        """Whether further data from a running board has no effect here: no request is open."""
+        """Whether no request is open, so that data from a running board has no effect here."""
         return self.phase is SETTLED and self._request is None and self._wanted is not PAUSED
 
     def heard_data(self, now: float) -> None:

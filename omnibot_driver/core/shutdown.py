@@ -40,7 +40,7 @@ class Shutdown:
 
     @property
     def owed(self) -> bool:
-        """Whether motion was commanded, and a proof that the robot then stopped is missing."""
+        """Whether motion was commanded, and no proof of a stop has come since then."""
         return self._policy.proof.owed
 
     @property

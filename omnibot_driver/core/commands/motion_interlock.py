@@ -54,8 +54,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        On a board without ~/start, this ends the refusal after a second stop within 60 s. A refusal
-        after a first stop stays, and so does one that only ~/start can end.
+        On a board without ~/start, this ends a refusal whose cause was a second stop within 60 s. A
+        refusal whose cause was a first stop stays, and so does one that only ~/start can end.
         """
         if self.until is Until.ESTOP:
             self.start()

@@ -17,8 +17,8 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.05
-"""Shortest time for which Stop is repeated, in s: 1 s from the first Stop to the last, and the
-longest time between two of them."""
+"""Shortest time for which Stop is repeated, in s. It is the sum of 1 s, from the first Stop to the
+last, and the longest time between two Stops."""
 UNPROVED_S: Final = 5.0
 """Longest time, in s, for which Stop is repeated without proof that the robot stands still."""
 ROUNDING_S: Final = 1e-6

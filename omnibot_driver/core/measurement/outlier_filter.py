@@ -29,8 +29,8 @@ Stamped = tuple[Reading, float]
 """A reading and its time in s."""
 
 OUT_OF_PROPORTION: Final = 3.0
-"""A change between two readings can be a spike only if it is more than this many times as large as
-the largest recent change."""
+"""A change between two readings can be a spike only if it is larger than the largest recent change
+times this factor."""
 CALMING: Final = 0.95
 """Factor by which the stored largest recent change shrinks with each reading. After 20 readings, a
 third of it is left."""
@@ -38,8 +38,8 @@ STILL: Final = 0.08
 """An implausible change of the IMU's readings was a spike only if at most this fraction of the
 change remains in the next reading.
 
-The change counts as one of a single value only if every other value changes by at most this
-fraction of it.
+It is regarded as the change of a single value only if every other value changes by at most this
+fraction of that change.
 """
 END_OF_SCALE: Final = 0.99996
 """Smallest fraction of the accelerometer's full scale that is regarded as the end of the scale. The
@@ -56,7 +56,7 @@ change remains in the next displacement."""
 class MotionLimits:
     """Limits that the robot cannot exceed, even when it is pushed by hand.
 
-    * ``force_step_mps2``: change of an acceleration between two readings, in m/s², up to which it
+    * ``force_step_mps2``: limit in m/s². A smaller change of an acceleration between two readings
       is never a spike.
     * ``full_scale_mps2``: full scale of the accelerometer, in m/s²; infinite if its readings are
       not integers.
@@ -200,7 +200,7 @@ class OutlierFilter:
         self._time_unknown |= reading.duration_s is None
 
     def _told_of_losses(self, reading: Reading) -> Reading:
-        """Return the reading. To the ``lost`` of a pose, add the number of rejected displacements.
+        """Return the reading; in a pose, ``lost`` also counts the rejected displacements.
 
         The pose includes the motion of these displacements, so it replaces them.
         """
@@ -229,7 +229,7 @@ class _Spikes:
 
     * ``left``: largest fraction of a spike that remains in the next reading.
     * ``knocked``: number of values at the beginning of the list that may leap when the robot is
-      knocked. A leap of these may be a spike only if one flipped bit explains it.
+      knocked. A leap of such a value may be a spike only if one flipped bit explains the leap.
     """
 
     def __init__(self, left: float, *, knocked: int) -> None:
@@ -246,7 +246,7 @@ class _Spikes:
     def judge(
         self, values: Sequence[float], periods: int = 1, topmost_bit: float = 0.0
     ) -> tuple[bool, bool]:
-        """Return whether the previous values were a spike, and whether these change implausibly.
+        """Return whether the previous values were a spike, and whether the new ones leap.
 
         ``periods``: number of sampling periods since the previous values.
 
@@ -283,8 +283,8 @@ class _Spikes:
         """Return whether one flipped bit can explain the step of a value.
 
         The step may differ from the bit by the recent variation of the readings. ``value``:
-        magnitude after the step. If it is at the end of the scale, the result is False, because a
-        knock can cause it.
+        magnitude after the step. At the end of the scale, the result is False, because a knock can
+        cause such a value.
         """
         if topmost == inf:  # the readings are not integers
             return False

@@ -53,7 +53,7 @@ class MeasurementPipeline:
             settings.motion, period_s or 0.0, corrected=board.traits.own_odometry
         )
         self._uncounted: list[tuple[Sequence[Reading], float]] = []
-        """Reads that are not counted yet: of each its readings, and the newest one's age in s."""
+        """Reads that are not counted yet: for each, its readings and the newest one's age in s."""
         self.undigested: list[Stamped] = []
         """Stamped readings that wait for ``flush``."""
 

@@ -24,7 +24,8 @@ class StreamStatistics:
     Only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
 
     * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by it, shows
-      how many IMU readings the board has sent. None if lost IMU readings are not counted so.
+      how many IMU readings the board has sent. None if lost IMU readings are not counted in this
+      way.
     """
 
     imu_period_s: float | None = None

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The following error: how far a robot has moved other than its recent set-points allow.
+"""The following error: how far a robot has moved in a way that its set-points do not allow.
 
-The *envelope* is the set of velocities that these set-points allow (``envelope.py``). The error is
+The *envelope* is the set of velocities that recent set-points allow (``envelope.py``). The error is
 the sum of the motion outside the envelope. A displacement inside the envelope resets the error to
 0. A single damaged displacement or a short jerk cannot reach the limit. This module knows
 velocities in the board's own axes, and times; it does not know which fault an error shows.
@@ -17,7 +17,7 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
 """Time in s that a robot may take to follow a set-point. So a displacement is compared with all
-set-points that held in this time before it, or later.
+set-points that held since this time before its beginning.
 
 A robot that is clearly slower than all these set-points is assumed to be held.
 """

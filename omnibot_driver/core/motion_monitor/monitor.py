@@ -230,7 +230,7 @@ class MotionMonitor:
         return Fault.UNCOMMANDED
 
     def _blocked(self, motion: BodyTwist, seconds: float, *, heading_known: bool) -> Fault | None:
-        """Return the fault of a robot that has not moved for 1 s although commanded, else None."""
+        """Return the fault of a robot that has not moved for 1 s despite a command, else None."""
         current = self._history.current
         assert current is not None
         wanted, turning = speed_of(current), current.yaw_rate_radps

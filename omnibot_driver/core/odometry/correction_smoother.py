@@ -62,7 +62,7 @@ class CorrectionSmoother:
     def follow(self, seconds: float) -> None:
         """Move ``pose`` by the part of the correction that is due after ``seconds``.
 
-        ``pose`` moves at most by the rest of the possible motion that ``move`` has not used.
+        ``move`` has used a part of the possible motion. ``pose`` moves at most by the rest.
         """
         wrong = self.wrong
         share = seconds / self._settling_s if self._settling_s > seconds else 1.0

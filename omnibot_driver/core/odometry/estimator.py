@@ -33,7 +33,7 @@ POSE_DUE_S: Final = 0.24
 """Longest time, in s of the board's clock, until the next pose arrives. A pose that has not arrived
 by then is regarded as lost."""
 WELL_KNOWN_RAD: Final = 0.15
-"""Smallest standard deviation of the heading, in rad, at which it counts as unknown. The deviation
+"""Smallest standard deviation, in rad, at which the heading counts as unknown. The deviation
 comes from lost displacements whose motion no pose of the board has shown yet."""
 UNKNOWN_S: Final = 0.5
 """Assumed duration, in s, of unreported motion in a gap of unknown length: a robot rolls to a halt

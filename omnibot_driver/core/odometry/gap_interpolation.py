@@ -15,7 +15,7 @@ from omnibot_driver.core.readings import DisplacementReading
 LONGEST_BRIDGE_S: Final = 2.0
 """Longest time, in s of the board's clock, over which motion is interpolated.
 
-Longer motion in a gap is unlikely: the driver stops a robot that sends no data sooner than this.
+Longer motion in a gap is unlikely: if the board sends no data, the driver stops the robot earlier.
 """
 NO_WAY: Final = Pose()
 

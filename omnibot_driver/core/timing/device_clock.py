@@ -267,8 +267,8 @@ class DeviceClock:
 
         ``latest_s``: latest allowed stamp, in s.
 
-        ``room_s``: step from the last stamp, in s, that leaves room for the stamps of the readings
-        after this one. The smallest step is not larger than this.
+        ``room_s``: upper limit, in s, for the least step from the last stamp. It leaves room for
+        the stamps of the readings after this one.
         """
         assert self._line is not None
         stamp_s = min(self._line.at(tick), latest_s)
