@@ -36,8 +36,7 @@ NAMES: Final = ("odom_linear_scale", "odom_angular_scale")
 COUNT, UNITS = "metres_per_count", "linear_scale"
 """Names of two parameters: m per encoder count, and number of motor units per m/s.
 
-The tool finds the first one. It divides the second one by the same factor by which the first one
-grows.
+The tool finds ``COUNT``. If ``COUNT`` grows by a factor, the tool divides ``UNITS`` by this factor.
 """
 BALANCE, BALANCE_SHOWN, BALANCE_SIGMA = "motor_balance", "Motor balance", 0.01
 """The balance of the two motors, which the driver measures during the drives.

@@ -16,9 +16,10 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s after the beginning of the state "disconnected", if it is the last one in the log.
+"""Time in s from the beginning of the state "disconnected", if this is the last state in the log.
 
-If /diagnostics still shows this state later, the driver still runs. Otherwise it has ended.
+If /diagnostics still shows this state after this time, the driver still runs. Otherwise the driver
+has ended.
 """
 
 
