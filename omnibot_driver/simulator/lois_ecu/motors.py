@@ -87,7 +87,7 @@ class Motor:
 
 
 class Encoder:
-    """An encoder disc, on which short and long levels alternate. A period is one of each.
+    """An encoder disc. Short and long levels alternate; a period is a short and a long level.
 
     ``steps``: edges per turn.
 

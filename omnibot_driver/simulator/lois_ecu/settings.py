@@ -43,7 +43,7 @@ class Quirks:
     limits_rpm: targets are limited to 50 RPM.
     fast_control: the controller runs every 91 ms instead of 200 ms, with the same coefficients.
     slow_timer: a count of 100 µs takes 100.7 µs, so each speed is reported 0.7 % too high.
-    slow_boot: the board does not react for 2 s after power-up, and reads earlier input then.
+    slow_boot: the board does not react for 2 s after power-up. It then reads what came meanwhile.
     """
 
     ticks_of_forward_targets: bool = False

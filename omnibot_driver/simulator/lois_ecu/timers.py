@@ -26,7 +26,7 @@ class Timers:
     def __init__(self) -> None:
         self._timers = {code: Timer(period) for code, period in PERIODS_MS.items()}
         self._none_due_ms = -1
-        """The board's clock up to which no message is due, in ms."""
+        """Time by the board's clock, in ms, until which no message is due."""
 
     def __iter__(self) -> Iterator[int]:
         return iter(self._timers)

@@ -2,7 +2,8 @@
 
 """The protocol as the board encodes and decodes it, from the manual and the public firmware.
 
-``:``, 2 hexadecimal digits of command, 8 of payload, 2 of checksum (XOR of all before), line feed.
+``:``, 2 hexadecimal digits of command, 8 of payload, 2 of checksum (XOR of all characters before
+it), line feed.
 
 This module shares no code with the driver. It does not know what a command means.
 """
