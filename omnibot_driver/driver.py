@@ -21,7 +21,7 @@ from omnibot_driver.output import UnblockedOutput, fill_gaps
 STOPPED_BY: Final = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 LONGEST_END_S: Final = 4.0
 LARGEST_DOMAIN: Final = 232
-"""Largest ROS_DOMAIN_ID of Fast DDS: that of the last UDP ports."""
+"""Largest ROS_DOMAIN_ID of Fast DDS. A larger one would require UDP ports above 65535."""
 USAGE: Final = "give parameters like this: --ros-args -p port:=/dev/ttyUSB0"
 HELP: Final = f"""\
 usage: ros2 run omnibot_driver driver [--ros-args -p NAME:=VALUE ... --params-file FILE]

@@ -265,8 +265,8 @@ def clock_offset(known_ns: int, before_ns: int, wall_ns: int, after_ns: int) -> 
     """Return wall clock minus steady clock, in ns.
 
     ``wall_ns`` was read between the steady times ``before_ns`` and ``after_ns``. ``known_ns`` is
-    the previous result. If these readings allow it, it is returned again, so that the result does
-    not vary with the duration of the readings.
+    the previous result. It is returned again if it agrees with these readings, so that the result
+    does not vary with the duration of the readings.
     """
     return min(max(known_ns, wall_ns - after_ns), wall_ns - before_ns)
 

@@ -106,8 +106,7 @@ class OmniBotDriver(Node):
     def create_service(
         self, kind: type, name: str, callback: Callable[[Any, Any], Any], **options: Any
     ) -> Any:
-        """Create a service. For those of rclpy that set parameters, the driver has its own
-        callbacks."""
+        """Create a service. A service that sets parameters gets the driver's own callback."""
         own = {SetParameters: declaration.set_each, SetParametersAtomically: declaration.set_all}
         if kind in own:
             callback = partial(own[kind], self)

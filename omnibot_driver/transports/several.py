@@ -174,8 +174,8 @@ class Several:
     def _open_missing(self) -> None:
         """Open the missing lines whose retry is due.
 
-        The port of a missing line may still be open, for example if the line is blocked. It is
-        closed before.
+        The port of a missing line may still be open, for example if the line is blocked. Such a
+        port is closed first.
         """
         now = time.monotonic()
         for channel, line in enumerate(self._lines):
