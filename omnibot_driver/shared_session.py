@@ -99,9 +99,9 @@ class SharedSession:
         * ``moves_base``: whether the command moves the base. If the driver refuses such a command,
           the motion interlock must know that the sender is still active.
 
-        Raises CommandRefused for a command that was sent while this process was stalled. The
-        function ``refused`` receives the reason of each refusal, unless too many events wait for
-        delivery.
+        Raises CommandRefused if ``action`` refuses, or if the command was sent while this process
+        was stalled. The function ``refused`` also receives the reason, unless too many events wait
+        for delivery.
         """
         try:
             with self.lock:

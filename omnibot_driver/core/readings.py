@@ -147,13 +147,17 @@ Reading = (
 
 @value(frozen=True, slots=True)
 class SampleBoundary:
-    """Where a read of the port ended in the stream of IMU samples. Times count from the read.
+    """Where a read of the port ended in the stream of IMU samples.
 
-    * ``ahead``: number of samples (0 or 1) after the last ImuReading that have arrived at least in
-      part.
-    * ``cut``: whether the sample counted in ``ahead`` is incomplete.
-    * ``latest_s``: longest time until the last sample is complete; 0: complete already.
-    * ``earliest_s``: shortest time until the next sample, or the incomplete one, is complete.
+    * ``ahead``: 1 if the read contains at least the first part of a sample for which no ImuReading
+      was returned yet, else 0.
+    * ``cut``: whether only the first part of this sample has arrived.
+
+    The times are in s after the read:
+
+    * ``latest_s``: latest time at which the cut sample can be complete; 0 without a cut sample.
+    * ``earliest_s``: earliest time at which another sample can be complete. This is the cut sample,
+      or, without a cut sample, the next one.
     """
 
     ahead: int

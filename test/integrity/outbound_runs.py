@@ -106,7 +106,7 @@ def add(total: Scores, more: Scores) -> None:
 def over(scores: Scores, *, fault: str, receiver: str = "", scene: str = "") -> Score:
     """Return the sum of the scores of one fault.
 
-    An empty ``receiver`` means all receivers. An empty ``scene`` means all scenes that end a drive.
+    An empty ``receiver`` means all receivers. An empty ``scene`` means all except ``DRIVES``.
     """
     total = Score()
     for (its_fault, its_receiver, its_scene), score in scores.items():

@@ -96,7 +96,7 @@ class FejemisBoard(Board):
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both boards carry checksums."""
+        """Whether the text lines to both boards carry checksums."""
         return self._ports.with_sums
 
     @property

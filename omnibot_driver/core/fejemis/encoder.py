@@ -55,7 +55,7 @@ class Pair(Protocol):
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both boards carry checksums."""
+        """Whether the text lines to both boards carry checksums."""
 
     def remark(self, text: str) -> None:
         """Queue a notice for the user that is shown only once."""

@@ -57,7 +57,7 @@ class Ports:
 
     @property
     def with_sums(self) -> bool:
-        """Whether lines to both boards carry checksums."""
+        """Whether the text lines to both boards carry checksums."""
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:

@@ -86,7 +86,10 @@ class Gate(Generic[Group]):
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of ticks. It infers the unit of the board's clock, and then requires this unit."""
+    """Check of the reports of encoder ticks.
+
+    Their times show whether the board's clock counts ms or ns. Later reports must agree.
+    """
 
     def __init__(self) -> None:
         super().__init__(_ticks_follow)

@@ -270,8 +270,8 @@ class Conversation:
     def _is_copy(self, word: Word, reply: Ok | Fail, now: float) -> bool:
         """Return whether a reply to the query ``word`` is a duplicate of another command's reply.
 
-        This is assumed under two conditions: an equal reply to another query or to a move has just
-        come, and the last reply to ``word`` was different.
+        This is assumed if an equal reply to another query or to a move has just come, and if the
+        last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
             return False  # RMCS reports the same angle as RMRA

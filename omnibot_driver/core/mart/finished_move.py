@@ -122,9 +122,10 @@ class Done:
 
     @property
     def ended_late(self) -> bool:
-        """Whether the reply came so late that it may be the reply to a second run.
+        """Whether the reply came so late that the move may have run twice.
 
-        In that case, the reply to the first run was lost.
+        The network can duplicate the request of a move. The reply may then belong to the second
+        run, and the reply to the first run was lost.
         """
         return self.lasted_s >= TWO * self.usual_s
 

@@ -142,13 +142,13 @@ class Jobs:
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
                 "no log was started: call ~/start_log first; without a log, this request"
-                " would end the server, and no file would come"
+                " would end the server without sending a file"
             )
         if job is Job.LOG_FILE and self.log_may_be_lost:
             raise RequestRefused(
                 "the server may have been restarted and may no longer keep a log; without a log,"
-                " this request would end the server, and no file would come: copy the file from"
-                " the controller, or begin a new log by ~/start_log"
+                " this request would end the server without sending a file. Copy the old file from"
+                " the controller, or call ~/start_log, which deletes it and begins a new log"
             )
         self.job, self._token, self.turn_record = job, token, None
         self._request = WORD_OF[job].request(*arguments)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The pauses in which the line was idle, and how reliable they are.
+"""The pauses in which the line was idle, and whether they show where frames begin.
 
 A board pauses only between frames. Two other causes of a pause between reads are an adapter that
 collects bytes, and a computer that reads late (``late_reads``). Accepted frames show whether the

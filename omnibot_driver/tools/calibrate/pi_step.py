@@ -50,7 +50,7 @@ The period is long, because the board can miss encoder ticks while it sends.
 RECORDING: Final = ("drive_mode", "record_samples", "ticks_period")
 """Parameters whose values the tool restores after it has recorded the wheels."""
 UNRESTORED: Final = (
-    "driver and board keep the values of this measurement for {}; restart both to remove them"
+    "driver and board still use values of this measurement: {}; restart both to remove them"
 )
 
 Records = dict[str, list[Column]]

@@ -245,7 +245,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
 def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     if not len(rhythm.gap_s):
         yield Finding(
-            Level.GOOD, "Gaps", f"{stream.name} has no gap in the states in which it is sent."
+            Level.GOOD, "Gaps", f"{stream.name} has no gap in the states that publish it."
         )
         return
     lost = int(rhythm.missing.sum())

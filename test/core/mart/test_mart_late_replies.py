@@ -142,10 +142,11 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
-    """All replies are late by 0.28 s, so the driver stops a possible copy of each move.
+    """All replies come 0.28 s late. So the network may have duplicated a move, which runs again.
 
-    If there was no copy, the replies come sooner than after a real stop, and the robot reaches the
-    goal. If there was one, the driver reports it, and adds the first run to the odometry.
+    The driver sends a stop after each move. Without a duplicate there is nothing to stop. The
+    server then answers sooner than after the stop of a motion, and the robot reaches the goal. With
+    a duplicate, the driver reports it, and adds the first run to the odometry.
     """
     bench = on(NetworkFaults(), "source")
     assert reach(bench, Pose(0.6, 0.0, 0.0)) == ""

@@ -1,10 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that no motor stays on after a straight move, whose end the public server can miss.
+"""Tests that no motor stays on after a straight move.
 
-In the sample in which the move ends, the server corrects the heading once more. That writes a unit
-to a motor that it has just switched off. The driver sends MCS, which writes "stop" to both motors,
-and then MSM, which ends the direct control.
+When the move ends, the public server switches both motors off. In the same control step it may
+correct the heading once more. This correction gives one motor a small speed again. So the driver
+sends MCS, which writes "stop" to both motors, and then MSM, which ends the direct control.
 """
 
 from collections.abc import Callable
