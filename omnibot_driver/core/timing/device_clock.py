@@ -117,6 +117,8 @@ class DeviceClock:
             stamp_s = self._due(ticks[0], now, edge, len(ticks))
             if stamp_s is not None:
                 return [stamp_s] * len(ticks)
+        if not readings and (edge is None or not edge.ahead):
+            return []  # bytes outside samples say nothing about the time of the next sample
         line = self._line = self._line or ClockFit(self._period_s, (self._tick, now))
         if readings and self._cut_off:
             if isinstance(readings[0], ImuReading) and not readings[0].lost:

@@ -6,7 +6,7 @@ import math
 import random
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import groupby, pairwise
 from statistics import fmean
 
 import pytest
@@ -251,6 +251,22 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
     assert after.samples[0][1] > before.samples[-1][1]
     assert after.unevenness() < 0.2e-3
     assert spread(before.errors() + after.errors()) < 0.5e-3
+
+
+@pytest.mark.parametrize("period_s", [0.01, 0.2])
+def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> None:
+    """A damaged text arrives a second before the first frames, and tells nothing of their time.
+
+    The stamps of the first frames are right, also if the host reads only five times a second.
+    """
+    for seed in SEEDS:
+        board = Board(seconds=4)
+        chunks = bursts(board.stream(random.Random(seed)), random.Random(seed))
+        reads = [(board.begins_at - 1.0, b"Pausd: 7 \n")]
+        for number, group in groupby(chunks, lambda chunk: math.ceil(chunk[0] / period_s)):
+            reads.append((number * period_s, b"".join(data for _, data in group)))
+        stamped = stamp(DeviceClock(0.01), board, reads)
+        assert max(map(abs, stamped.errors(since_s=0.0))) < 0.03
 
 
 def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
