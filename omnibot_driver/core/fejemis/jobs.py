@@ -12,14 +12,24 @@ from typing import Final
 
 from omnibot_driver.core.errors import RequestRefused
 from omnibot_driver.core.fejemis.half import Role
-from omnibot_driver.core.fejemis.messages import Heartbeat, Message, Status, WheelConfiguration
+from omnibot_driver.core.fejemis.messages import (
+    Comment,
+    FrontWheelOffset,
+    Heartbeat,
+    Message,
+    Status,
+    WheelConfiguration,
+)
 from omnibot_driver.core.fejemis.readings import Job, JobDone
 
 POWER_ENDS: Final = "the power is about to be cut; call ~/start to keep it on"
 """The reason for refusing motion, brush and lift after a requested power-off."""
 UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99: a checksum does not detect the loss of both."""
-WITHIN_S: Final = 8.0
+CALIBRATED_WITHIN_S: Final = 8.0
+ANSWERED_WITHIN_S: Final = 4.5
+"""``CALIBRATED_WITHIN_S``, ``ANSWERED_WITHIN_S``: time in s after which a calibration, or another
+job, ends as failed."""
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
 AGAIN_S: Final = 0.4
@@ -108,7 +118,7 @@ class Jobs:
             )
         self.job, self._token = job, token
         self._begun_at = self._next_at = now + wait_s
-        self._until = self._begun_at + WITHIN_S
+        self._until = now + (CALIBRATED_WITHIN_S if job in OFFSETS else ANSWERED_WITHIN_S)
         if job is Job.POWER_OFF:
             self._text = b"off %d" % whole_seconds(delay_s)
             self.powering_off = True
@@ -174,9 +184,9 @@ class Jobs:
         match self.job:
             case Job.SAVE | Job.LOAD:
                 text = b"eew" if self.job is Job.SAVE else b"eer"
-                more = [b"confi"] if self.job is Job.LOAD and not first else []
-                told = [text] if first else []
-                return {"drive": [*told, *more], "front": told}
+                if self.job is Job.LOAD and not first:
+                    return {"drive": [b"confi"], "front": [b"fwoi"]}
+                return {"drive": [text], "front": [text]} if first else {}
             case Job.POWER_OFF:
                 return {"drive": [self._text] if first else []}
             case job:
@@ -192,7 +202,7 @@ class Jobs:
         job = self.job
         if job is None or not self._said:
             return
-        if isinstance(message, Heartbeat):
+        if isinstance(message, Heartbeat) and job is not Job.LOAD:
             self._heard.add(role)
             late = now - self._begun_at > SAID * AGAIN_S
             # Saving cannot be checked. The job only waits for a heartbeat of both boards.
@@ -201,10 +211,14 @@ class Jobs:
             elif job is Job.POWER_OFF and late and role == "drive":
                 self._finish(
                     True,
-                    f"the board cuts the power {self._text[4:].decode('ascii')} s after the call",
+                    "the command to cut the power"
+                    f" {self._text[4:].decode('ascii')} s after the call was sent; the board does"
+                    " not confirm it",
                 )
-        elif job is Job.LOAD and isinstance(message, WheelConfiguration):
-            if now - self._begun_at > SAID * AGAIN_S:
+        elif job is Job.LOAD and now - self._begun_at > SAID * AGAIN_S:
+            if _answers(role, message):
+                self._heard.add(role)
+            if {"drive", "front"} <= self._heard:
                 self._finish(
                     True,
                     "the saved configuration is loaded; the driver now reads it from the boards",
@@ -256,3 +270,15 @@ class Jobs:
             self.reload = True
         self.done.append(JobDone(self._token, success, message))
         self._clear()
+
+
+def _answers(role: Role, message: Message) -> bool:
+    """Return whether a board answers the request that follows ``eer``, so that it receives lines.
+
+    A front board that does not know the request answers with a comment.
+    """
+    if role == "drive":
+        return isinstance(message, WheelConfiguration)
+    if isinstance(message, Comment):
+        return "unhandled: 'fwoi'" in message.text
+    return isinstance(message, FrontWheelOffset)

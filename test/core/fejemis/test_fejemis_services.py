@@ -7,7 +7,7 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.fejemis.jobs import Jobs, whole_seconds
-from omnibot_driver.core.fejemis.messages import Status
+from omnibot_driver.core.fejemis.messages import Comment, Status, WheelConfiguration
 from omnibot_driver.core.fejemis.readings import (
     BatteryReading,
     Job,
@@ -98,6 +98,46 @@ def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
     assert not done.success
     assert "unchanged" in done.message
     assert bench.lines(DRIVE).count(word) == 2
+
+
+@pytest.mark.parametrize("channel", [DRIVE, FRONT])
+def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -> None:
+    """One board receives nothing, but sends its data. Loading fails, and is answered in time."""
+    bench = nominal()
+    bench.run(3.0)
+    bench.hears.discard(channel)
+    done = ask(bench, Job.LOAD, 5.0)
+    assert not done.success
+    assert "not confirmed" in done.message
+
+
+def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() -> None:
+    """The front board does not know ``fwoi`` and says so. This shows that it receives lines."""
+    jobs = Jobs()
+    jobs.ask(Job.LOAD, None, 0.0)
+    for at in (0.0, 0.5, 1.0, 1.5):
+        said = jobs.due(at)
+    assert said["front"] == [b"fwoi"]
+    jobs.hear("drive", WheelConfiguration(0.08, 0.08, 15.0, 68.0, 0.4, 0.001), 1.6)
+    assert not jobs.done
+    jobs.hear("front", Comment("# 12.3 unhandled: 'fwoi'"), 1.7)
+    assert jobs.done[0].success
+
+
+@pytest.mark.parametrize("job", [Job.SAVE, Job.LOAD, Job.POWER_OFF])
+def test_boards_that_fall_silent_do_not_delay_an_answer(job: Job) -> None:
+    """Both boards fall silent after the request. It fails within 5 s."""
+    bench = nominal()
+    bench.run(3.0)
+    bench.speaks.clear()
+    assert not ask(bench, job, 5.0).success
+
+
+def test_a_power_off_that_no_board_confirms_does_not_claim_to_happen() -> None:
+    """The drive board sends heartbeats but hears nothing. The answer says: not confirmed."""
+    bench = nominal()
+    bench.hears.clear()
+    assert "does not confirm" in ask(bench, Job.POWER_OFF, 5.0).message
 
 
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
