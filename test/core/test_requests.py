@@ -168,6 +168,24 @@ def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> 
     assert "cable" in answer.message
 
 
+def test_lost_texts_do_not_make_a_paused_board_seem_to_have_restarted() -> None:
+    """A paused board does not receive R, and three of its «Paused» texts are lost.
+
+    The number in the next text is too high for a restart. The reset fails.
+    """
+    bench = Bench(run=False)
+    bench.open()
+    bench.run(2.5)
+    bench.hears = False
+    bench.session.request(Request.RESET, token := object(), bench.now)
+    bench.speaks = False
+    bench.run(3.0)
+    bench.speaks = True
+    bench.run(7.0)
+    (done,) = [event for event in bench.events if isinstance(event, RequestDone)]
+    assert (done.token, done.success) == (token, False)
+
+
 def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
     """A pause has failed, and the user resets the board. Afterwards the driver starts the board.
 

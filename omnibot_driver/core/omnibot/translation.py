@@ -34,6 +34,11 @@ from omnibot_driver.core.readings import (
 
 DELTA_LSB: Final = 1e-4
 """Size of one count of a delta: 0.1 mm in m, or 0.1 mrad in rad."""
+MOST_TEXTS_LOST: Final = 9
+"""Largest number of lost "Paused" texts, one a second, that a counter may show.
+
+A reset is answered within this time. A counter that seems to show more has restarted.
+"""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
@@ -130,8 +135,10 @@ class Translation:
                 self._paused_count = count
                 self._sequence.pause()
                 self._rhythm = FrameSchedule(self._schedule)
-                continues = paused_count is not None and count == (paused_count + 1) % 256
-                return PausedReading(continues)
+                if paused_count is None:
+                    return PausedReading()
+                lost = (count - paused_count - 1) % 256
+                return PausedReading(continues=lost <= MOST_TEXTS_LOST)
 
     def _displacement(self, frame: DeltaFrame, now: float) -> DisplacementReading:
         imus, self._imus = self._imus, 0
