@@ -26,6 +26,12 @@ PERIOD_S: Final = 0.01
 PAIR_WITHIN_S: Final = 0.005
 """If the second line of a pair arrives this time in s or more after the first line, the pair may be
 false. It must then wait for the next pose."""
+SILENT_S: Final = 0.1
+"""Silence in s after which a pair must wait for the next pose, although it is not false.
+
+The pose shows whether the board was silent, or the host only read late. After a silence, the
+sampling time of the pair is unknown, so the pair is rejected.
+"""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """``KNOWN_S``: difference in s that shows which line of a sample comes first. It is the sum of the
@@ -55,7 +61,8 @@ class Pair:
 
     ``skipped``: how many incomplete samples were left out since the previous pair.
 
-    ``doubtful``: whether the pair may be false, and so must wait for the next pose.
+    ``doubtful``: whether the pair may be false, or follows a silence, and so must wait for the next
+    pose.
     """
 
     gyro: Gyro
@@ -96,6 +103,8 @@ class ImuPairs:
         """For each kind of line except gyro and acceleration: how many came outside of pairs, minus
         how many came within pairs."""
         self._skipped = 0
+        self._silent = False
+        """Whether a silence precedes the lines since the last pose."""
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
         self._counts: dict[Kind, int] = {"gyro": 0, "acc": 0}
@@ -141,6 +150,7 @@ class ImuPairs:
             if lacking or not counted:
                 self._reject(pair)
             pair.doubtful = False
+        self._silent = False
         self._pose_s = time_s
         self._counts = {"gyro": 0, "acc": 0}
 
@@ -155,6 +165,7 @@ class ImuPairs:
             if isinstance(item, Pair) and item.doubtful:
                 if max(self._counts.values()) <= UNPOSED:
                     break
+                self._silent = False
                 self._reject(item)
                 continue
             taken.append(self._queue.popleft())
@@ -178,6 +189,7 @@ class ImuPairs:
         self._last = kind, line, now
         between, self._between = self._between, set()
         self._counts[kind] += 1
+        self._silent |= last is not None and now - last[2] > SILENT_S
         if last is not None and last[0] != kind:
             self._learn(kind, now - last[2], marked=bool(between))
         if self.first is None:
@@ -210,7 +222,8 @@ class ImuPairs:
         gyro, acceleration = (first, line) if isinstance(first, Gyro) else (line, first)
         assert isinstance(gyro, Gyro)
         assert isinstance(acceleration, Acceleration)
-        pair = Pair(gyro, acceleration, now, self._pose_s, self._skipped, doubtful=late)
+        doubtful = late or self._silent
+        pair = Pair(gyro, acceleration, now, self._pose_s, self._skipped, doubtful)
         self._queue.append(pair)
         self._skipped = 0
 

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import pytest
+from fejemis_bench import DRIVE, nominal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -278,3 +279,35 @@ def test_no_pair_has_lines_of_two_samples(
         reads = reads_every(lines, period_s, chance.uniform(0.0, period_s))
     result = outcome(reads)
     assert result.false == result.excused
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("silence_s", [0.3, 3.0])
+def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
+    """The drive board is silent. It speaks again before or after a pose.
+
+    A sample that comes before the first pose has no known time, so the driver leaves it out.
+    """
+    for phase_s in (0.0, 0.005, 0.01, 0.015):
+        bench = nominal()
+        bench.run(3.0)
+        bench.speaks.discard(DRIVE)
+        bench.run(silence_s + phase_s)
+        bench.speaks.add(DRIVE)
+        bench.events.clear()
+        again_at = bench.now
+        bench.run(0.5)
+        assert len(bench.imu) > 45
+        assert all(estimate.stamp_s > again_at - 0.02 for estimate in bench.imu)
+
+
+@pytest.mark.slow
+def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
+    """The host reads every 0.2 s. Each read begins with samples before a pose; none is left out."""
+    bench = nominal()
+    bench.run(3.0)
+    bench.read_s = 0.2
+    bench.run(1.0)
+    bench.events.clear()
+    bench.run(4.0)
+    assert 380 < len(bench.imu) <= 420
