@@ -33,6 +33,24 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
     assert line.units(slope * (10.0 - dead)) == pytest.approx(10.0, abs=0.8)
 
 
+@given(SLOPES, st.floats(0.95, 1.0))
+def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
+    slope: float, part: float
+) -> None:
+    """A motor turns from the first unit on, but its speed at 26 units is measured too low.
+
+    A straight line through the measured speeds would show motion at zero units, which is excluded.
+    The speed at 14 units is then higher than expected. It does not lower the expected speed.
+    """
+    line = MotorLine()
+    for _ in range(8):
+        line.learn(18.0, slope * 18.0)
+    line.learn(26.0, slope * part * 26.0)
+    before = line.speed(14.0)
+    line.learn(14.0, slope * 14.0)
+    assert line.speed(14.0) >= min(before, slope * 14.0) - 0.01
+
+
 @given(SLOPES, DEAD, st.floats(0.15, 1.0))
 def test_a_turn_on_the_spot_is_right_after_a_drive_and_another_turn(
     slope: float, dead: float, rate_radps: float
