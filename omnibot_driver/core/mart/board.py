@@ -23,7 +23,7 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.states import State
 from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.packets import Packets
-from omnibot_driver.core.readings import NOTHING_MEASURED, Reading
+from omnibot_driver.core.readings import NOTHING_MEASURED, NoticeReading, Reading
 from omnibot_driver.core.traits import Traits
 
 TRAITS: Final = Traits(
@@ -49,11 +49,10 @@ TRAITS: Final = Traits(
         Fault.BEYOND_LIMITS: "check `metres_per_count` and `track`",
     },
 )
-UNREAD_S: Final = 0.5
-"""Longest time in s without a reading from a server that answers.
+ANSWERED: Final = NoticeReading("", halt=False)
+"""A reading without effect. It only shows that the server answers.
 
-After this time, the next reply yields at least NOTHING_MEASURED, a reading without values. It shows
-the driver that the server answers. A moving robot is measured more often.
+NOTHING_MEASURED would make the motion monitor forget the motion before it.
 """
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
@@ -72,7 +71,7 @@ class MartBoard(Board):
     def __init__(self, settings: MartSettings) -> None:
         self._pilot = Pilot(settings)
         self._mode = Mode.UNKNOWN
-        self._told_s = self._expected_s = self._read_s = -math.inf
+        self._told_s = self._expected_s = -math.inf
 
     @property
     def settings(self) -> MartSettings:
@@ -129,19 +128,15 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that a datagram from this channel yields.
 
-        After UNREAD_S without a reading, a reply yields at least NOTHING_MEASURED: a reading
-        without values, which shows that the server answers.
+        A reply without a value yields ANSWERED.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
         readings = self._pilot.take()
         if self._pilot.ready:
             self._mode = Mode.NOMINAL
-            unread = not readings and now >= self._read_s + UNREAD_S
-            if unread and self._pilot.heard_s == now:
-                readings.append(NOTHING_MEASURED)
-        if readings:
-            self._read_s = now
+            if not readings and self._pilot.heard_s == now:
+                readings.append(ANSWERED)
         return readings
 
     def silence(self) -> None:

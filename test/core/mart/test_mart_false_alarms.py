@@ -169,3 +169,18 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
             bench.estop(False)
             bench.run(0.5)
     assert not any("robot moves" in notice for notice in bench.notices), bench.notices
+
+
+def test_each_reply_delays_the_report_of_a_silence_even_if_it_has_no_value() -> None:
+    """The last reply before a gap in the network is the server's name, which measures nothing.
+
+    The driver counts the silence from this reply on.
+    """
+    bench = MartBench().ready()
+    bench.speaks = False
+    bench.run(0.4)
+    bench.session.inbound.receive(b"ok BBB", bench.now, 0)
+    bench.run(1.4)
+    assert bench.session.state == "nominal"
+    bench.run(0.2)
+    assert bench.session.state == "connecting"
