@@ -282,10 +282,12 @@ class Stops(Ground, ABC):
         """Record that the server answers a stop only after the driver has used the stop port.
 
         In this state, the server's stop port could hang the next forward drive (RM); see
-        docs/boards/mart.md.
+        docs/boards/mart.md. A number is no such answer: it answers an earlier query, or the stop of
+        a turn on the spot, which leaves the stop port free.
         """
-        ends = isinstance(reply, Ok) and reply.form in ANSWERS.get(self.motion, ())
-        if ends and self.motion is not Motion.SPIN:
+        if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
+            return
+        if reply.form is Form.NOTHING and reply.form in ANSWERS.get(self.motion, ()):
             self.health.outlived = True
 
     def _repeat_lost(self, now: float) -> Packets:

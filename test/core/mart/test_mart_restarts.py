@@ -50,6 +50,28 @@ def test_a_lost_server_that_answers_again_without_a_restart_is_not_driven(
     assert not bench.robot.stands
 
 
+@pytest.mark.parametrize("offset_s", [0.0, 0.03, 0.06, 0.5, 0.7])
+def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s: float) -> None:
+    """The server's process is stopped while the robot is at rest, and continues after 5 s.
+
+    Meanwhile the driver has used the stop port. The server then answers the queries that have
+    waited. The driver does not take their values for the end of a motion.
+    """
+    bench = MartBench("source").ready()
+    bench.command(0.3, 0.3, 2.0)
+    bench.command(0.0, 0.0, 2.0)
+    bench.run(offset_s)
+    advance = bench.robot.advance
+    bench.robot.advance = lambda: []
+    bench.run(5.0)
+    assert b"SL" in bench.said()
+    bench.robot.advance = advance
+    bench.run(5.0)
+    assert bench.try_command(0.3, 0.0) == ""
+    bench.command(0.3, 0.0, 3.0)
+    assert not bench.robot.stands
+
+
 @pytest.mark.parametrize("wanted", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)])
 @pytest.mark.parametrize("boot_s", [0.3, 1.0, 4.0])
 def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
