@@ -19,10 +19,10 @@ from omnibot_driver.core.mart.words import Form, Request
 
 RATIO: Final = 0.35
 """Relative change of the commanded rate above which the driver begins a new turn."""
-OFF, OFF_AGAIN = 0.05, 0.12
+OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 """Relative error of a turn's rate above which the driver begins the turn anew.
 
-``OFF``: until the motors' speed is known.
+``OFF``: for the first turn, until it has had a steady rate for EARLY_S (s).
 
 ``OFF_AGAIN``: afterwards. It is larger, because the new start disturbs more than a small error.
 """
@@ -182,7 +182,8 @@ class SpotTurns:
         seen_radps = self._odometry.speeds.means[1]
         if self._is_held(seen_radps):
             return False
-        most_radps = (OFF_AGAIN if self._has_learned else OFF) * abs(rate_radps)
+        is_early = not self._has_learned and steady_s < EARLY_S
+        most_radps = (OFF if is_early else OFF_AGAIN) * abs(rate_radps)
         if abs(seen_radps - rate_radps) <= most_radps or self._corrections >= CORRECTIONS:
             return False
         lesson_radps = self._lesson(seen_radps)

@@ -91,6 +91,23 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
     assert abs(bench.error.yaw_rad) < 0.1
 
 
+def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
+    """Something slows the first turn on the spot by 10 % for half a second, after three seconds.
+
+    A new beginning would cost more than the error.
+    """
+    bench = MartBench("source", speed_mps_per_unit=MartSettings().speed_per_unit).ready()
+    bench.command(0.0, 0.5, 4.0)
+    begun = bench.said().count(b"L CUSTOM")
+    chassis = bench.server.chassis
+    gains = chassis._gain_right, chassis._gain_left
+    chassis._gain_right, chassis._gain_left = 0.9 * gains[0], 0.9 * gains[1]
+    bench.command(0.0, 0.5, 0.6)
+    chassis._gain_right, chassis._gain_left = gains
+    bench.command(0.0, 0.5, 2.0)
+    assert bench.said().count(b"L CUSTOM") == begun
+
+
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
     """Something, such as a door sill, slows a turn for a second.
