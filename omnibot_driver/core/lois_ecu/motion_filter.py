@@ -274,7 +274,10 @@ class MotionFilter:
             self.begin_excess()
 
     def begin_excess(self) -> None:
-        """Reset the estimate of how much faster than its set-point each wheel rolls backward."""
+        """Reset the excess of each wheel.
+
+        The excess is the fraction by which a wheel that rolls backward exceeds its set-point.
+        """
         for index in (0, 1):
             mean = EXCESS_MEAN[self.tuned] if self.holds else 0.0
             stddev = EXCESS_STDDEV[self.tuned] if self.holds else 0.0

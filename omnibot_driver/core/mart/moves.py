@@ -28,8 +28,8 @@ It is a standard deviation, as a fraction of the move. A second run would then b
 standard deviations.
 """
 RAN_TWICE: Final = (
-    "the network has delivered a controlled move twice; the driver has stopped the second run, and"
-    " continues with an estimate of the first one: check the network"
+    "the network has delivered a controlled move twice; the driver has stopped the second run. The"
+    " first run was not measured, so `odom` uses its expected distance or turn: check the network"
 )
 CONTRADICTED: Final = (
     "the controller has measured a turn of {:.0f}°, but the right wheel shows {:.0f}°: one wheel"

@@ -85,10 +85,12 @@ class SwitchOff:
         self.underway = word is MCS and self._supported
 
     def missed(self, word: Word) -> bool:
-        """Record that MCS or MSM was not answered; return whether the driver gives MCS up.
+        """Record that MCS or MSM was not answered. Return whether the driver now stops using MCS.
 
-        After MOST_MISSES unanswered requests in a row, the driver starts motions again. If MCS is
-        still in progress, the server refuses the next motion, and the driver then sends MSM.
+        After MOST_MISSES unanswered requests in a row, the driver allows motions again. If the last
+        of these requests was MCS, the driver sends no MCS until the next connection. If MCS is
+        still in progress, the server refuses the next motion. The driver then sends MSM, which ends
+        MCS.
         """
         self._misses += 1
         if self._misses < MOST_MISSES:

@@ -125,7 +125,8 @@ def dot(one: BodyTwist, other: BodyTwist) -> float:
 def _outside_hull(motion: BodyTwist, explained: Sequence[Velocity]) -> float:
     """Return how far a velocity is outside the hull, in m/s; 0 or less if it is inside.
 
-    The hull contains rest and all set-points, multiplied by 1.2 (``STRETCH``).
+    The hull is the convex hull of zero speed and of all velocities in ``explained``, multiplied by
+    1.2 (``STRETCH``).
     """
     furthest_mps = -math.inf
     for x, y in _DIRECTIONS:

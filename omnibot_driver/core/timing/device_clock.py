@@ -212,11 +212,13 @@ class DeviceClock:
         return self._displaced_tick + passed - self._tick
 
     def _compare(self, line: ClockFit, edge: SampleBoundary, now: float, *, counted: bool) -> int:
-        """Compare the newest arrival with the fitted clock, and correct the count of the ticks.
+        """Compare the newest arrival with the fitted clock, and correct the tick count.
 
-        Return the correction in ticks: positive if ticks were lost but not counted.
+        Return the correction in ticks. It is positive if the count was too low because of lost
+        ticks.
 
-        ``counted``: whether displacements in this read confirm the number of the tick.
+        ``counted``: whether this read contains a displacement. If so, the tick number of the last
+        displacement is corrected too.
         """
         tick, arrival = self._tick + edge.ahead, now + edge.latest_s
         if tick == self._seen_tick:

@@ -21,7 +21,7 @@ _SWITCHES = (
     ("tilt", "pose lines have a fifth number, the tilt"),
     (
         "start-resumes",
-        "after the command start, the board obeys the last rc command again, even one that it"
+        "after a start command, the board obeys the last rc command again, even one that it"
         " received while it was stopped",
     ),
     ("confirms", "the board confirms a command that begins with !"),

@@ -36,7 +36,7 @@ def read(path: Path) -> dict[str, Column]:
 
     A missing time is NaN.
 
-    Raises ToolError if the file cannot be read, or lacks too many times.
+    Raises ToolError if the file cannot be read, or if too many times are missing.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -47,9 +47,9 @@ def read(path: Path) -> dict[str, Column]:
     for told in columns.values():
         if not told or sum(not one for one in told[1:]) > UNTOLD * len(told):
             raise ToolError(
-                f"the record {path} lacks too many times. Either the wheels turned so slowly that"
-                " the board could not report the times (in a unit of 100 ns it can do so only above"
-                " 152 RPM), or the unit of the times is not known"
+                f"too many times are missing in the record {path}. Either the wheels turned too"
+                " slowly for the board to report the times (with a unit of 100 ns, it needs more"
+                " than 152 RPM), or the driver does not know the unit of the times"
             )
     return {
         side: np.array([float(one) if one else np.nan for one in told])

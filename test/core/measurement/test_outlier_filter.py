@@ -244,7 +244,7 @@ def test_what_a_refused_displacement_told_of_the_board_is_not_forgotten() -> Non
 def test_all_motion_of_a_pause_may_be_in_one_displacement() -> None:
     """The robot rolls out in a pause. The first displacement after the pause has all this motion.
 
-    It is released if the robot can drive so far in the pause, and rejected otherwise.
+    If the robot can drive so far in the pause, the filter accepts this displacement.
     """
     through = gate()
     through.admit(ahead(), 1.0)

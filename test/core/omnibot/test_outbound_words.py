@@ -52,9 +52,9 @@ def test_harmless_words_stay_as_they_are(counts: tuple[int, int, int]) -> None:
 def test_a_word_is_moved_by_one_lsb_where_its_low_byte_would_act(
     counts: tuple[float, float, float],
 ) -> None:
-    """In a word of at most 20,479, only the low byte can be harmful.
+    """In a word from -20,479 to 20,479, only the low byte can be harmful.
 
-    Such a word changes by one LSB.
+    If it is harmful, the word changes by one LSB, in addition to the rounding.
     """
     for word, count in zip(harmless(counts), counts, strict=True):
         assert abs(word - count) <= 1.5

@@ -48,10 +48,10 @@ def test_a_quirk_is_unseen_on_a_board_as_documented(name: str) -> None:
     assert not SEEN[name](DOCUMENTED)
 
 
-def test_ticks_are_reported_as_they_are() -> None:
-    """The last report of wheel ticks can be found among the reports of a drive.
+def test_ticks_in_finds_the_reports_of_ticks() -> None:
+    """After a drive, ``ticks_in`` finds the reports of encoder ticks among the board's lines.
 
-    Other tests of this module rely on this.
+    The detectors of several quirks rely on this.
     """
     rig = Rig().booted()
     rig.drive(20, 20, 3.0)
