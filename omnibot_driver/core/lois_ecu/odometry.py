@@ -39,6 +39,9 @@ UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
 """The pose is predicted for this number of tick periods after the last report, or for ``UNHEARD_S``
 s if this is longer."""
+LOST_REPORTS_S: Final = 1.2
+"""After a silence of less than this time in s, the reports are assumed to be lost, and the wheels
+to have followed their set-points, unless a set-point changed in the silence."""
 FEWEST_UNFORESEEN: Final = 2.0
 """Smallest difference between a reported and an expected count, in ticks, that can show a restart
 of the board."""
@@ -61,6 +64,9 @@ class LoisOdometry:
         self._may_roll_mps = [0.0, 0.0]
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
+        self._said: SetRpm | SetDuty | None = None
+        self._said_at_s = -math.inf
+        """``_said``: last set-point. ``_said_at_s``: time since which it is the same."""
         self._uncertainty = Uncertainty(OdometryNoise())
         self._source: Source = "standing"
         self.late_stddev_s = LATE_S
@@ -186,6 +192,8 @@ class LoisOdometry:
 
     def wrote(self, command: SetRpm | SetDuty, now: float) -> None:
         """Record that a set-point was sent to the board."""
+        if command != self._said:
+            self._said, self._said_at_s = command, now
         if isinstance(command, SetRpm):
             kind: CommandKind = "rpm"
             unit = self._settings.rim_mps_per_rpm
@@ -220,7 +228,7 @@ class LoisOdometry:
         ``late_s``: how much later than usual the ticks arrived.
         """
         before, from_s = self._ticks, self._at_s
-        if now > max(self._heard_at_s, self._lost_s) + self._unheard_s > -math.inf:
+        if self._was_silent(now):
             self._after_silence(now)
         self._advance(now)
         self._ticks = ticks
@@ -253,7 +261,7 @@ class LoisOdometry:
         duration_s, self._odometry_at_s = now - self._odometry_at_s, now
         if self._ticks is None:
             return
-        if now > self._heard_at_s + self._unheard_s > -math.inf:
+        if self._heard_at_s > -math.inf and self._was_silent(now):
             self._after_silence(now)
             return
         self._advance(now)
@@ -280,6 +288,18 @@ class LoisOdometry:
             speed_mps = abs(self._motion.speed_mps(index))
             self._may_roll_mps[index] = max(speed_mps, abs(wheel.course.target_mps))
         self._motion.history.keep(now)
+
+    def _was_silent(self, now: float) -> bool:
+        """Return whether a report at ``now`` ends a long silence, in which the motion is unknown.
+
+        The motion is unknown if the board may not have received a new set-point.
+        """
+        heard_s = max(self._heard_at_s, self._lost_s)
+        if not now > heard_s + self._unheard_s > -math.inf:
+            return False
+        connected = self._at_s > -math.inf
+        lost = connected and self._said_at_s < heard_s and now < heard_s + LOST_REPORTS_S
+        return not lost
 
     def _after_silence(self, now: float) -> None:
         """Add the errors of a long silence.
