@@ -62,6 +62,9 @@ class ReportedSpeed:
         self._told = 0.0
         self._repeats = 0
         self._jumped = False
+        self._doubted_m = 0.0
+        """Standard deviation in m that was added to the wheel's distance, because the wheel may be
+        at rest since its reported speed last changed."""
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
@@ -155,10 +158,29 @@ class ReportedSpeed:
                 spread = 2 * motion.rpm_mps + told_mps / 2
                 motion.filter.forget(wheel.base + SPEED, sign * told_mps, spread**2)
             wheel.rolled_to_m = motion.way_m(self._index)
+            self._doubted_m = 0.0
         elif resting.chance == 1.0 and not wheel.rests:
             self.come_to_rest()
         elif not wheel.rests and resting.chance:
-            motion.doubt(self._index, resting.chance * abs(speed) * duration_s)
+            if motion.tuned:
+                motion.doubt(self._index, resting.chance * abs(speed) * duration_s)
+            else:
+                self._doubt_rolling(resting.chance)
+
+    def _doubt_rolling(self, chance: float) -> None:
+        """Add the error of a wheel that may be at rest, but is estimated as rolling.
+
+        If it is at rest, the whole distance since its reported speed last changed is wrong. So the
+        errors of successive reports are not independent. The board's odometry (0x20) does not show
+        this error, because the board uses the old speed.
+
+        ``chance``: probability that the wheel is at rest.
+        """
+        wrong_m = chance * abs(self._motion.way_m(self._index) - self._wheel.rolled_to_m)
+        if wrong_m > self._doubted_m:
+            more_m = math.sqrt(wrong_m**2 - self._doubted_m**2)
+            self._motion.shift(self._index, 0.0, more_m)
+            self._doubted_m = wrong_m
 
     def _rolls_at(self, speed_mps: float, duration_s: float) -> None:
         """Correct the wheel's estimate by its mean speed between the last two ticks."""

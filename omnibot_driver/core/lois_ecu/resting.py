@@ -22,6 +22,14 @@ FELL_RPM: Final = 5.0
 FELL_FAR_RPM: Final = 7.0
 WITHIN_S: Final = 0.9
 SWINGS_S: Final = 2.0
+LOST_REPORTS: Final = 4
+LOST_S: Final = 0.25
+"""If the mean time between the last ``LOST_REPORTS`` reports is more than ``LOST_S``, reports were
+lost, or the board seldom sends them. Late reads hardly change the mean of four reports."""
+REPORT_S: Final = 0.2
+"""Usual longest time in s between two reports. While reports are lost, the clock of this module
+advances by at most this time with each report, so that the speeds before a gap are still known
+after it."""
 HIDDEN_PART: Final = 0.3
 """While the board reports no speeds, the clock of this module runs at this fraction of real
 time."""
@@ -30,6 +38,8 @@ FAR: Final[tuple[float, ...]] = (0.0, 0.6, 1.0)
 LONE: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 NEAR: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 FASTER: Final[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.0, 0.1, 0.3, 0.6, 1.0)
+FELL_IN_GAPS: Final[tuple[float, ...]] = (0.0, 0.6, 0.8, 0.9, 1.0)
+GAPS: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 0.7, 0.8, 0.8, 1.0)
 TUNED: Final[tuple[float, ...]] = (0.0, 0.1, 0.2, 0.3)
 """Probabilities that a wheel is at rest. Index: how often the reported speed has been repeated. The
 values were counted on the public firmware:
@@ -41,6 +51,11 @@ values were counted on the public firmware:
 ``LONE``: after a fall by at least ``FELL_FAR_RPM`` from a speed that was reported only once.
 
 ``NEAR``: after a smaller fall.
+
+``FELL_IN_GAPS``: after a smaller fall, or a fall from a speed that was reported only once, while
+reports are lost. The rest of the fall may be in a gap.
+
+``GAPS``: without a fall, while reports are lost. The whole fall may be in a gap.
 
 ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. These values were
 not counted, but assumed. Such a speed is wrong if the board noticed the second-to-last tick late.
@@ -66,6 +81,9 @@ class RestingWheel:
         self._fell_rpm = 0.0
         self._lone = False
         self._repeats = 0
+        self._gaps = False
+        """Whether reports were lost before the reported speed last changed."""
+        self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0
         self.chance = 0.0
 
@@ -86,7 +104,9 @@ class RestingWheel:
 
         ``tuned``: whether the user set the controller's gains.
         """
-        self._pass(since_s)
+        self._intervals_s.append(since_s)
+        lost = sum(self._intervals_s) > LOST_S * len(self._intervals_s)
+        self._pass(min(since_s, REPORT_S) if lost else since_s)
         if abs(rpm - self._told_rpm) < SAME_RPM:
             self._repeats += 1
         else:
@@ -95,6 +115,7 @@ class RestingWheel:
             self._fell_rpm = speeds[1] - rpm if len(speeds) > 1 else 0.0
             self._lone = bool(speeds) and self._fell_rpm < FELL_FAR_RPM <= speeds[0] - rpm
             self._repeats = 0
+            self._gaps = lost and not tuned
             if self._fell_rpm >= FELL_FAR_RPM:
                 self._fell_at_s = self._clock_s
         self._told_rpm = rpm
@@ -117,6 +138,8 @@ class RestingWheel:
             return FAST if self._fell_rpm >= FELL_RPM else ()
         if self._fell_rpm >= FELL_FAR_RPM:
             return FAR
+        if self._gaps:
+            return FELL_IN_GAPS if self._lone or self._fell_rpm >= FELL_RPM else GAPS
         if self._lone:
             return LONE
         return NEAR if self._fell_rpm >= FELL_RPM else ()

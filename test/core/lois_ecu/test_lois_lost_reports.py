@@ -7,7 +7,49 @@ import math
 import pytest
 from lois_drives import HOST_GAINS, Rig, nominal
 
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
 pytestmark = pytest.mark.slow
+
+UNIT_MPS = 0.13 * math.tau / 60
+TRACK_M = 0.47
+
+
+class Told:
+    """An odometry of a robot with two set-points, and the reports of its board.
+
+    ``rpm``: set-points of the left and the right wheel in RPM.
+    """
+
+    def __init__(self, rpm: tuple[int, int]) -> None:
+        self.odometry = LoisOdometry(LoisEcuSettings())
+        self._command, self._now = SetRpm(*rpm), 0.0
+        self._x_m = self._y_m = self._yaw_rad = 0.0
+        for _ in range(3):
+            self.report(0.2, (0, 0))
+
+    def report(self, after_s: float, rpm: tuple[int, int]) -> None:
+        """Report these speeds in RPM, ``after_s`` after the last report."""
+        self._now += after_s
+        left, right = (one * UNIT_MPS for one in rpm)
+        along, turning = (left + right) / 2, (right - left) / TRACK_M
+        self._yaw_rad += after_s * turning
+        dx, dy = along * math.cos(self._yaw_rad), along * math.sin(self._yaw_rad)
+        self._x_m, self._y_m = self._x_m + after_s * dx, self._y_m + after_s * dy
+        self.odometry.heard_ticks(Ticks(round(1e3 * self._now), 0, 0), self._now)
+        place = self._x_m, self._y_m, self._yaw_rad
+        group = BoardOdometry(*place, dx, dy, turning, appended=True)
+        self.odometry.heard_odometry(group, self._now + 0.01)
+        self.odometry.wrote(self._command, self._now + 0.02)
+
+    @property
+    def yaw_stddev_deg(self) -> float:
+        """Standard deviation of the heading at the last report, in degrees."""
+        estimate = self.odometry.predict(self._now + 0.02)
+        assert estimate is not None
+        return math.degrees(math.sqrt(estimate.covariance.yaw_yaw))
 
 
 @pytest.mark.parametrize("gap_s", [0.7, 0.9])
@@ -44,3 +86,16 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
     rig._loss = 0.0
     rig.order(0, 0, 2.5)
     assert rig.outcome().sigmas < 3.0
+
+
+def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
+    """Most reports are lost. The few others show one speed of the right wheel, which may rest.
+
+    The standard deviation of the heading is half of the angle that is wrong in this case.
+    """
+    told = Told((-10, -11))
+    for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
+        told.report(0.5, rpm)
+    for step in range(6):
+        told.report(0.5, (-10 - step % 2, -12))
+    assert told.yaw_stddev_deg > math.degrees(3.0 * 12 * UNIT_MPS / TRACK_M) / 2

@@ -7,13 +7,15 @@ import pytest
 from omnibot_driver.core.lois_ecu.resting import RestingWheel
 
 GROUP_S = 0.1
+GAP_S = 0.5
+"""Time from one report to the next if most reports are lost."""
 
 
-def told(*speeds_rpm: float, tuned: bool = False) -> RestingWheel:
+def told(*speeds_rpm: float, tuned: bool = False, every_s: float = GROUP_S) -> RestingWheel:
     """Return a detector that has received these speeds, one with each report."""
     wheel = RestingWheel()
     for rpm in speeds_rpm:
-        wheel.tell(rpm, GROUP_S, tuned=tuned)
+        wheel.tell(rpm, every_s, tuned=tuned)
     return wheel
 
 
@@ -100,3 +102,48 @@ def test_a_fall_that_was_not_told_is_seen() -> None:
     for _ in range(3):
         wheel.tell(14, GROUP_S)
     assert wheel.chance == 1.0
+
+
+def test_a_fall_in_gaps_between_reports_is_seen() -> None:
+    """Most reports are lost, so the reported speeds fall from 25 to 9 RPM in a whole second.
+
+    The wheel is at rest.
+    """
+    assert 0.5 < told(26, 25, 17, 9, 9, every_s=GAP_S).chance < 1.0
+    assert told(26, 25, 17, 9, 9, 9, every_s=GAP_S).chance == 1.0
+
+
+def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
+    """Most reports are lost. The reported speeds fall by 6 RPM, which is less than usual.
+
+    The beginning of the fall may be in a gap, so the wheel is probably at rest.
+    """
+    assert told(17, 17, 16, 12, 12, every_s=GAP_S).chance < 0.2
+    assert told(19, 18, 18, 12, 12, every_s=GAP_S).chance > 0.5
+    assert told(19, 18, 18, 12, 12, every_s=GROUP_S).chance < 0.2
+
+
+def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
+    """Most reports are lost. The reported speed is 14 RPM from the first report on.
+
+    The whole fall may be in a gap. So the wheel may be at rest, and is surely at rest after many
+    reports. The same reports without gaps show a wheel that rolls.
+    """
+    speeds = (13, 13, 13, 14)
+    assert 0.0 < told(*speeds, 14, every_s=GAP_S).chance < 0.2
+    assert 0.4 < told(*speeds, *[14] * 5, every_s=GAP_S).chance < 1.0
+    assert told(*speeds, *[14] * 10, every_s=GAP_S).chance == 1.0
+    assert told(*speeds, *[14] * 10).chance == 0.0
+    assert told(*speeds, *[14] * 10, every_s=GAP_S, tuned=True).chance == 0.0
+
+
+def test_reports_that_are_read_late_are_not_lost() -> None:
+    """A busy computer reads three reports at once, 0.4 s after the last ones.
+
+    No report is lost, so a constant speed shows a wheel that rolls.
+    """
+    wheel = told(13, 13, 13)
+    for _ in range(10):
+        for since_s in (0.4, 0.0, 0.0):
+            wheel.tell(14, since_s)
+    assert wheel.chance == 0.0
