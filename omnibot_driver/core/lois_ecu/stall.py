@@ -31,8 +31,10 @@ UNLIKE: Final = 1.15
 by set-point). The two factors are assumed to differ at most by ``UNLIKE``."""
 FEED_FORWARD: Final = (Setting.LEFT_FEED_FORWARD, Setting.RIGHT_FEED_FORWARD)
 AT_LEAST: Final = 4
+AT_LEAST_BACKWARD: Final = 8
 """Smallest number of reports without motion after which a wheel is stalled. It prevents a false
-alarm on a bad line, where few reports arrive."""
+alarm on a bad line, where few reports arrive. ``AT_LEAST_BACKWARD``: for a wheel commanded
+backward, because a wheel that rolls steadily may also show the same speed in a few reports."""
 
 
 class StallWatch:
@@ -104,8 +106,10 @@ class StallWatch:
         If a wheel is reported, the timing of both wheels begins again.
         """
         left, right = (
-            now - seen_at >= STALLED_S and quiet >= AT_LEAST
-            for seen_at, quiet in zip(self._seen_at, self._quiet, strict=True)
+            now - seen_at >= STALLED_S and quiet >= (AT_LEAST_BACKWARD if target < 0 else AT_LEAST)
+            for seen_at, quiet, target in zip(
+                self._seen_at, self._quiet, self._targets, strict=True
+            )
         )
         if left or right:
             self._seen_at = [at if at == math.inf else now for at in self._seen_at]
