@@ -20,6 +20,7 @@ from omnibot_driver.core.lois_ecu.reported_speed import (
     ODOMETRY_AGE_S,
     ReportedSpeed,
 )
+from omnibot_driver.core.lois_ecu.resting import REPORT_S
 from omnibot_driver.core.lois_ecu.wheel_motion import (
     ALONG,
     COUNT,
@@ -63,6 +64,15 @@ steady speed, ``SWINGING_M`` at an oscillating one."""
 SWERVED_M: Final = 0.05
 """Standard deviation in m of the robot's position after a wheel has rolled 1 m at an oscillating
 speed. It is added to the effect of ``SWINGING_M``."""
+LOST_PART: Final = (0.15, 0.35)
+"""Standard deviation of the error that lost reports cause in a wheel's distance without counted
+ticks, as a fraction of what the wheel rolls in the gap. First value: at a steady speed. Second
+value: at an oscillating one."""
+CORRECTED_TICKS: Final = 2.0
+CORRECTED_PART: Final = 0.5
+"""``CORRECTED_PART``: standard deviation of the error of a correction by the board's odometry
+(0x20), as a fraction of the part of the correction that exceeds ``CORRECTED_TICKS``. A large
+correction is wrong, because the filter is linear and the start of a wheel is not."""
 LATE_PART: Final = 0.6
 """A late report causes an error in a wheel's distance without counted ticks. This is the standard
 deviation of the error, as a fraction of the distance that the wheel rolls in the delay."""
@@ -177,7 +187,10 @@ class Comparison:
                 swings = wheel.rests or self._speeds[index].resting.swings
                 part = SWINGING_M if swings else BLIND_M
                 late_m = 0.0 if wheel.rests else LATE_PART * motion.speed_mps(index) * late_s
-                motion.shift(index, 0.0, math.hypot(part * math.sqrt(min(rolled_m, 1.0)), late_m))
+                lost_s = 0.0 if wheel.rests else max(duration_s - REPORT_S, 0.0)
+                lost_m = LOST_PART[swings] * motion.speed_mps(index) * lost_s
+                unseen_m = part * math.sqrt(min(rolled_m, 1.0))
+                motion.shift(index, 0.0, math.hypot(unseen_m, late_m, lost_m))
                 for state in (X, Y) if swings else ():
                     motion.filter.disturb([(state, 1.0)], SWERVED_M**2 * min(rolled_m, 1.0))
         # Neither wheel has ticked, or both wheels have the same speed.
@@ -189,8 +202,14 @@ class Comparison:
         rolling = abs(motion.speed_mps(0)) + abs(motion.speed_mps(1))
         pause_s = min(motion.tick_m / max(rolling, 0.01), LONGEST_PAUSE_S)
         self._turned_m += told.turned_m
+        before_m = motion.way_m(0), motion.way_m(1)
         self._turn(told, shown[1] - shown[0], pause_s, duration_s, late_s)
         self._along(told, sum(shown) / 2, pause_s)
+        for index, wheel in enumerate(motion.wheels):
+            corrected_m = abs(motion.way_m(index) - before_m[index])
+            large_m = corrected_m - CORRECTED_TICKS * motion.tick_m
+            if wheel.blind and large_m > 0.0:
+                motion.shift(index, 0.0, CORRECTED_PART * large_m)
         if told.speeds_mps is None:
             return
         left, right = (wheel.course.measured_sign for wheel in motion.wheels)

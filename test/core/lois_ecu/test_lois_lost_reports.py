@@ -7,7 +7,7 @@ import math
 import pytest
 from lois_drives import HOST_GAINS, Rig, nominal
 
-from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks
+from omnibot_driver.core.lois_ecu import BoardOdometry, SetRpm, Ticks, comparison
 from omnibot_driver.core.lois_ecu.odometry import LoisOdometry
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
@@ -99,3 +99,49 @@ def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports
     for step in range(6):
         told.report(0.5, (-10 - step % 2, -12))
     assert told.yaw_stddev_deg > math.degrees(3.0 * 12 * UNIT_MPS / TRACK_M) / 2
+
+
+@pytest.mark.parametrize(
+    ("right_rpms", "more_deg"),
+    [((-24, -24, -24, -24), 3.0), ((-32, -31, -18, -17), 8.0)],
+    ids=["steady", "swinging"],
+)
+def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
+    right_rpms: tuple[int, ...], more_deg: float
+) -> None:
+    """In a drive backward, reports are lost for 0.9 s. The wheels may have changed their speeds.
+
+    The standard deviation of the heading grows by more than without the gap. It grows even more if
+    the speed of a wheel swings.
+    """
+
+    def grown_deg(gap_s: float) -> float:
+        told = Told((-20, -24))
+        for step in range(40):
+            told.report(0.2, (-20 - step % 2, right_rpms[step % 4]))
+        before_deg = told.yaw_stddev_deg
+        told.report(gap_s, (-20, -24))
+        return math.sqrt(told.yaw_stddev_deg**2 - before_deg**2)
+
+    assert grown_deg(0.9) > grown_deg(0.2) + more_deg
+
+
+def test_a_large_correction_by_the_heading_of_0x20_is_not_exact(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Reports are lost while the wheels start. The next one shows a turn that was not expected.
+
+    The odometry corrects the heading by 0x20. The filter is linear and the start is not, so the
+    error of this correction is part of the covariance.
+    """
+
+    def stddev_deg() -> float:
+        told = Told((17, -17))
+        for _ in range(2):
+            told.report(0.2, (0, 0))
+        told.report(0.5, (5, -18))
+        return told.yaw_stddev_deg
+
+    ours_deg = stddev_deg()
+    monkeypatch.setattr(comparison, "CORRECTED_PART", 0.0)
+    assert ours_deg > 1.5 * stddev_deg()
