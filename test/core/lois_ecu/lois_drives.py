@@ -290,14 +290,15 @@ def motion(
     ours: LoisEcuSettings | None = None,
     *,
     side_m: float = 5.0,
+    loss: float = 0.0,
     reads_s: tuple[float, float] = (0.0, 0.0),
 ) -> Drive:
     """Drive one of the motions ``MOTIONS`` or ``VARIED``, and return the outcome.
 
-    The encoders begin at random positions between two ticks. ``reads_s``: least and greatest time
-    between two reads of the driver, in s.
+    The encoders begin at random positions between two ticks. ``loss``: probability that a byte is
+    lost. ``reads_s``: least and greatest time between two reads of the driver, in s.
     """
-    rig = Rig(settings, ours, reads_s=reads_s)
+    rig = Rig(settings, ours, loss=loss, reads_s=reads_s)
     random = Random(f"encoders {settings.seed}")
     for encoder in rig.board._vehicle.encoders:
         encoder._periods = random.random()
