@@ -282,8 +282,8 @@ class Stops(Ground, ABC):
         """Record that the server answers a stop only after the driver has used the stop port.
 
         In this state, the server's stop port could hang the next forward drive (RM); see
-        docs/boards/mart.md. A number is no such answer: it answers an earlier query, or the stop of
-        a turn on the spot, which leaves the stop port free.
+        docs/boards/mart.md. A number does not show this state: it answers an earlier query, or the
+        stop of a turn on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

@@ -74,7 +74,7 @@ def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: floa
 
 
 def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
-    """The line is interrupted in both directions, and the robot is told to stop meanwhile.
+    """The line is interrupted in both directions, and the user stops the robot meanwhile.
 
     The robot drives on. The covariance includes the distance.
     """
