@@ -33,14 +33,6 @@ BEAT_READS: Final = 12
 An adapter with a timer of 16 ms reads at five phases of a 10 ms tick. Each phase has its own delay.
 In 12 reads, each phase occurs twice, also the one with the least delay.
 """
-BEHIND: Final = 10.0
-BEHIND_READS: Final = 3
-"""``BEHIND``, ``BEHIND_READS``: delay of the newest sample, in periods, and number of consecutive
-reads with a longer delay, that show lost ticks to a host that reads rarely.
-
-Such a host takes all samples that wait, so the newest one has not waited for long. The reads must
-extend over ``BEAT_READS`` periods, as they do for a host that reads in time.
-"""
 CALM: Final = 0.45
 """Largest difference from the fitted clock, in periods, of a read whose tick number is certain.
 
@@ -89,10 +81,6 @@ class DeviceClock:
         self._single_reads = 0
         """How many reads in a row, up to the last one, brought exactly one sample."""
         self._lags_s: deque[float] = deque(maxlen=BEAT_READS)
-        self._behind_reads = 0
-        self._behind_since_s, self._least_behind_s = math.inf, math.inf
-        """Of the consecutive reads, up to the last one, whose newest sample is late by more than
-        ``BEHIND`` periods: their number, the time of the first one, and the smallest delay."""
         self._seen_at = -math.inf
         """Time in s at which a new tick was seen last.
 
@@ -226,15 +214,8 @@ class DeviceClock:
         lag_s = arrival - line.at(tick)
         period_s, lags_s = self._period_s, self._lags_s
         short = 0
-        self._follow_behind(lag_s, now)
         if self._settled and lag_s < -period_s / 2:
             short = round(lag_s / period_s)
-        elif (
-            self._behind_reads >= BEHIND_READS
-            and now - self._behind_since_s >= BEAT_READS * period_s
-        ):
-            short, counted = round(self._least_behind_s / period_s), True
-            lags_s.clear()
         elif len(lags_s) == BEAT_READS:
             self._settled = True
             *before_s, last_s = lags_s
@@ -249,8 +230,6 @@ class DeviceClock:
             elif min(lags_s) > period_s / 2:
                 short, counted = round(min(lags_s) / period_s), True
                 lags_s.clear()
-        if short:
-            self._behind_reads = 0
         if short > LARGEST_LOSS_TICKS:
             self.restart()
             line = self._line = ClockFit(period_s, (tick, arrival))
@@ -270,19 +249,6 @@ class DeviceClock:
         is_calm = self._settled and not edge.cut and abs(lag_s) <= self._calm_s
         self._calm = line if is_calm else None
         return short
-
-    def _follow_behind(self, lag_s: float, now: float) -> None:
-        """Count the consecutive reads whose newest sample, late by ``lag_s``, is very late.
-
-        Reads within half a period are counted as one.
-        """
-        if lag_s <= BEHIND * self._period_s:
-            self._behind_reads = 0
-            return
-        if not self._behind_reads:
-            self._behind_since_s, self._least_behind_s = now, math.inf
-        self._behind_reads += now - self._seen_at >= self._period_s / 2
-        self._least_behind_s = min(self._least_behind_s, lag_s)
 
     def _see(self, line: ClockFit, tick: int, lag_s: float, now: float) -> None:
         """Record the delay ``lag_s`` of a new tick, which was read at ``now``.

@@ -281,30 +281,6 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
     assert after.unevenness() < 0.2e-3
 
 
-@pytest.mark.parametrize("imu_only", [False, True])
-def test_an_outage_is_found_by_a_host_that_reads_rarely(imu_only: bool) -> None:
-    """The frames of a second are lost, and the host reads every 50 to 300 ms.
-
-    The stamps are right again 0.7 s after the outage, or with the next displacement.
-    """
-    for seed in SEEDS:
-        rng = random.Random(seed)
-        board = Board(seconds=10, imu_only=imu_only)
-        reads: list[Read] = []
-        read_at = ends_at = 0.0
-        for at, data in bursts(board.stream(rng), rng):
-            if 1005.0 < at < 1006.0:
-                continue
-            if at > ends_at:
-                read_at = ends_at = max(at, ends_at) + rng.uniform(0.05, 0.3)
-                reads.append((read_at, data))
-            else:
-                reads[-1] = read_at, reads[-1][1] + data
-        stamped = stamp(DeviceClock(0.01), board, reads)
-        late_s = 0.7 if imu_only else 0.35
-        assert max(map(abs, stamped.errors(since_s=6.0 + late_s))) < 0.02
-
-
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
     """An adapter may cut the stream between a displacement and the IMU sample of the same tick.
 
