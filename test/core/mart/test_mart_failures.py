@@ -350,3 +350,29 @@ def test_a_wrong_sign_or_scale_stops_the_robot_and_is_told_by_its_parameter(
     bench.command(0.3, 0.0, 6.0)
     assert bench.robot.stands
     assert any(f"check `{parameter}`" in notice for notice in bench.notices)
+
+
+def test_another_server_is_refused_by_its_name() -> None:
+    """A different server answers HELLO with its own name.
+
+    The driver refuses motion, and a notice contains this name.
+    """
+    bench = MartBench()
+    bench.open()
+    bench.run(0.5)
+    for _ in range(30):
+        bench.session.inbound.receive(b"ok ROVER", bench.now)
+        bench.run(0.1)
+    assert "ROVER" in bench.session.board.refusal
+    assert any("ROVER" in notice for notice in bench.notices)
+
+
+def test_nobody_answers() -> None:
+    """A controller that never answers is reported once, and motion is refused."""
+    bench = MartBench()
+    bench.speaks = False
+    bench.open()
+    bench.run(12.0)
+    assert bench.session.state == "connecting"
+    assert sum("no data from the board" in notice for notice in bench.notices) == 1
+    assert bench.try_command(0.3, 0.0)

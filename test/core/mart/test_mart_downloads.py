@@ -1,0 +1,180 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of the files that the controller sends: the log, and the records of moves and turns."""
+
+import pytest
+from mart_bench import MartBench
+
+from omnibot_driver.core.errors import RequestRefused
+from omnibot_driver.core.mart.jobs import Job
+from omnibot_driver.core.mart.readings import JobDone
+from omnibot_driver.core.packets import Packet
+from omnibot_driver.simulator.mart import Firmware
+
+
+def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
+    """The request of a download is lost, and a command cancels this download.
+
+    The next download succeeds.
+    """
+    bench = MartBench().ready()
+    bench.command(0.0, 0.5, 2.0)
+    bench.run(3.0)
+    inner = bench.robot.receive
+    bench.robot.receive = lambda data, now, channel: (  # type: ignore[method-assign]
+        None if data == b"LAST MOVE" else inner(data, now, channel)
+    )
+    bench.board.ask(Job.LAST_MOVE, "first", bench.now)
+    bench.run_until(lambda: b"LAST MOVE" in bench.said(), 5.0)
+    bench.try_command(0.0, 0.0)
+    bench.run(1.0)
+    done = bench.job(Job.LAST_TURN)
+    assert done.success, done
+
+
+def test_the_last_move_and_turn_are_downloaded_whole() -> None:
+    """The driver downloads the files of the last move and turn, in pieces of 512 bytes."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.command(0.0, 0.5, 2.0)
+    bench.run(3.0)
+    for job in (Job.LAST_MOVE, Job.LAST_TURN):
+        done = bench.job(job)
+        assert done.success, done
+        assert done.content == bench.server.files[done.name.rpartition("/")[2]].content
+
+
+def test_nothing_to_download_is_told() -> None:
+    """The controller has no file to download. The job fails with the controller's reason."""
+    done = MartBench().ready().job(Job.LAST_MOVE)
+    assert not done.success
+    assert "no file available" in done.message
+
+
+@pytest.mark.parametrize("spoil", ["lose", "double"])
+def test_a_piece_that_is_lost_or_comes_twice_spoils_the_file(spoil: str) -> None:
+    """A piece of a file is lost or comes twice. The download fails, and names the cause."""
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    inner, pieces = bench.robot.advance, 0
+
+    def advance() -> list[tuple[int, bytes]]:
+        nonlocal pieces
+        out: list[tuple[int, bytes]] = []
+        for packet in inner():
+            pieces += len(packet[1]) == 512
+            second = len(packet[1]) == 512 and pieces == 2
+            out += [packet] * ((0 if spoil == "lose" else 2) if second else 1)
+        return out
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+    done = bench.job(Job.LAST_MOVE)
+    assert not done.success
+    assert ("lost" if spoil == "lose" else "twice") in done.message
+
+
+def test_a_last_piece_that_comes_too_early_spoils_the_file() -> None:
+    """Only the last piece of a file is shorter than the others.
+
+    An earlier short piece shows a wrong order, so the download fails.
+    """
+    bench = MartBench().ready()
+    bench.command(0.3, 0.0, 2.0)
+    bench.run(3.0)
+    inner = bench.robot.advance
+
+    def advance() -> list[tuple[int, bytes]]:
+        return sorted(inner(), key=lambda packet: len(packet[1]) == 512)
+
+    bench.robot.advance = advance  # type: ignore[method-assign]
+    done = bench.job(Job.LAST_MOVE)
+    assert not done.success
+    assert "order" in done.message
+
+
+def test_a_stop_within_the_download_of_the_log_says_that_the_server_has_ended() -> None:
+    """A download of the log sends EXIT, which ends the server. A stop then interrupts the download.
+
+    The job's result asks the user to copy the file from the controller.
+    """
+    bench = MartBench().ready()
+    assert bench.job(Job.LOG).success
+    bench.board.ask(Job.LOG_FILE, "token", bench.now)
+    bench.run_until(lambda: b"EXIT" in bench.said(), 5.0)
+    bench.try_command(0.0, 0.0)
+    bench.run(0.1)
+    done = bench.extras(JobDone)[-1]
+    assert not done.success
+    assert "copy the file from the controller" in done.message
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("firmware", ["documented", "firmware", "source"])
+def test_a_log_is_downloaded_after_a_straight_drive(firmware: Firmware) -> None:
+    """After a straight drive, the heading is often exactly zero, as after a restart.
+
+    A restart would lose the log. The driver does not assume a restart, so the log can be
+    downloaded.
+    """
+    for seed in range(6):
+        bench = MartBench(firmware, seed=seed).ready()
+        assert bench.job(Job.LOG).success
+        bench.command(0.3, 0.0, 2.0)
+        bench.run(3.0)
+        assert bench.job(Job.LOG_FILE).success, seed
+
+
+def test_only_a_log_that_was_started_ends_the_server() -> None:
+    """The log can be downloaded only after it was started.
+
+    The download sends EXIT and ends the server, so the controller must be started again.
+    """
+    bench = MartBench().ready()
+    with pytest.raises(RequestRefused, match="start_log"):
+        bench.board.ask(Job.LOG_FILE, "token", bench.now)
+    assert bench.job(Job.LOG).success
+    done = bench.job(Job.LOG_FILE)
+    assert done.success
+    assert "must be started again" in done.message
+    assert bench.server.crashed == "EXIT"
+    assert bench.said().count(b"EXIT") == 1
+    bench.run(5.0)
+    assert bench.session.state == "connecting"
+
+
+def test_a_log_is_not_expected_of_a_server_that_was_restarted() -> None:
+    """A server is restarted and has lost its log. The driver refuses the download of the log.
+
+    The download needs EXIT, which would end the server without a file.
+    """
+    bench = MartBench("source").ready()
+    assert bench.job(Job.LOG).success
+    bench.server.restart(1.0)
+    bench.run(3.0)
+    assert bench.session.state == "nominal"
+    with pytest.raises(RequestRefused, match="start_log"):
+        bench.board.ask(Job.LOG_FILE, "token", bench.now)
+
+
+def test_a_lost_reply_to_a_stop_does_not_forget_the_log() -> None:
+    """The reply to a stop is lost, and the repeated stop finds no motion, as after a restart.
+
+    A restart would lose the log. But the heading is not zero, so the server was not restarted, and
+    the log can still be downloaded.
+    """
+    bench = MartBench("source").ready()
+    assert bench.job(Job.LOG).success
+    bench.command(0.3, 0.3, 2.0)
+    advance, lost = bench.robot.advance, []
+
+    def lose() -> list[Packet]:
+        out = advance()
+        if not lost and bench.said()[-1:] == [b"SRM"] and (0, b"ok") in out:
+            lost.append(out.remove((0, b"ok")))
+        return out
+
+    bench.robot.advance = lose  # type: ignore[method-assign]
+    bench.command(0.0, 0.0, 4.0)
+    assert lost
+    assert bench.job(Job.LOG_FILE).success
