@@ -43,7 +43,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """One command of the server.
+    """One command of the server. Two are equal if their texts are.
 
     ``forms``: the forms of a successful reply.
 
@@ -54,12 +54,12 @@ class Word:
     """
 
     text: str
-    kind: Kind
-    forms: frozenset[Form]
-    takes_s: float
-    least_s: float = 0.0
-    channel: int = COMMAND
-    fails: frozenset[str] = field(default_factory=frozenset)
+    kind: Kind = field(compare=False)
+    forms: frozenset[Form] = field(compare=False)
+    takes_s: float = field(compare=False)
+    least_s: float = field(default=0.0, compare=False)
+    channel: int = field(default=COMMAND, compare=False)
+    fails: frozenset[str] = field(default_factory=frozenset, compare=False)
 
     def request(self, *arguments: object) -> "Request":
         """Return a request of this command with these arguments.
