@@ -95,7 +95,7 @@ def test_decoding_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     assert most_calls(FrameDecoder().feed)[kind] <= bound
 
 
-@pytest.mark.parametrize(("kind", "bound"), [(IMU, 48), (DELTA, 159), (POSE, 281)])
+@pytest.mark.parametrize(("kind", "bound"), [(IMU, 47), (DELTA, 159), (POSE, 255)])
 def test_the_core_calls_no_more_than_it_did(kind: int, bound: int) -> None:
     """The session needs at most ``bound`` calls per tick, from the bytes to its events.
 
