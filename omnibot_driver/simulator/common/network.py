@@ -6,6 +6,7 @@ This module knows datagrams, probabilities and board time. It must not know what
 """
 
 import heapq
+import math
 from collections import Counter
 from dataclasses import dataclass
 from random import Random
@@ -53,6 +54,11 @@ class NetworkPath:
             due_s = at_s + self._faults.delay_s * self._random.random()
             heapq.heappush(self._on_their_way, (due_s, self._sent, datagram))
             self._sent += 1
+
+    @property
+    def next_s(self) -> float:
+        """Board time, in s, at which the next datagram arrives; infinite if none is on its way."""
+        return self._on_their_way[0][0] if self._on_their_way else math.inf
 
     def arrived(self, now_s: float) -> list[bytes]:
         """Remove and return the datagrams that have arrived by the board time ``now_s``, in s."""

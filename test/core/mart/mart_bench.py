@@ -30,7 +30,7 @@ class NetworkRobot(MartRobot):
 
     def __init__(self, faults: NetworkFaults, seed: int, **settings: Any) -> None:
         self.board = SimulatedMart(MartSettings(seed=seed, **settings))
-        self._good, self._heard = faults == NetworkFaults(), False
+        self._heard = False
         self.network = [FaultyNetwork(faults, f"{seed} {channel}") for channel in (0, 1)]
 
     def receive(self, data: bytes, now: float, channel: int) -> None:
@@ -39,7 +39,7 @@ class NetworkRobot(MartRobot):
 
     def advance(self) -> list[Packet]:
         out: list[Packet] = []
-        if self._good and not self._heard and sleeps(self.board):
+        if not self._heard and self._network_rests() and sleeps(self.board):
             return out
         self._heard = False
         for _ in range(5):
@@ -52,6 +52,15 @@ class NetworkRobot(MartRobot):
             for channel, way in enumerate(self.network):
                 out += [(channel, data) for data in way.from_board.arrived(self.board.now_s)]
         return out
+
+    def _network_rests(self) -> bool:
+        """Return whether nothing can arrive in the next five ticks."""
+        until_s = (self.board.ticks + 5) * TICK_S
+        return all(
+            path.next_s > until_s
+            for way in self.network
+            for path in (way.to_board, way.from_board)
+        )
 
 
 def sleeps(board: SimulatedMart) -> bool:

@@ -37,7 +37,6 @@ EVERY_FIRMWARE: list[Firmware] = ["documented", "firmware", "source"]
 def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
     """Return a bench that is ready, and whose network has these faults from now on."""
     bench = MartBench(firmware, seed=seed).ready()
-    bench.robot._good = False
     for channel in bench.robot.network:
         channel.to_board._faults = channel.from_board._faults = network
     return bench
@@ -45,20 +44,22 @@ def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
 
 def reach(bench: MartBench, goal: Pose) -> str:
     """Command the goal, and wait for its end. Return the driver's messages."""
-    since = len(bench.events)
+    seen, texts = len(bench.events), list[str]()
 
-    def messages() -> str:
-        return " ".join(each.text for each in bench.events[since:] if isinstance(each, Notice))
+    def ended() -> bool:
+        nonlocal seen
+        texts.extend(each.text for each in bench.events[seen:] if isinstance(each, Notice))
+        seen = len(bench.events)
+        return pilot.goal_progress.startswith("over") or any("discarded" in text for text in texts)
 
     bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
     bench.run(0.1)
     pilot = bench.board._pilot
-    bench.run_until(
-        lambda: pilot.goal_progress.startswith("over") or "discarded" in messages(), 120.0
-    )
+    bench.run_until(ended, 120.0)
     bench.run(3.0)
     assert bench.robot.stands
-    return messages()
+    ended()
+    return " ".join(texts)
 
 
 def yaw_error(bench: MartBench) -> float:

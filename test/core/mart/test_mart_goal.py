@@ -221,7 +221,6 @@ def test_a_late_ok_of_the_check_does_not_confirm_a_drive_that_was_lost(firmware:
     adds no motion.
     """
     bench = MartBench(firmware).ready()
-    bench.robot._good = False
     bench.command(-0.2, 0.0, 3.0)
     replies = bench.robot.network[0].from_board
     replies._faults = NetworkFaults(duplicate=1.0)

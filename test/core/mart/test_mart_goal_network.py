@@ -106,7 +106,6 @@ def test_a_turn_that_runs_twice_is_counted_twice_or_uncertain(
     """
     settings = Settings(network_delay_s=delay_s)
     bench = MartBench(firmware, settings=settings).ready()
-    bench.robot._good = False
     moves = twice_once(bench, b"MC", 0.02)
     bench.go_to(0.0, 0.0, math.radians(degrees))
     bench.run_until(lambda: bool(moves) and bench.board._pilot._last_move is None, 20.0)
@@ -149,7 +148,6 @@ def test_the_first_move_of_an_uncalibrated_robot_is_not_taken_for_half_a_move() 
     nothing to the pose.
     """
     bench = MartBench("source", speed_mps_per_unit=0.0039).ready()
-    bench.robot._good = False
     bench.go_to(1.0, 0.0, 0.0)
     pilot, network = bench.board._pilot, bench.robot.network[0]
     quiet = (b"ENC", b"HELLO", b"RMRA")
@@ -267,7 +265,6 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
         real(data, at_s + 0.25 if checked else at_s)
 
     network.to_board.send, network.from_board.send = send, reply
-    bench.robot._good = False
     bench.go_to(0.0, 0.0, math.pi / 2)
     bench.run(10.0)
     assert bench.robot.stands

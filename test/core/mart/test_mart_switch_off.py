@@ -32,7 +32,6 @@ def registers(bench: MartBench) -> tuple[int, int]:
 def creeping(firmware: Firmware = "source") -> MartBench:
     """Return a bench whose robot has just driven straight, and whose left motor is still on."""
     bench = MartBench(firmware).ready()
-    bench.robot._good = False
     bench.go_to(0.5, 0.0, 0.0)
     pilot = bench.board._pilot
     bench.run_until(lambda: pilot.motion is Motion.STRAIGHT, 10.0)
@@ -185,7 +184,6 @@ def test_a_server_that_does_not_answer_the_switch_off_drives_nevertheless(reply:
     The driver tries a few times, reports once that there is no answer, and then starts motions.
     """
     bench = MartBench("documented")
-    bench.robot._good = False
     network = bench.robot.network[0]
     real = network.to_board.send
 
@@ -301,7 +299,6 @@ def test_a_driver_releases_a_server_that_another_one_has_left_in_a_switch_off(
     driver uses the stop port.
     """
     bench = MartBench("source")
-    bench.robot._good = False
     bench.server.receive(BOTH[0], 0, None, 0.0)
     bench.run(0.1)
     assert bench.server.manual
@@ -341,7 +338,6 @@ def test_a_copy_of_the_release_reply_is_not_taken_for_the_check_of_the_imu() -> 
     in progress.
     """
     bench = MartBench("source", settings=Settings(network_delay_s=0.5))
-    bench.robot._good = False
     bench.server.receive(b"RM 30", 0, None, 0.0)
     bench.run(0.5)
     began_s = bench.now

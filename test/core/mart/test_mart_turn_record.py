@@ -52,7 +52,6 @@ def lose_once(bench: MartBench, begins: bytes) -> None:
                 real(data, at_s)
 
         way.send = send
-    bench.robot._good = False
 
 
 def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -> list[float]:
@@ -76,7 +75,6 @@ def copy_late(bench: MartBench, request: bytes, after_s: float, late_s: float) -
         real(data, at_s + (late_s if of_copy and is_file else 0.0))
 
     there.send, back.send = send, reply
-    bench.robot._good = False
     return copied_s
 
 
