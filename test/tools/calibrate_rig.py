@@ -7,18 +7,21 @@ The board has planted errors, which a calibration must find.
 
 import math
 import re
+import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass, field
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from driver_process import Driver
+from driver_process import PATIENCE_S, Driver
 
 from omnibot_driver.simulator.omnibot import BoardSettings, PtyBoard, SimulatedBoard
-from omnibot_driver.tools.calibrate import listener
+from omnibot_driver.tools.calibrate import client, listener, motion
+from omnibot_driver.tools.calibrate import robot as robot_module
 from omnibot_driver.tools.calibrate.__main__ import main
 from omnibot_driver.tools.calibrate.connection import connect
 from omnibot_driver.tools.calibrate.interruption import Interruption
@@ -27,7 +30,11 @@ from omnibot_driver.tools.calibrate.robot import Robot
 Answer = Callable[[str], str]
 
 BUSY_S = 3.0
-"""Timeout of commands and data, in s. It is longer than the delays of a busy test machine."""
+"""Timeout of commands and data, in s. It is longer than most delays of a busy test machine."""
+ATTEMPTS = 5
+STALLED = "driver stalled for"
+OVERLOADED = ("did not run for", "not overloaded")
+"""The driver and the tool report with these texts that the computer was too busy."""
 
 
 def yes(_question: str) -> str:
@@ -48,14 +55,27 @@ class Rig:
         return self.folder / "robot.yaml"
 
     def calibrate(self, *words: str, answer: Answer = yes) -> int:
-        """Run a calibration in this process, and return its exit code."""
+        """Run a calibration in this process, and return its exit code.
+
+        If it ends with an error because the computer was too busy, it is begun again.
+        """
 
         def read(question: str) -> str:
             self.questions.append(question)
             return answer(question)
 
         files = ("--output", str(self.output), "--plot", str(self.folder))
-        return main([*words, *files, "--namespace", self.driver.namespace], read)
+        for _ in range(ATTEMPTS):
+            since, errors = len(self.driver.lines), StringIO()
+            with redirect_stderr(errors):
+                code = main([*words, *files, "--namespace", self.driver.namespace], read)
+            print(errors.getvalue(), file=sys.stderr, end="")
+            was_busy = any(STALLED in line for line in self.driver.lines[since:]) or any(
+                text in errors.getvalue() for text in OVERLOADED
+            )
+            if code != 1 or not was_busy:
+                break
+        return code
 
     def written(self) -> dict[str, Any]:
         """Return the content of the calibration file that was written."""
@@ -75,6 +95,14 @@ def rig(
         Driver(port=port.path, **{"cmd_vel_timeout": BUSY_S, **(parameters or {})}) as driver,
     ):
         patch.setattr(listener, "LOST_S", BUSY_S)
+        patch.setattr(motion, "LOOK_S", BUSY_S)
+        for module, name in (
+            (client, "FOUND_WITHIN_S"),
+            (client, "ANSWER_WITHIN_S"),
+            (listener, "FOUND_WITHIN_S"),
+            (robot_module, "ANSWER_WITHIN_S"),
+        ):
+            patch.setattr(module, name, PATIENCE_S)
         driver.wait_for_line("state: nominal|state: imu_only")
         yield Rig(port, driver, folder)
 

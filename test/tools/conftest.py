@@ -18,5 +18,8 @@ def rigged(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Rig]:
 
 @pytest.fixture
 def robot(rigged: Rig) -> Iterator[Robot]:
+    """Yield a calibration's connection to the robot, with the e-stop released."""
     with robot_of(rigged.driver) as robot:
+        if robot._estop:
+            robot.call("estop", False)
         yield robot

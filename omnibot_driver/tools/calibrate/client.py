@@ -24,6 +24,12 @@ from omnibot_driver.tools.needs import ToolError
 
 FOUND_WITHIN_S: Final = 5.0
 ANSWER_WITHIN_S: Final = 12.0
+SPIN_S: Final = 0.005
+"""Time, in s, for which the executor waits for a message.
+
+It is constant, because rclpy's executor takes turns between the subscriptions only while its
+arguments stay equal. Otherwise, on a busy computer, the IMU would leave no turn for the e-stop.
+"""
 
 
 class Client:
@@ -164,5 +170,5 @@ class Client:
 
     def _hear(self, seconds: float) -> None:
         deadline_s = time.monotonic() + seconds
-        while (left_s := deadline_s - time.monotonic()) > 0:
-            self._executor.spin_once(timeout_sec=left_s)
+        while time.monotonic() < deadline_s:
+            self._executor.spin_once(timeout_sec=SPIN_S)
