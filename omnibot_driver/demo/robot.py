@@ -64,7 +64,7 @@ class Robot:
         self._node = node = rclpy.create_node("demo", namespace=namespace)
         self._cmd_vel = node.create_publisher(Twist, "cmd_vel", 1)
         if imu:
-            node.create_subscription(Imu, "imu/data_raw", self._on_imu, 50)
+            node.create_subscription(Imu, "imu/data_raw", self._on_imu, 1000, raw=True)
         node.create_subscription(Odometry, "odom", self._on_odom, 50)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         node.create_subscription(String, "omnibot_driver/state", self._on_state, latched)
@@ -117,7 +117,7 @@ class Robot:
     def _on_estop(self, message: Bool) -> None:
         self._estop = message.data
 
-    def _on_imu(self, _message: Imu) -> None:
+    def _on_imu(self, _message: bytes) -> None:
         if self.imu is not None:
             self.imu.arrived(time.monotonic())
 

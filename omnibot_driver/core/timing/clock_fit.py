@@ -96,7 +96,9 @@ class ClockFit:
             self._latest.append((best, cut))
         if len(self._not_before) >= FEWEST_READS:
             slope_s = self.slope_s
-            heights = sorted([(time - slope_s * tick, tick, time) for tick, time in self._not_before])
+            heights = sorted(
+                [(time - slope_s * tick, tick, time) for tick, time in self._not_before]
+            )
             _, tick, time = heights[-1 - int(LATE_PART * len(heights))]
             earliest = tick, time - LATE_S
             is_near = 0.0 < self._height(best) - self._height(earliest) < WIDEST * self._period_s

@@ -57,9 +57,7 @@ class NetworkRobot(MartRobot):
         """Return whether nothing can arrive in the next five ticks."""
         until_s = (self.board.ticks + 5) * TICK_S
         return all(
-            path.next_s > until_s
-            for way in self.network
-            for path in (way.to_board, way.from_board)
+            path.next_s > until_s for way in self.network for path in (way.to_board, way.from_board)
         )
 
 
