@@ -123,7 +123,10 @@ def test_what_happens_on_the_way_ends_it_at_rest(
 def test_a_computer_too_slow_for_the_imu_still_hears_the_estop(
     robot: Robot, rigged: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """IMU messages arrive faster than the tool reads them. The tool still reads the other topics."""
+    """IMU messages arrive faster than the tool reads them.
+
+    The tool still reads the other topics.
+    """
     estop = robot._node.create_publisher(Bool, "estop", 10)
     assert robot._wait(estop.get_subscription_count, PATIENCE_S)
     (imu,) = (each for each in robot._node.subscriptions if each.msg_type is Imu)
