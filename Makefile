@@ -49,7 +49,7 @@ demo: $(VENV)/.runtime  ## drive a square on a simulated BOARD, until ctrl-C or 
 	@$(PY) -m omnibot_driver.demo --board $(BOARD)
 
 test: lint $(VENV)/.docs  ## run every check and test
-	$(PY) -m pytest -n 8 --dist loadfile --no-loadscope-reorder $(ENDS_HANGING)  # the longest files first: conftest.py
+	$(PY) -m pytest -n 4 --dist loadfile --no-loadscope-reorder $(ENDS_HANGING)  # the longest files first: conftest.py
 
 check: lint  ## check formatting, style and types, and run the quick tests (a minute if the computer is idle)
 	$(PY) -m pytest -n 2 -q -m "not slow" $(QUICK)

@@ -8,6 +8,7 @@ examples than usual.
 
 import os
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,20 +41,22 @@ WAITING = ("faults", "system", "tools")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let parallel workers begin with the slow test files.
+    """Let parallel workers begin with the longest files, then alternate between the kinds of files.
 
-    Otherwise one worker is still busy with a long file when the others have ended.
+    Tests that wait leave computing time for the tests that compute. Otherwise the drivers of many
+    waiting tests would run at once, and starve.
     """
     if not hasattr(config, "workerinput"):
         return
     home = Path(__file__).parent
-    slow = (home / "test_board_removed.py", home / "integrity" / "test_integrity.py")
-
-    def rank(item: pytest.Item) -> int:
-        path = item.path
-        return 0 if path in slow else 1 if path.relative_to(home).parts[0] in WAITING else 2
-
-    items.sort(key=rank)
+    first = (home / "test_board_removed.py", home / "integrity" / "test_integrity.py")
+    places: dict[Path, tuple[int, bool]] = {}
+    seen = Counter[bool]()
+    for path in dict.fromkeys(item.path for item in items):
+        computes = path.relative_to(home).parts[0] not in WAITING
+        seen[computes] += 1
+        places[path] = (-1 if path in first else seen[computes], computes)
+    items.sort(key=lambda item: places[item.path])
 
 
 def pytest_report_header() -> str:
