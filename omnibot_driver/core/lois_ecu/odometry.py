@@ -12,29 +12,21 @@ Time is an argument. All times are arrival times in s.
 import math
 from typing import Final
 
-from omnibot_driver.core.geometry.differential import DifferentialKinematics
-from omnibot_driver.core.geometry.se2 import Pose
-from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu.board_kind import BoardKind
 from omnibot_driver.core.lois_ecu.board_odometry import OdometryReader
 from omnibot_driver.core.lois_ecu.comparison import Comparison
+from omnibot_driver.core.lois_ecu.estimates import Estimates
 from omnibot_driver.core.lois_ecu.fused_odometry import FusedOdometry, Source
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, SetDuty, SetRpm, Stream, Ticks
 from omnibot_driver.core.lois_ecu.misconfiguration import own_gains
 from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.plausibility import wrapped
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
-from omnibot_driver.core.lois_ecu.size_errors import SizeErrors
 from omnibot_driver.core.lois_ecu.wheel_model import CommandKind
 from omnibot_driver.core.lois_ecu.wheel_motion import PER_WHEEL, WAY, X, Y
-from omnibot_driver.core.odometry.covariance import Covariance, OdometryNoise, Uncertainty
 
 __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
-WHEEL_DRIFT: Final = 0.0035
-"""Assumed standard deviation, in m, of the random error of a wheel's distance after 1 m."""
-LATE_S: Final = 0.012
-"""Assumed standard deviation of an arrival time in s, until a better value is known."""
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
 """The pose is predicted for this number of tick periods after the last report, or for ``UNHEARD_S``
@@ -45,15 +37,18 @@ to have followed their set-points, unless a set-point changed in the silence."""
 FEWEST_UNFORESEEN: Final = 2.0
 """Smallest difference between a reported and an expected count, in ticks, that can show a restart
 of the board."""
-HIDDEN_PART: Final = 1 / 6
 FASTEST_MPS: Final = 5.0
 
 
 class LoisOdometry:
-    """Odometry of a robot with a LOIS ECU. Pairs of values are for the left and the right wheel."""
+    """Odometry of a robot with a LOIS ECU. Pairs of values are for the left and the right wheel.
+
+    ``estimates``: the estimates that it returns.
+    """
 
     def __init__(self, settings: LoisEcuSettings) -> None:
         self._motion = MotionFilter()
+        self.estimates = Estimates(self._motion)
         self._comparison = Comparison(self._motion)
         self._kind = BoardKind(self._motion)
         self._ticks: Ticks | None = None
@@ -61,16 +56,12 @@ class LoisOdometry:
         self._estimated = False
         """Whether no time has passed since the last estimate. If so, a report may still show motion
         from before the estimate, because it was read together with the ticks of the estimate."""
-        self._may_roll_mps = [0.0, 0.0]
+        self._may_roll_mps = 0.0, 0.0
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
         self._said: SetRpm | SetDuty | None = None
         self._said_at_s = -math.inf
         """``_said``: last set-point. ``_said_at_s``: time since which it is the same."""
-        self._uncertainty = Uncertainty(OdometryNoise())
-        self._source: Source = "standing"
-        self.late_stddev_s = LATE_S
-        """Standard deviation of the timestamps, in s."""
         self.configure(settings)
         self.reset()
         self.connect()
@@ -93,15 +84,12 @@ class LoisOdometry:
         self._board = OdometryReader(settings.track_m, settings.rim_mps_per_rpm)
         if other_wheels:
             self._comparison.begin_counts()
-        wheels = DifferentialKinematics(wheel_radius_m=1.0, track_m=settings.track_m)
-        self._uncertainty.noise = OdometryNoise(
-            wheel_drift=WHEEL_DRIFT, wheel_scale=0.0, wheel_slip=0.0, wheels=wheels
-        )
+        self.estimates.configure(settings)
 
     @property
     def yaw_rad(self) -> float:
         """Yaw of the last estimate, in rad."""
-        return self._pose.yaw_rad
+        return self.estimates.pose.yaw_rad
 
     @property
     def appends(self) -> bool:
@@ -126,9 +114,7 @@ class LoisOdometry:
         for wheel in self._motion.wheels:
             wheel.rolled_to_m = 0.0
         self._motion.yaw0_rad = 0.0
-        self._uncertainty = Uncertainty(self._uncertainty.noise)
-        self._sizes = SizeErrors()
-        self._pose, self._ways_m = Pose(), (0.0, 0.0)
+        self.estimates.reset()
         self._motion.history.forget()
 
     def connect(self) -> None:
@@ -140,7 +126,7 @@ class LoisOdometry:
         self._ticks = None
         self._board.begin()
         self._at_s = self._odometry_at_s = self._heard_at_s = -math.inf
-        self._heading_compared = False
+        self.estimates.heading_compared = False
 
     def restarted(self, now: float, age_s: float | None) -> None:
         """Record that the board has restarted, and so has lost its set-point.
@@ -203,7 +189,8 @@ class LoisOdometry:
             speeds_mps = command.left_percent / scale, command.right_percent / scale
         for index, speed_mps in enumerate(speeds_mps):
             self._motion.wheels[index].course.command(now, kind, speed_mps)
-            self._may_roll_mps[index] = max(self._may_roll_mps[index], abs(speed_mps))
+        left_mps, right_mps = self._may_roll_mps
+        self._may_roll_mps = max(left_mps, abs(speeds_mps[0])), max(right_mps, abs(speeds_mps[1]))
 
     def halted(self, now: float) -> None:
         """Record that the board has set both set-points to zero, because of its e-stop button."""
@@ -272,21 +259,24 @@ class LoisOdometry:
             return
         self._comparison.odometry(told, duration_s, late_s)
         self._keep(now)
-        self._heading_compared = True
+        self.estimates.heading_compared = True
 
     def predict(self, now: float) -> FusedOdometry | None:
         """Return the odometry predicted for ``now``; None before a connection's first ticks."""
         if self._ticks is None or self._at_s == -math.inf:
             return None
         self._advance(min(now, self._heard_at_s + self._unheard_s))
-        return self._fused(max(now, self._at_s))
+        stamp_s = max(now, self._at_s)
+        return self.estimates.now(stamp_s, stamp_s - self._at_s, self._may_roll_mps)
 
     def _keep(self, now: float) -> None:
         """Store the state after a report, for a restart of the board that is noticed later."""
         self._heard_at_s, self._lost_s = now, -math.inf
-        for index, wheel in enumerate(self._motion.wheels):
-            speed_mps = abs(self._motion.speed_mps(index))
-            self._may_roll_mps[index] = max(speed_mps, abs(wheel.course.target_mps))
+        left, right = self._motion.wheels
+        self._may_roll_mps = (
+            max(abs(self._motion.speed_mps(0)), abs(left.course.target_mps)),
+            max(abs(self._motion.speed_mps(1)), abs(right.course.target_mps)),
+        )
         self._motion.history.keep(now)
 
     def _was_silent(self, now: float) -> bool:
@@ -325,59 +315,10 @@ class LoisOdometry:
         self._motion.advance(since_s, now)
         self._at_s = self._advanced_s = max(now, self._at_s)
 
-    # Estimates
-
     @property
     def _blind(self) -> bool:
         return not self._motion.signed and any(wheel.blind for wheel in self._motion.wheels)
 
     def _estimate(self) -> FusedOdometry:
-        motion = self._motion
-        blind = [wheel.blind and not motion.signed for wheel in motion.wheels]
-        ways_m = motion.way_m(0), motion.way_m(1)
-        if not any(blind):
-            self._source = "ticks" if ways_m != self._ways_m else "standing"
-        elif self._heading_compared:
-            self._source = "commands and heading" if all(blind) else "ticks and heading"
-        elif self._source in ("standing", "ticks"):
-            self._source = "commands"
-        self._heading_compared = False
         self._estimated = True
-        fused = self._fused(self._at_s)
-        self._uncertainty.move(self._pose.yaw_rad, self._tangent(fused.wheel_ways_m))
-        self._sizes.move(*fused.wheel_ways_m, motion.turn_sign * motion.track_m)
-        # An error of less than a tick is usually cancelled by the next error. After a turn the
-        # two errors do not cancel, because they have different directions.
-        turned = min(abs(fused.displacement.yaw_rad), 1.0)
-        hidden = HIDDEN_PART * (self._settings.tick_m * turned) ** 2
-        for state in (X, Y):
-            motion.filter.disturb([(state, 1.0)], hidden)
-        self._pose, self._ways_m = fused.pose, ways_m
-        return fused
-
-    def _fused(self, stamp_s: float) -> FusedOdometry:
-        motion = self._motion
-        mean = motion.filter.mean
-        pose = Pose(mean[X], mean[Y], motion.yaw_rad)
-        ways_m = motion.way_m(0) - self._ways_m[0], motion.way_m(1) - self._ways_m[1]
-        speeds = self._tangent((motion.speed_mps(0), motion.speed_mps(1)))
-        twist = BodyTwist(speeds.x_m, 0.0, speeds.yaw_rad)
-        covariance = self._covariance(pose.yaw_rad, twist, stamp_s - self._at_s)
-        variances, displacement = motion.twist_variances(), self._pose.way_to(pose)
-        return FusedOdometry(
-            stamp_s, pose, twist, covariance, variances, displacement, ways_m, self._source
-        )
-
-    def _tangent(self, ways_m: tuple[float, float]) -> Pose:
-        turn = self._motion.turn_sign * (ways_m[1] - ways_m[0]) / self._settings.track_m
-        return Pose((ways_m[0] + ways_m[1]) / 2, 0.0, turn)
-
-    def _covariance(self, yaw_rad: float, twist: BodyTwist, unheard_s: float) -> Covariance:
-        filtered = self._motion.pose_covariance()
-        whole = self._uncertainty.total(Pose()) + self._sizes.covariance(yaw_rad) + filtered
-        left_m, right_m = (speed_mps * unheard_s for speed_mps in self._may_roll_mps)
-        late_m = math.hypot(self.late_stddev_s * twist.vx_mps, (left_m + right_m) / 2)
-        turned_rad = math.hypot(left_m, right_m) / self._settings.track_m
-        late_rad = math.hypot(self.late_stddev_s * twist.yaw_rate_radps, turned_rad)
-        along = (late_m**2, math.cos(yaw_rad), math.sin(yaw_rad), 0.0)
-        return whole.with_errors([along, (late_rad**2, 0.0, 0.0, 1.0)])
+        return self.estimates.conclude(self._at_s, self._may_roll_mps)

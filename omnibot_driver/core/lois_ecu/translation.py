@@ -124,7 +124,7 @@ class Translation:
             case Ticks():
                 restarted = self._watch(report, clock_unit, now)
                 self._late_s = self._time.late_s(report.time_counts, self._unit, now)
-                odometry.late_stddev_s = self._time.stddev_s
+                odometry.estimates.late_stddev_s = self._time.stddev_s
                 self._time.sent(TICKS_LINES)
                 return restarted + self._displaced(odometry.heard_ticks(report, now, self._late_s))
             case BoardOdometry(appended=appended):

@@ -117,7 +117,10 @@ def test_headings_are_accepted_after_a_reset_of_the_odometry() -> None:
     yaw is zero, but the driver still knows that the robot does not face north.
     """
     ecu = LoisConversation(LoisEcuSettings())
-    headings, ecu.translation.odometry._pose = encode_report(Heading(120)) * 20, Pose(0, 0, -2.094)
+    headings, ecu.translation.odometry.estimates.pose = (
+        encode_report(Heading(120)) * 20,
+        Pose(0, 0, -2.094),
+    )
     assert ecu.receive(headings, 0.0)
     ecu.reset_odometry()
     assert ecu.receive(headings, 4.0)
