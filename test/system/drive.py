@@ -81,7 +81,7 @@ def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float 
 
     The caller must have initialised rclpy.
     """
-    from driver_process import Driver
+    from driver_process import PATIENCE_S, Driver
     from geometry_msgs.msg import Twist
     from nav_msgs.msg import Odometry
     from probe import Probe
@@ -111,21 +111,23 @@ def drive(seconds: float, *, lose: float = 0.0, burst: float = 0.0, flip: float 
         random = Random("drive")
         phases = [random.uniform(0.0, math.tau) for _ in range(3)]
         start_tick = board.tick
-        ticks = {"left": round(seconds / TICK_S)}
+        steered = -1
 
-        def steer(_board: SimulatedBoard) -> bool:
-            ticks["left"] -= 1
-            if ticks["left"] % 5 == 0:
-                t, twist = ticks["left"] * TICK_S, Twist()
+        def steer(board: SimulatedBoard) -> bool:
+            nonlocal steered
+            passed = board.tick - start_tick
+            if passed // 5 > steered:
+                steered = passed // 5
+                t, twist = passed * TICK_S, Twist()
                 twist.linear.x = 0.3 * math.sin(0.9 * t + phases[0])
                 twist.linear.y = 0.3 * math.sin(1.3 * t + phases[1])
                 twist.angular.z = 0.45 * math.sin(0.5 * t + phases[2])
                 cmd_vel.publish(twist)
-            return ticks["left"] <= 0
+            return passed * TICK_S >= seconds
 
-        port.wait_for(steer, 2 * seconds + 10.0)
+        port.wait_for(steer, 2 * seconds + PATIENCE_S)
         cmd_vel.publish(Twist())
-        port.wait_for(lambda board: board.tick >= start_tick + (seconds + 2.0) / TICK_S, 20.0)
+        port.wait_for(lambda board: board.tick >= start_tick + (seconds + 2.0) / TICK_S, PATIENCE_S)
         with port.lock:
             sent = [frame.data for frame in board.sent]
         return compare(sent, list(imu), list(odom), seconds, line)
