@@ -5,7 +5,6 @@
 The tests of the rules for motion (what may move or stop a robot) use this bench.
 """
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
@@ -212,7 +211,6 @@ class AnyBench:
         self.hears = self.speaks = True
         self.events: list[Event] = []
         self.written: list[Packet] = []
-        self._wake_s = -math.inf
 
     def open(self) -> None:
         self.session.opened(self.now)
@@ -228,23 +226,16 @@ class AnyBench:
             if self.hears:
                 self.robot.receive(data, self.now, channel)
         self.events += self.session.take_events()
-        self._wake_s = self.session.wake_at
 
     def run(self, seconds: float) -> None:
-        """Advance the simulated time by ``seconds``.
-
-        The session is called only when it has something to do, which saves computing time.
-        """
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
-            packets = self.robot.advance()
-            for channel, data in packets:
+            for channel, data in self.robot.advance():
                 if self.speaks:
                     self.session.inbound.receive(data, self.now, channel)
-            if packets or self.now >= self._wake_s:
-                if self.now >= self.session.wake_at:
-                    self.session.tick(self.now)
-                self.settle()
+            if self.now >= self.session.wake_at:
+                self.session.tick(self.now)
+            self.settle()
 
     def stall(self, seconds: float) -> None:
         """Simulate a stall of the process: data waits for ``seconds`` and is then read together."""

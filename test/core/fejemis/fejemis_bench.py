@@ -65,7 +65,6 @@ class Bench:
         Its arguments are channel and bytes.
         """
         self.read_s = 0.0
-        self._wake_s = -math.inf
         self._unread, self._read_at = [b"", b""], [-math.inf, -math.inf]
         self.events: list[Event] = []
         self.written: list[tuple[float, int, bytes]] = []
@@ -84,7 +83,6 @@ class Bench:
             if channel in self.hears:
                 self.robot.receive(data, self.now, channel)
         self.events += self.session.take_events()
-        self._wake_s = self.session.wake_at
 
     def step(self) -> None:
         self.now += self.robot.tick_s
@@ -97,7 +95,7 @@ class Bench:
                 self._unread[channel], self._read_at[channel] = b"", self.now
                 self.session.inbound.receive(data, self.now, channel)
                 self.settle()
-        if self.now >= self._wake_s:
+        if self.now >= self.session.wake_at:
             self.session.tick(self.now)
             self.settle()
 

@@ -5,6 +5,7 @@
 import math
 from typing import Any
 
+from any_board import TICK_S as BENCH_TICK_S
 from any_board import AnyBench, MartRobot
 
 from omnibot_driver.core.errors import CommandRefused
@@ -89,6 +90,7 @@ class MartBench(AnyBench):
         self.board: Any = self.session.board
         self._odometry: list[OdometryEstimate] = []
         self._sorted = 0
+        self._wake_s = -math.inf
 
     def ready(self) -> "MartBench":
         """Connect, and wait until the session is nominal and the robot is known to stand still."""
@@ -103,6 +105,26 @@ class MartBench(AnyBench):
         self._sorted += len(new)
         self._odometry += [event for event in new if isinstance(event, OdometryEstimate)]
         return self._odometry
+
+    def settle(self) -> None:
+        super().settle()
+        self._wake_s = self.session.wake_at
+
+    def run(self, seconds: float) -> None:
+        """Advance the simulated time by ``seconds``.
+
+        The session is called only when it has something to do, which saves computing time.
+        """
+        for _ in range(round(seconds / BENCH_TICK_S)):
+            self.now += BENCH_TICK_S
+            packets = self.robot.advance()
+            for channel, data in packets:
+                if self.speaks:
+                    self.session.inbound.receive(data, self.now, channel)
+            if packets or self.now >= self._wake_s:
+                if self.now >= self.session.wake_at:
+                    self.session.tick(self.now)
+                self.settle()
 
     def command(self, vx: float, yaw_rate: float, seconds: float) -> None:
         """Command the twist ten times a second for ``seconds``, and ignore refusals."""
