@@ -334,3 +334,8 @@ def test_a_proof_that_fails_may_do_so_at_once(reason: str) -> None:
     talk = conversation()
     talk.ask(words.RESET.request(), 1.0)
     assert talk.hear(parse(f"fail {reason}".encode()), 1.001) is not None
+
+
+def test_no_two_commands_have_the_same_text() -> None:
+    """Commands are compared by their texts, so each text belongs to one command only."""
+    assert len({word.text for word in words.WORDS}) == len(words.WORDS)
