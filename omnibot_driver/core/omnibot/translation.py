@@ -39,6 +39,13 @@ MOST_TEXTS_LOST: Final = 9
 
 A reset is answered within this time. A counter that seems to show more has restarted.
 """
+FULL: Final = 4000
+"""Smallest number of bytes in a read that may have filled the kernel's buffer of 4 KiB. Not all
+bytes of a read are decoded at once."""
+BEHIND_S: Final = 0.5
+"""Shortest delay in s of a read after which the next read may be late too. It is late if it brings
+twice the bytes of its time, and those of a further ``BURST_S``."""
+BURST_S: Final = 0.05
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
@@ -70,6 +77,8 @@ class Translation:
         """``singles_to_come``: number of IMU frames that the fast path ``single_imu`` may still
         decode. ``_most_singles``: its initial value."""
         self.heard_s = -math.inf
+        self._behind_s = 0.0
+        """Time in s from the sending of the last byte to the read that returned it."""
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
         """Return the readings of the frames that one read, at the time ``now``, completed.
@@ -78,17 +87,31 @@ class Translation:
         estimated from its place in the read, because bytes arrive one by one.
         """
         self._catch_up()
-        before_s, self.heard_s = self.heard_s, now
         lengths = [LENGTH.get(type(frame), 0) for frame in found]
         left = sum(skipped) + sum(lengths)
+        before_s = self.heard_s - self._behind_s
+        sent_s = self._sent_s(left, now)
+        self.heard_s, self._behind_s = now, now - sent_s
         readings = []
         for frame, length, before in zip(found, lengths, skipped, strict=True):
             left -= before + length
-            came_s = max(before_s, now - left / self._schedule.bytes_per_s)
+            came_s = max(before_s, sent_s - left / self._schedule.bytes_per_s)
             readings.append(self._read(frame, came_s, before))
         usual = self._paused_count is None and not any(skipped)
         self.singles_to_come = self._most_singles = self.modes.imus_to_come - 1 if usual else 0
         return readings
+
+    def _sent_s(self, count: int, now: float) -> float:
+        """Return when the last of ``count`` bytes was sent that a read at ``now`` returned.
+
+        This is ``now``, unless the computer read late and the kernel's buffer may have been full.
+        The buffer keeps the first bytes and loses the next ones. Several reads may empty it.
+        """
+        duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
+        goes_on = self._behind_s > BEHIND_S and duration_s > 2 * elapsed_s + BURST_S
+        if (count >= FULL or goes_on) and math.isfinite(elapsed_s):
+            return min(now, self.heard_s - self._behind_s + duration_s)
+        return now
 
     def apply(self, happening: Happening) -> None:
         """Apply an event to the mode. Raises RequestRefused if the mode forbids it."""

@@ -1,0 +1,65 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of a reader that is late until the kernel's buffer is full, so that the rest is lost."""
+
+import math
+
+import pytest
+from lossy_odometry import DELTA
+from session_bench import TICK_S, Bench
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.simulator.omnibot import BoardSettings
+
+READ = 4095
+"""Largest number of bytes that a read of a terminal returns."""
+
+
+def board_pose(bench: Bench) -> Pose:
+    pose = bench.board.odometry
+    return Pose(pose.x_mm / 1000.0, pose.y_mm / 1000.0, pose.theta_mrad / 1000.0)
+
+
+def last_count(bench: Bench) -> int:
+    """Return the counter of the last delta that the board sent."""
+    return next(sent.data[-1] for sent in reversed(bench.board.sent) if sent.data[:2] == DELTA)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [254, 0, 3, 60, 200])
+@pytest.mark.parametrize("yaw_rate", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("stall_s", "kept"), [(6.0, READ), (11.0, READ), (10.0, 3 * READ), (15.0, 3 * READ)]
+)
+def test_motion_that_the_full_buffer_lost_is_in_odom_whatever_the_counter_shows(
+    stall_s: float, kept: int, yaw_rate: float, count: int
+) -> None:
+    """The reader stalls for seconds while the robot drives.
+
+    The first bytes arrive in one read or in three, and the following bytes are lost. The first
+    count afterwards may be small, but the board has not restarted. A second later, odom is the
+    board's pose again.
+    """
+    bench = Bench(BoardSettings(seed=3, running=True))
+    bench.open()
+    bench.run(2.0)
+    origin = board_pose(bench)
+    while (last_count(bench) + round(stall_s / 0.04) - count) % 256:
+        if bench.board.tick % 10 == 0:
+            bench.drive(0.4, yaw_rate=yaw_rate)
+        bench.run(TICK_S)
+    held = b""
+    for _ in range(round(stall_s / TICK_S)):
+        held += bench.board.step()
+        bench.now += TICK_S
+    driven = board_pose(bench)
+    for place in range(0, kept, READ):
+        bench.session.inbound.receive(held[place : place + READ], bench.now)
+        bench.now += 0.001
+    bench.settle()
+    bench.run(1.0)
+    assert origin.way_to(driven).way_m > 0.1
+    off = bench.odometry[-1].pose - origin.way_to(board_pose(bench))
+    assert off.way_m < 0.005
+    assert abs(math.remainder(off.yaw_rad, math.tau)) < 0.005
+    assert not any("moves faster" in notice for notice in bench.notices)
