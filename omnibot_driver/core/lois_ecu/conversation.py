@@ -13,6 +13,7 @@ from omnibot_driver.core.errors import CommandRefused, RequestRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
 from omnibot_driver.core.lois_ecu import outbound
 from omnibot_driver.core.lois_ecu.decoder import DecoderStatistics, LoisDecoder
+from omnibot_driver.core.lois_ecu.late_reads import LateReads
 from omnibot_driver.core.lois_ecu.messages import (
     PERIOD_ONCE,
     BoardOdometry,
@@ -58,6 +59,7 @@ class LoisConversation:
     def _forget_line(self) -> None:
         self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
         self._decoder.statistics = self._statistics
+        self._late_reads = LateReads()
         self._points.connect()
         self._stall = StallWatch(self._settings)
 
@@ -106,7 +108,8 @@ class LoisConversation:
             if own:
                 self._upkeep.change.protocol_heard(now)
                 self._decoder.terminal = self._upkeep.change.terminal
-        times = self._decoder.times
+        unit = self._decoder.clock_unit
+        times = self._late_reads.times(reports, self._decoder.times, unit)
         for at, report in zip(times, reports, strict=True):
             if isinstance(report, Ticks):
                 self._upkeep.writer.ticks_came(at)
@@ -121,7 +124,7 @@ class LoisConversation:
                 (stalled[0] and not rolls_left, stalled[1] and not rolls_right)
             )
             self._points.clear_again()
-        found = self._translation.readings(reports, times, self._decoder.clock_unit, now)
+        found = self._translation.readings(reports, times, unit, now)
         if self._translation.needs_date:
             self._upkeep.writer.ask_date(now)
         if self._translation.restarts != restarts:

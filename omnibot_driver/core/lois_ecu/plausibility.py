@@ -34,6 +34,10 @@ the unit is regarded as known."""
 LEARNT_FROM_S: Final = 0.15
 """Shortest time in s between two tick reports that can show the clock's unit. Over a shorter time,
 the errors of the arrival times are too large."""
+ROLLED_OUT_TICKS: Final = 10
+STARTING_TICKS_PER_S: Final = 20.0
+"""``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count, in ticks, after a restart
+of the board. A wheel may roll out and start again in this time."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -46,6 +50,13 @@ Group = TypeVar("Group")
 def wrapped(difference: int) -> int:
     """Return the difference of two 32-bit counters as a signed number, -2³¹..2³¹-1."""
     return (difference + _HALF) % _WRAP - _HALF
+
+
+def began_within(duration_s: float, ticks: Ticks) -> bool:
+    """Return whether clock (in ns) and counts may have begun at zero in the last ``duration_s``."""
+    age_s = ticks.time_counts * 1e-9
+    most = ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * age_s
+    return age_s <= duration_s and max(abs(ticks.left), abs(ticks.right)) <= most
 
 
 class Gate(Generic[Group]):

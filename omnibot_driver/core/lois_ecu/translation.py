@@ -23,7 +23,7 @@ from omnibot_driver.core.lois_ecu.messages import (
     Ticks,
 )
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry, LoisOdometry
-from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, wrapped
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, wrapped
 from omnibot_driver.core.lois_ecu.readings import (
     FixReading,
     HeadingReading,
@@ -42,10 +42,6 @@ RESTARTED_TICKS: Final = 20
 RESTARTED_TICKS_PER_S: Final = 60.0
 """``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count, in ticks, that
 wheels can cause by rolling back. If a count falls further, the board has restarted."""
-ROLLED_OUT_TICKS: Final = 10
-STARTING_TICKS_PER_S: Final = 20.0
-"""``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count, in ticks, after a restart
-of the board. A wheel may roll out and start again in this time."""
 SILENT_S: Final = 1.0
 """Pause in s without tick reports. After a longer pause, counts near zero show a restart even if
 the wheels may have rolled back to them."""
@@ -176,7 +172,7 @@ class Translation:
         rolled = RESTARTED_TICKS_PER_S * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
-        began = left + right > 0 and _began_within(duration_s, ticks)
+        began = left + right > 0 and began_within(duration_s, ticks)
         if began and not contradicted:
             began = self._unit == "ns" and self._restart_is_shown(ticks, duration_s, now)
         if late or began or fewer > RESTARTED_TICKS:
@@ -260,13 +256,6 @@ class Translation:
             return None
         day = _days_since_1970(2000 + date.year, date.month, date.day)
         return day * DAY_S + time.hours * 3600 + time.minutes * 60 + time.seconds
-
-
-def _began_within(duration_s: float, ticks: Ticks) -> bool:
-    """Return whether clock (in ns) and counts may have begun at zero in the last ``duration_s``."""
-    age_s = ticks.time_counts * UNIT_S["ns"]
-    most = ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * age_s
-    return age_s <= duration_s and max(abs(ticks.left), abs(ticks.right)) <= most
 
 
 def _is_date(date: GpsDate) -> bool:

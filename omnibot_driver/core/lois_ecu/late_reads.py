@@ -1,0 +1,108 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Times of reports that waited in the kernel's buffer because the computer read late.
+
+They arrive together. The board's clock, in every tick report, shows when each of them was sent.
+
+Input: reports and their arrival times; output: the time of each report.
+"""
+
+import math
+from collections import deque
+from itertools import pairwise
+from statistics import median
+from typing import Final
+
+from omnibot_driver.core.lois_ecu.messages import Report, Ticks
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, wrapped
+from omnibot_driver.core.values import value
+
+LATE_S: Final = 0.4
+"""Shortest time in s without a report after which the times of several tick reports that arrive
+together are corrected. The odometry expects shorter delays."""
+RATES_KEPT: Final = 15
+
+
+@value(frozen=True, slots=True)
+class Heard:
+    """A tick report, its arrival in s, and its time in s."""
+
+    ticks: Ticks
+    arrived_s: float
+    at_s: float
+
+
+class LateReads:
+    """Times of the reports from one board. They never decrease, and are not after the arrival."""
+
+    def __init__(self) -> None:
+        self._last: Heard | None = None
+        self._waited = False
+        """Whether the last tick report waited, so that the reports after it may have waited too."""
+        self._unit: ClockUnit | None = None
+        self._arrived_s = self._latest_s = -math.inf
+        self._rates: deque[float] = deque(maxlen=RATES_KEPT)
+        """Durations of one unit of the board's clock, in s, as the last tick reports show them."""
+
+    def times(
+        self, reports: list[Report], arrived: list[float], unit: ClockUnit | None
+    ) -> list[float]:
+        """Return the times in s of reports that were read together.
+
+        * ``arrived``: the time in s at which the last line of each report was read.
+        * ``unit``: the unit of the board's clock, None if unknown now. If a clock in ns is near
+          zero, it has wrapped, or the board has restarted. Only the arrival times can tell, so they
+          are returned.
+        """
+        self._unit = unit or self._unit
+        told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]
+        known = [self._last.ticks] if self._last else []
+        known += [ticks for _, ticks in told]
+        shown = self._unit == "ms" or not any(may_have_restarted(*pair) for pair in pairwise(known))
+        found, before = list(arrived), self._last
+        leading_s = before.at_s if before and self._waited and not told else math.inf
+        for number, (place, ticks) in enumerate(told, 1):
+            after = told[number][0] if number < len(told) else len(reports)
+            late = after < len(reports) and arrived[place] > self._arrived_s + LATE_S
+            at_s = self._time(ticks, arrived[place], late=late and shown)
+            if self._waited:
+                found[place:after] = [at_s] * (after - place)
+                if number == 1 and before:  # ticks before these reports were discarded
+                    leading_s = (before.at_s + at_s) / 2
+        first = told[0][0] if told else len(reports)
+        found[:first] = [min(at_s, leading_s) for at_s in arrived[:first]]
+        for place, at_s in enumerate(found):
+            self._latest_s = found[place] = max(at_s, self._latest_s)
+        self._arrived_s = arrived[-1] if arrived else self._arrived_s
+        return found
+
+    def _time(self, ticks: Ticks, arrived_s: float, *, late: bool) -> float:
+        """Return the time in s of ticks.
+
+        ``late``: whether these ticks waited, because they arrived together with later ones.
+        """
+        last, waited, at_s = self._last, False, arrived_s
+        if last is not None:
+            since_s = arrived_s - last.arrived_s
+            passed = wrapped(ticks.time_counts - last.ticks.time_counts)
+            restarted = passed <= 0 or may_have_restarted(last.ticks, ticks)
+            if restarted:
+                passed = ticks.time_counts
+            if self._rates:
+                passed_s = median(self._rates) * passed
+                waited = late or (self._waited and since_s < passed_s / 2)
+                if waited:
+                    at_s = min(arrived_s, last.at_s + passed_s)
+            if not (waited or restarted) and since_s > 0.0:
+                self._rates.append(since_s / passed)
+        self._last, self._waited = Heard(ticks, arrived_s, at_s), waited
+        return at_s
+
+
+def may_have_restarted(before: Ticks, after: Ticks) -> bool:
+    """Return whether the board may have restarted between two tick reports.
+
+    Clock and counts have then begun at zero. A clock in ns also does so every 4.3 s.
+    """
+    fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
+    return fewer and began_within(math.inf, after)

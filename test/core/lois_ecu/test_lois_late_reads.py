@@ -1,0 +1,223 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of reads that are late by seconds, so that many reports arrive at once."""
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from lois_bench import FIRMWARE, Bench
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.lois_ecu.late_reads import LateReads
+from omnibot_driver.core.lois_ecu.messages import GpsTime, Report, Ticks
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
+
+KERNEL_BUFFER = 4096
+"""Size of a pseudo-terminal's buffer, in bytes."""
+PERIOD_MS = 200
+FORWARD = BodyTwist(0.3, 0.0, 0.0)
+
+
+def ticks(*clocks_ms: int) -> list[Report]:
+    return [Ticks(clock_ms, 0, 0) for clock_ms in clocks_ms]
+
+
+def listening(unit: ClockUnit = "ms") -> LateReads:
+    """Return the times of a board whose ticks at 1000 to 1800 ms arrived at 1.0 to 1.8 s."""
+    late_reads = LateReads()
+    for clock_ms in range(1000, 2000, PERIOD_MS):
+        at_s = clock_ms / 1e3
+        assert late_reads.times(ticks(clock_ms), [at_s], unit) == [at_s]
+    return late_reads
+
+
+def read(late_reads: LateReads, now: float, *reports: Report) -> list[float]:
+    return late_reads.times(list(reports), [now] * len(reports), None)
+
+
+def test_the_reports_of_a_late_read_have_the_times_that_the_boards_clock_shows() -> None:
+    """A read is late by 0.6 s. The last report has just arrived, the others came before."""
+    found = read(listening(), 2.6, *ticks(2000, 2200, 2400, 2600))
+    assert found == pytest.approx([2.0, 2.2, 2.4, 2.6])
+
+
+def test_if_the_buffer_was_full_its_reports_came_at_the_beginning() -> None:
+    """Five seconds pass. The read returns the reports of the first second; the rest is lost."""
+    late_reads = listening()
+    found = read(late_reads, 6.8, *ticks(2000, 2200, 2400, 2600, 2800))
+    assert found[:-1] == pytest.approx([2.0, 2.2, 2.4, 2.6])
+    assert read(late_reads, 6.9, *ticks(6900)) == pytest.approx([6.9])
+
+
+def test_a_backlog_may_come_in_several_reads() -> None:
+    """The kernel returns 4 KiB at most, so the reports of a long stall come in several reads."""
+    late_reads = listening()
+    found = [
+        *read(late_reads, 5.0, *ticks(2000, 2200, 2400, 2600)),
+        *read(late_reads, 5.001, *ticks(2800)),
+        *read(late_reads, 5.002, *ticks(3000, 3200, 3400, 3600, 3800)),
+        *read(late_reads, 5.003, *ticks(4000, 4200, 4400, 4600, 4800, 5000)),
+    ]
+    assert found == pytest.approx([clock_ms / 1e3 for clock_ms in range(2000, 5001, PERIOD_MS)])
+
+
+def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
+    """Other reports have no clock. They follow the ticks directly."""
+    found = read(listening(), 2.4, *ticks(2000), GpsTime(1, 2, 3), *ticks(2200, 2400))
+    assert found == pytest.approx([2.0, 2.0, 2.2, 2.4])
+
+
+def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
+    """The first ticks of a late read are often discarded as implausible.
+
+    A report directly after them has a time between the ticks before and after.
+    """
+    found = read(listening(), 2.6, GpsTime(1, 2, 3), *ticks(2200, 2400, 2600))
+    assert found == pytest.approx([2.0, 2.2, 2.4, 2.6])
+
+
+def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
+    """The board restarts during a late read, so its clock begins at zero."""
+    found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
+    assert found == pytest.approx([2.0, 2.1, 2.3, 2.5])
+
+
+def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
+    """A clock in ns wraps every 4.3 s, so a low clock and fewer ticks may be a restart or not."""
+    late_reads = listening("ns")
+    found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))
+    assert found == [4.0, 4.0, 4.0]
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(-300, 500), st.floats(0.0, 3.0), st.booleans()),
+        min_size=1,
+        max_size=40,
+    ),
+    st.sampled_from(["ms", "ns"]),
+)
+def test_times_never_decrease_and_are_not_after_the_arrival(
+    told: list[tuple[int, float, bool]], unit: ClockUnit
+) -> None:
+    """Whatever the clock shows, and however the reports are read."""
+    late_reads, clock_ms, now, last_s = listening(unit), 1800, 1.8, 1.8
+    reports: list[Report] = []
+    for passed_ms, pause_s, is_read in [*told, (200, 0.1, True)]:
+        clock_ms = max(0, clock_ms + passed_ms)
+        reports += [GpsTime(1, 2, 3), *ticks(clock_ms)]
+        if is_read:
+            now += pause_s
+            found = read(late_reads, now, *reports)
+            assert all(before <= after for before, after in pairwise([last_s, *found]))
+            last_s, reports = found[-1], []
+            assert last_s <= now
+
+
+def stalled_drive(
+    bench: Bench,
+    stall_s: float,
+    twist: BodyTwist = FORWARD,
+    most: int = KERNEL_BUFFER,
+    during: Callable[[float], None] = lambda _: None,
+) -> tuple[float, float]:
+    """Drive, read nothing for ``stall_s``, and stand still for 3 s.
+
+    Return the distance of odom from the true position, and its standard deviation, in m.
+
+    * ``most``: number of bytes that the kernel keeps. A read returns a buffer at most.
+    * ``during``: function that is called with the time since the begin of the stall, in s.
+    """
+    origin, begin = bench.odometry[-1].pose, true_pose(bench)
+    for _ in range(40):
+        bench.session.command_twist(twist, bench.now)
+        bench.settle()
+        bench.run(0.1)
+    held = b""
+    for tick in range(round(stall_s / 0.01)):
+        during(tick * 0.01)
+        bench.now += 0.01
+        held += b"".join(data for _, data in bench.robot.advance())
+    bench.session.stood_still(stall_s, bench.now)
+    seen = len(bench.odometry)
+    for place in range(0, min(len(held), most), KERNEL_BUFFER):
+        piece = held[place : min(place + KERNEL_BUFFER, most)]
+        bench.session.inbound.receive(piece, bench.now)
+        bench.now += 0.001
+    bench.settle()
+    bench.run(3.0)
+    for estimate in bench.odometry[seen:]:
+        assert estimate.twist is not None
+        assert abs(estimate.twist.vx_mps) < 0.5, "the robot never drove so fast"
+    last = bench.odometry[-1]
+    off = origin.way_to(last.pose) - begin.way_to(true_pose(bench))
+    return off.way_m, math.sqrt(last.covariance.xx + last.covariance.yy)
+
+
+def true_pose(bench: Bench) -> Pose:
+    truth = bench.board.truth
+    return Pose(truth.x_m, truth.y_m, truth.yaw_rad)
+
+
+@FIRMWARE
+@pytest.mark.slow
+@pytest.mark.parametrize("stall_s", [0.75, 1.5, 3.0])
+def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stall_s: float) -> None:
+    """The driver stalls for seconds during a drive, and then reads all reports at once.
+
+    The twist is never that of a robot which drove the whole way in an instant.
+    """
+    bench = Bench(firmware)
+    error_m, _ = stalled_drive(bench, stall_s)
+    assert error_m < 0.06
+    assert not any("does not move" in text for text in bench.notices)
+
+
+@FIRMWARE
+@pytest.mark.slow
+@pytest.mark.parametrize("stall_s", [0.6, 1.0, 3.0])
+@pytest.mark.parametrize("twist", [BodyTwist(-0.3, 0.0, 0.0), BodyTwist(0.0, 0.0, 0.8)])
+def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
+    firmware: str, twist: BodyTwist, stall_s: float
+) -> None:
+    """The public firmware does not count the ticks of a wheel that is commanded backward."""
+    error_m, stddev_m = stalled_drive(Bench(firmware), stall_s, twist)
+    assert error_m < max(0.06, 3 * stddev_m)
+
+
+@FIRMWARE
+@pytest.mark.slow
+@pytest.mark.parametrize("stall_s", [6.0, 9.0])
+def test_a_backlog_in_several_reads_leaves_the_pose_right(firmware: str, stall_s: float) -> None:
+    """The operating system has kept 64 KiB. It returns them in reads of 4 KiB."""
+    error_m, _ = stalled_drive(Bench(firmware), stall_s, most=65536)
+    assert error_m < 0.06
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at_s", [0.3, 1.0, 2.5])
+def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
+    """The board of the public firmware restarts while the driver stalls, so the robot stops."""
+    bench = Bench("firmware")
+    error_m, stddev_m = stalled_drive(
+        bench, 3.0, during=lambda s: bench.board.reboot() if s == at_s else None
+    )
+    assert error_m < max(0.06, 3 * stddev_m)
+
+
+@FIRMWARE
+@pytest.mark.slow
+@pytest.mark.parametrize("stall_s", [7.0, 9.0])
+def test_a_full_buffer_leaves_an_error_that_the_covariance_describes(
+    firmware: str, stall_s: float
+) -> None:
+    """The kernel's buffer could not hold all reports, so the last ones are lost."""
+    bench = Bench(firmware)
+    error_m, stddev_m = stalled_drive(bench, stall_s)
+    assert error_m < 3 * stddev_m
+    assert stddev_m < 0.4
