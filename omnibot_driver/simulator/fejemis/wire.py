@@ -15,6 +15,7 @@ BUFFER = 200
 If a line is longer, the characters in the full buffer are discarded.
 """
 
+_CONTROL_CHARACTERS = bytes(range(0x20))
 _NUMBER = re.compile(r"[ \t]*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 _PREFIX = re.compile(r";(\d\d)")
 
@@ -29,7 +30,7 @@ class Check(Enum):
 
 def sum_of(text: str) -> int:
     """Return the checksum of a text, from 1 to 99."""
-    return sum(ord(character) for character in text if character >= " ") % 99 + 1
+    return sum(text.encode("latin-1").translate(None, _CONTROL_CHARACTERS)) % 99 + 1
 
 
 def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
