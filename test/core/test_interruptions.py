@@ -24,6 +24,7 @@ from omnibot_driver.core.readings import DisplacementReading, PoseReading
 # Pauses and restarts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hidden", [False, True])
 @pytest.mark.parametrize("seed", range(6))
 def test_a_pause_in_the_middle_of_motion_loses_nothing(seed: int, hidden: bool) -> None:

@@ -35,6 +35,7 @@ def test_on_a_silent_board_every_request_is_answered_in_time(
     assert "power" in answer.message
 
 
+@pytest.mark.slow
 def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> None:
     """The board sends data but receives none. A pause and a reset both fail in time."""
     bench.hears = False
@@ -203,6 +204,7 @@ def test_a_reset_after_a_pause_that_failed_starts_the_board_again() -> None:
     assert not bench.still()
 
 
+@pytest.mark.slow
 def test_a_reset_that_fails_as_well_leaves_the_board_to_be_paused(bench: Bench) -> None:
     """A pause and then a reset fail, because the board receives nothing.
 

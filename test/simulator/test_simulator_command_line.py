@@ -131,6 +131,7 @@ def test_the_hint_has_the_whole_path_of_a_link(
     assert f"-p port:={tmp_path}/toy-drive -p front_port:={tmp_path}/toy-front\n" in err
 
 
+@pytest.mark.slow
 def test_a_board_on_the_network_prints_its_address() -> None:
     """A board on the network prints its UDP address, and has options for network faults.
 

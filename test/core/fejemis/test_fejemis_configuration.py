@@ -70,6 +70,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         bench.run(5.0)
 
 
+@pytest.mark.slow
 def test_a_board_that_does_not_keep_a_value_is_told_of() -> None:
     """The user sets an impossible radius, and the board does not keep it.
 
@@ -154,6 +155,7 @@ def test_a_small_change_by_the_user_is_written() -> None:
     assert bench.board.figures.own["Drive conf"].startswith("0.0772 0.0778")
 
 
+@pytest.mark.slow
 def test_a_small_change_while_the_robot_is_driven_is_written_once_it_stands() -> None:
     """The user changes a setting while the robot is driven.
 
@@ -184,6 +186,7 @@ def test_a_small_difference_is_written_after_a_start() -> None:
     assert not configuration.pending
 
 
+@pytest.mark.slow
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
     """Without checksums, a query that loses one or two characters does not become a command."""
     bench = nominal(Simulated(firmware=Firmware(sums=False)))

@@ -161,6 +161,7 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
     assert bench.notices == []
 
 
+@pytest.mark.slow
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
     """Motion is refused until the user calls ~/start, and then the driver reconnects.
 

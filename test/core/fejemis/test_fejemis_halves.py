@@ -21,6 +21,7 @@ def assert_stands(bench: Bench) -> None:
     assert bench.robot.truth.x_m == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("swapped", [False, True])
 def test_the_ports_may_be_in_any_order(*, swapped: bool) -> None:
     """The two boards are connected in either order.
@@ -162,6 +163,7 @@ def test_boards_that_are_no_pair_are_not_driven(ids: tuple[int, int], sentence: 
         bench.drive()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ids", [(7, 91), (90, 7)])
 def test_a_board_of_another_robot_receives_only_stops_and_questions(ids: tuple[int, int]) -> None:
     """One port leads to a board of another robot.
@@ -185,6 +187,7 @@ def test_a_board_that_never_speaks_is_missed(half: str) -> None:
     assert sum(f"no data from the {half} board" in text for text in bench.notices) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", HALVES)
 def test_a_board_that_is_silent_after_a_reconnect_is_missed(half: str) -> None:
     """After a reconnect one port is silent. The driver remembers which board was at this port.
@@ -280,6 +283,7 @@ def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() 
     assert not any("both ports" in text for text in bench.notices)
 
 
+@pytest.mark.slow
 def test_what_a_board_told_before_a_reconnect_is_not_shown_as_current() -> None:
     """After a reconnect another board may be at the port.
 

@@ -236,6 +236,7 @@ def test_every_sample_is_given_in_pieces(
     assert_nothing_is_missing(outcome(reads), lines, reads)
 
 
+@pytest.mark.slow
 @given(layouts, chances, st.floats(0.0, 0.1))
 @settings(max_examples=60, deadline=None)
 def test_every_sample_is_given_by_a_reader_that_stalls(

@@ -248,6 +248,7 @@ def test_no_brush_is_switched_on_at_a_front_board_that_is_not_heard() -> None:
     assert any("brush and lift switched off" in text for text in bench.notices)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [0.7, 3.0])
 def test_a_front_board_that_missed_the_stop_of_its_brush_receives_it_again(seconds: float) -> None:
     """The front board hangs and does not receive the stop of its brush.

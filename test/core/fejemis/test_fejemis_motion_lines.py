@@ -83,6 +83,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
                     assert set(motions(without(data, lost))) <= right, (text, lost)
 
 
+@pytest.mark.slow
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
     """Random motions are commanded. In each line, the checksum detects the loss of two characters.
 
@@ -137,6 +138,7 @@ def test_what_three_lost_characters_leave() -> None:
     assert passed / total < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "w"), COMMANDS)
 def test_the_lines_say_what_is_commanded(v: float, w: float) -> None:
     """In the front board's line, the angle is right within 0.02°, and small angles within 1 %.

@@ -177,6 +177,7 @@ def test_every_message_has_a_golden_line_and_is_asked_for(keyword: str) -> None:
     assert keyword in asked
 
 
+@pytest.mark.slow
 def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
     """The driver subscribes to some messages as streams. The diagnostics show all other messages.
 

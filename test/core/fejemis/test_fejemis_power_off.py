@@ -75,6 +75,7 @@ def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
     assert_still_refused(bench)
 
 
+@pytest.mark.slow
 def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
     """The boards are silent for a while after a requested power off.
 
@@ -91,6 +92,7 @@ def test_a_silence_does_not_cancel_a_power_off(bench: Bench) -> None:
     assert_still_refused(bench)
 
 
+@pytest.mark.slow
 def test_a_reconnect_does_not_cancel_a_power_off(bench: Bench) -> None:
     """The driver reconnects after a requested power off.
 
@@ -124,6 +126,7 @@ def test_a_power_off_is_forgotten_if_the_drive_board_restarts_while_not_connecte
     assert not bench.robot.standing
 
 
+@pytest.mark.slow
 def test_a_restart_of_the_front_board_does_not_fail_a_power_off() -> None:
     """The front board restarts after a request to power off. Only the drive board cuts the power.
 

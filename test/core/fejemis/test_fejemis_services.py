@@ -74,6 +74,7 @@ def lose(bench: Bench, word: bytes, times: int) -> None:
     bench.robot.receive = lossy  # type: ignore[method-assign]
 
 
+@pytest.mark.slow
 def test_a_calibration_whose_command_is_lost_is_commanded_once_more() -> None:
     """The command to calibrate is lost, so the offsets do not change. The driver sends it again."""
     bench = nominal(Simulated(gyro_bias_dps=(1.0, -2.0, 3.0)))
@@ -100,6 +101,7 @@ def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
     assert bench.lines(DRIVE).count(word) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", [DRIVE, FRONT])
 def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -> None:
     """One board receives nothing, but sends its data. Loading fails, and is answered in time."""
@@ -124,6 +126,7 @@ def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() ->
     assert jobs.done[0].success
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.SAVE, Job.LOAD, Job.POWER_OFF])
 def test_boards_that_fall_silent_do_not_delay_an_answer(job: Job) -> None:
     """Both boards fall silent after the request. It fails within 5 s."""
@@ -149,6 +152,7 @@ def test_the_accelerometer_is_calibrated_by_the_board() -> None:
     assert bench.imu[-1].specific_force == pytest.approx((0.0, 0.0, 9.80665), abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_accelerometer_is_not_calibrated_while_a_parameter_sets_its_offsets() -> None:
     """A parameter sets the accelerometer's offsets and would undo a calibration.
 
@@ -229,6 +233,7 @@ def test_a_configuration_is_saved_and_loaded() -> None:
     assert ask(bench, Job.LOAD).success
 
 
+@pytest.mark.slow
 def test_power_off_is_called_back_by_a_start() -> None:
     """After a request to power off, motion, brush and lift are refused until ~/start cancels it."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
@@ -317,6 +322,7 @@ def test_an_estop_or_a_pause_ends_what_needs_the_robot_at_rest(job: Job, stop: s
     assert "meanwhile" in done.message
 
 
+@pytest.mark.slow
 def test_settings_are_written_again_after_a_loading_that_an_estop_ends() -> None:
     """An e-stop ends a loading, but the boards may already have loaded their saved values.
 
@@ -369,6 +375,7 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
     assert begun[0] - mark > 0.4
 
 
+@pytest.mark.slow
 def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
     """After a request to power off, the drive board restarts. The restart cancels the power off.
 

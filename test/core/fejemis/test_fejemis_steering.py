@@ -70,6 +70,7 @@ def test_what_rc_alone_would_do(
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx((body_v, body_w), abs=2e-4)
 
 
+@pytest.mark.slow
 @given(speeds, rates, angles)
 def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: float) -> None:
     """For every angle of the front wheel, the driver computes the same motion as the manual."""
@@ -190,6 +191,7 @@ def test_a_turn_on_the_spot_begins_without_rolling() -> None:
     assert bench.robot.truth.yaw_rate_radps > 0.8
 
 
+@pytest.mark.slow
 def test_from_one_side_to_the_other_the_robot_stands_while_the_wheel_turns() -> None:
     """A turn on the spot to the left is followed by one to the right.
 

@@ -57,6 +57,7 @@ def test_the_stop_of_an_estop_is_a_word_alone() -> None:
     assert b"\n;59stop\n" in b"".join(said)
 
 
+@pytest.mark.slow
 def test_a_lost_start_after_an_estop_is_said_again() -> None:
     """The line ``start``, which the driver sends after the release of an e-stop, is lost.
 
@@ -76,6 +77,7 @@ def test_a_lost_start_after_an_estop_is_said_again() -> None:
     assert not bench.robot.standing
 
 
+@pytest.mark.slow
 def test_a_pause_is_proved_by_the_source_in_the_heartbeat() -> None:
     """The user requests a pause. The command source -1 in a heartbeat (rcSource) proves it.
 

@@ -188,6 +188,7 @@ def test_a_sample_has_si_units() -> None:
     assert reading.specific_force == pytest.approx((0.0, 0.0, 9.80665))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sums", [True, False])
 def test_the_imu_is_told_a_hundred_times_a_second(*, sums: bool) -> None:
     """The board sends a hundred IMU samples a second.

@@ -175,6 +175,7 @@ def test_a_change_of_settings_does_not_replace_the_bias() -> None:
     assert change == pytest.approx((-1.0, -2.0, -3.0), abs=0.3)
 
 
+@pytest.mark.slow
 def test_the_bias_is_refined_at_standstill_only_where_it_is_wanted() -> None:
     """The user switches ``auto_gyro_bias`` on. After 15 s at rest, half of the bias is found.
 

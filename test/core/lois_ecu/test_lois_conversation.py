@@ -31,6 +31,7 @@ BOTH = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 RPM = math.tau / 60
 
 
+@pytest.mark.slow
 @BOTH
 def test_opened_it_is_configured_and_drives(firmware: Firmware) -> None:
     """After the port is opened, the driver writes low pass, periods and gains to the board.
@@ -70,6 +71,7 @@ def test_a_restarted_board_is_configured_again() -> None:
     assert place.way_to(true).way_m < 0.15
 
 
+@pytest.mark.slow
 def test_a_restart_that_no_silence_shows_is_seen_in_the_counters() -> None:
     """The board restarts within a moment, without a silence.
 
@@ -110,6 +112,7 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
     assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
 
 
+@pytest.mark.slow
 def test_a_board_without_checksum_is_driven_without() -> None:
     """The user wants lines without checksums, which value 4 of command 0x11 selects.
 
@@ -168,6 +171,7 @@ def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) 
             rig.order(0, 0, 0.7)
 
 
+@pytest.mark.slow
 def test_without_clearing_a_slower_start_fails_on_the_public_firmware() -> None:
     """The robot drives at 30 RPM and is stopped. In this test, no RPM 0/0 follows the Stop.
 

@@ -45,6 +45,7 @@ def test_a_date_period_survives_the_loss_of_its_last_line(firmware: str) -> None
         assert bench.board._timers[Stream.GPS_DATE].period_ms == 500, nth
 
 
+@pytest.mark.slow
 @FIRMWARE
 @pytest.mark.parametrize("period_ms", [200, 1000, 30000])
 def test_a_board_with_any_date_period_confirms_its_settings(firmware: str, period_ms: int) -> None:

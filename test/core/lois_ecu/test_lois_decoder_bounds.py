@@ -50,6 +50,7 @@ def test_any_bytes_are_taken_in_any_chunks_with_equal_results(
     assert results[0] == results[1] == results[2]
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(codes, payloads, st.integers(0, 13), st.integers(0, 9)), max_size=60),
     st.sampled_from(RecordKind),

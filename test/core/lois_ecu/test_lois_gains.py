@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+import pytest
 from any_board import AnyBench, LoisRobot
 from lois_drives import HOST_GAINS
 
@@ -39,6 +40,7 @@ def test_the_boards_own_gains_are_told_once_with_what_follows() -> None:
     )
 
 
+@pytest.mark.slow
 def test_gains_that_are_set_need_no_words() -> None:
     """The notice names only gains that are not set, and does not appear if all are set."""
     assert told(opened(HOST_GAINS)) == []

@@ -53,6 +53,7 @@ def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: fl
         assert decoder.group_statistics.damaged_groups == 0
 
 
+@pytest.mark.slow
 @given(st.data(), st.booleans())
 def test_any_chunks_and_pauses_give_the_reports_of_one_read(data: st.DataObject, cut: bool) -> None:
     """The host reads each burst of lines in several parts, all within 145 ms.

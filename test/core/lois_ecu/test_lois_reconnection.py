@@ -52,6 +52,7 @@ def happen(odometry: LoisOdometry, what: object, now: float) -> None:
         odometry.restarted(now, 1.0 if what == "restart" else None)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(WAITS_S, HAPPENINGS), max_size=30))
 def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, object]]) -> None:
     """Reports, commands, restarts and connections come in random order. The pose stays finite."""

@@ -38,6 +38,7 @@ def test_a_held_button_keeps_the_estop_latched(firmware: str) -> None:
     assert not bench.robot.stands
 
 
+@pytest.mark.slow
 def test_the_motion_monitor_names_this_boards_parameters() -> None:
     """The motion monitor stops the robot, and its notices name parameters of the LOIS ECU.
 
@@ -204,6 +205,7 @@ def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     assert arrived == {int(setting) for setting in names}
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_a_host_that_reads_late_gets_several_groups_at_once(firmware: str) -> None:
     """All reports of 0.6 s arrive in one read. Odometry stays within 0.15 m of the truth."""
@@ -239,6 +241,7 @@ def test_a_driver_that_leaves_says_nothing_but_stop(firmware: str) -> None:
     assert {data for _, data in bench.written} == {encode_command(SetDuty(0, 0))}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", ["documented", "firmware"])
 def test_a_reset_while_the_robot_drives_adds_no_way(firmware: str) -> None:
     """The board's counters are reset during a drive. The reset does not change the odometry."""

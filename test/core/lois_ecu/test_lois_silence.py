@@ -70,6 +70,7 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     assert error_m <= 0.1 * bench.robot.way_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
     """The board is silent and the robot may still be driving. The covariance grows meanwhile."""

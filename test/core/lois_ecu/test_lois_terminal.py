@@ -109,6 +109,7 @@ def test_a_board_that_restarts_in_a_terminal_mode_is_put_back_into_it() -> None:
     assert bench.board.wheels[0].controller.gains.low_pass == 1.0
 
 
+@pytest.mark.slow
 @FIRMWARE
 @pytest.mark.parametrize("settings", [GPS, COMPASS], ids=["gps", "compass"])
 def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
@@ -147,6 +148,7 @@ def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
         bench.drive()
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_another_drive_mode_stops_first(firmware: str) -> None:
     """The user sets another drive mode while the robot drives.

@@ -41,6 +41,7 @@ def test_the_led_is_switched_while_the_robot_drives(firmware: str) -> None:
     assert bench.board.led
 
 
+@pytest.mark.slow
 @FIRMWARE
 def test_an_unconfirmed_board_does_not_keep_the_pacer_awake(
     firmware: str, monkeypatch: pytest.MonkeyPatch

@@ -55,6 +55,7 @@ def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> Non
     assert nees(bench) < MOST_NEES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("vx", "yaw_rate"), [(0.0, 0.6), (0.0, -0.6), (-0.3, 0.0)])
 def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
     vx: float, yaw_rate: float

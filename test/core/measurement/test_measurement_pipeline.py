@@ -82,6 +82,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
     assert bench.odometry[-1].pose.x_m == pytest.approx(way, abs=unreported)
 
 
+@pytest.mark.slow
 def test_lost_odometry_frames_are_told_once_in_a_while_and_counted(bench: Bench) -> None:
     """Frames are lost thirty times. The driver combines the losses in only one or two notices."""
     for _ in range(30):

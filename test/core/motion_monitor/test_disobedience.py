@@ -90,6 +90,7 @@ def test_with_a_displacement_every_0_1_s_it_takes_no_longer(
         assert stopped_after_s(bench, command) <= WITHIN_S
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed_mps", [0.05, 0.3])
 @pytest.mark.parametrize("phase", range(0, 10, 3))
 def test_a_robot_that_turns_round_within_a_long_displacement_was_not_held(

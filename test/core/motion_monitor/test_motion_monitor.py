@@ -314,6 +314,7 @@ orders = st.lists(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(
     orders,

@@ -33,6 +33,7 @@ def angles_by_encoder(line: Line) -> tuple[float, ...]:
     return tuple(count * RAD_PER_COUNT for count in line.board._world.encoders)
 
 
+@pytest.mark.slow
 @given(axis_signs, st.lists(small_moves, min_size=1, max_size=20), st.sampled_from("eb"))
 def test_wheels_from_the_bodys_displacements_and_back(
     signs: Signs, tangents: list[Pose], frame: str

@@ -19,6 +19,7 @@ def bench() -> Bench:
     return driving()
 
 
+@pytest.mark.slow
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
     """The board's switch is set to position control, so the robot does not obey velocities.
 
@@ -32,6 +33,7 @@ def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_once() -> None:
     assert bench.session.figures(bench.now).commands.trips == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held_s", [0.3, 0.8, 3.0])
 @pytest.mark.parametrize("gains", [WheelGains(), WheelGains(proportional=0.0, integral=0.3)])
 def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(

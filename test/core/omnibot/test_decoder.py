@@ -36,6 +36,7 @@ from omnibot_driver.core.omnibot.frames import Frame
 # Undamaged streams
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STREAMS)
 def test_an_undamaged_stream_is_decoded_whole_by_ticks_and_byte_by_byte(name: str) -> None:
     """The decoder returns all frames of the simulated board in order, and no others."""
@@ -99,6 +100,7 @@ def test_a_frame_comes_out_with_its_last_byte(name: str) -> None:
             assert complete < 2 or found == complete or (doubtful and found == complete - 1)
 
 
+@pytest.mark.slow
 @given(believable_frames.filter(lambda frame: not isinstance(frame, PausedFrame)), st.data())
 def test_odd_content_waits_for_two_frames_at_the_most(odd: Frame, data: st.DataObject) -> None:
     """The content of a frame looks like damage.

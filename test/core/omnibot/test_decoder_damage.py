@@ -233,6 +233,7 @@ def test_a_reboot_in_the_middle_of_a_frame_is_heard_with_its_first_text(length: 
     assert made.feed(b"Paused: 0 \n", 0.3) == [PausedFrame(0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 @pytest.mark.parametrize("late_s", [0.15, 1.0])
 def test_a_late_backlog_costs_no_frame(name: str, late_s: float) -> None:

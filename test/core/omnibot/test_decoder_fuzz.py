@@ -79,6 +79,7 @@ def test_all_frames_between_silences_come_in_any_chunks(
     assert found == [frame for burst in bursts for frame in burst]
 
 
+@pytest.mark.slow
 @given(calm_frames)
 def test_a_calm_frame_comes_out_with_its_last_byte(frames: list[Frame]) -> None:
     """Calm frames come: the content of each fits that of the frame before it.

@@ -204,6 +204,7 @@ def test_a_restart_shows_in_the_count(period_s: float) -> None:
     assert sequence.delta(1, 99 * period_s + 1.5).restarted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", [Request.RESET, "pause", "unplugged"])
 def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> None:
     """A board with deltas at 10 Hz is reset, or paused and started, or connected again.
@@ -228,6 +229,7 @@ def test_odom_goes_on_over_what_happens_to_a_board_at_10_hz(action: object) -> N
     assert off_by_m(bench) < begun + 0.01
 
 
+@pytest.mark.slow
 @EVERY_PERIOD
 def test_imu_only_mode_needs_six_missing_deltas(period_s: float) -> None:
     """At any delta period, the driver assumes IMU-only mode only when six deltas are missing."""

@@ -149,6 +149,7 @@ def test_p_is_refused_where_the_board_is_not_known_to_run(mode: Mode) -> None:
     assert made.mode is mode
 
 
+@pytest.mark.slow
 @given(st.lists(st.one_of(st.sampled_from(Happening), frames, imu_frames), max_size=80))
 def test_an_illegal_request_raises_and_changes_nothing(
     happenings: list[Happening | Frame],

@@ -134,6 +134,7 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
     assert rig.board.drive.source == 10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:

@@ -56,6 +56,7 @@ def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
     assert rig.decoder.statistics.faults == rig.decoder.group_statistics.damaged_groups == 0
 
 
+@pytest.mark.slow
 def test_periods_stretch_with_the_load() -> None:
     """On the public firmware, a message with a period of 400 ms comes only every 422 ms."""
     rig = Rig()
@@ -99,6 +100,7 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
             rig.say(SetRpm(0, 0))
 
 
+@pytest.mark.slow
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
     """The button stops the robot. The board reports press and release.
@@ -216,6 +218,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
     assert len(ticks_in([report for _, report in rig.heard[-len(heard) - 3 :]])) <= 1
 
 
+@pytest.mark.slow
 def test_the_gps_moves_with_the_robot() -> None:
     """The robot drives along x, which points east. The reported longitude changes accordingly."""
     rig = Rig(DOCUMENTED)

@@ -40,6 +40,7 @@ def walk(rig: Rig, seed: int, steps: int) -> None:
             rig.server.restart()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(15))
 def test_whatever_is_said_time_goes_on_and_a_copy_goes_the_same_way(seed: int) -> None:
     """A server is copied in the middle of random requests.

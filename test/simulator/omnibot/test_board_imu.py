@@ -105,6 +105,7 @@ def test_readings_saturate_at_the_range_of_the_sensor() -> None:
     assert readings(board, 0.1)[0][5] == 32767 / 131
 
 
+@pytest.mark.slow
 def test_a_bias_that_walks_gets_as_far_as_it_should_in_a_second() -> None:
     """The gyro's bias changes at random.
 

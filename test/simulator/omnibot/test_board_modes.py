@@ -249,6 +249,7 @@ command_bytes = st.lists(
 ).map(b"".join)
 
 
+@pytest.mark.slow
 @given(command_bytes, st.data())
 @settings(max_examples=60)
 def test_the_chunking_of_the_input_does_not_matter(stream: bytes, data: st.DataObject) -> None:

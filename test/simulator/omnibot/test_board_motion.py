@@ -65,6 +65,7 @@ def test_a_wheel_command_drives_that_wheel_alone() -> None:
         assert board.rim_speeds_mps == pytest.approx([value / 70 for value in values], abs=0.003)
 
 
+@pytest.mark.slow
 def test_a_motion_goes_on_without_further_commands() -> None:
     """One command is sent, and then no more. After 60 s the robot still drives."""
     board = SimulatedBoard(RUNNING)

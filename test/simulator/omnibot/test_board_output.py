@@ -79,6 +79,7 @@ def test_the_record_of_what_was_sent_is_what_was_sent() -> None:
     assert first + run(board, 1.0) == b"".join(frame.data for frame in board.sent)
 
 
+@pytest.mark.slow
 def test_both_sequences_count_by_themselves_and_wrap() -> None:
     """Deltas and poses each have their own SEQ. It counts from 0 to 255 and then wraps."""
     board = SimulatedBoard(RUNNING)
