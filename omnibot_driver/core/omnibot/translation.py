@@ -90,7 +90,8 @@ class Translation:
         lengths = [LENGTH.get(type(frame), 0) for frame in found]
         left = sum(skipped) + sum(lengths)
         before_s = self.heard_s - self._behind_s
-        sent_s = self._sent_s(left, now)
+        may_wait = left >= FULL or self._behind_s > BEHIND_S
+        sent_s = self._sent_s(left, now) if may_wait else now
         self.heard_s, self._behind_s = now, now - sent_s
         readings = []
         for frame, length, before in zip(found, lengths, skipped, strict=True):
@@ -102,14 +103,14 @@ class Translation:
         return readings
 
     def _sent_s(self, count: int, now: float) -> float:
-        """Return when the last of ``count`` bytes was sent that a read at ``now`` returned.
+        """Return when the last of ``count`` bytes was sent that a late read at ``now`` returned.
 
-        This is ``now``, unless the computer read late and the kernel's buffer may have been full.
-        The buffer keeps the first bytes and loses the next ones. Several reads may empty it.
+        The kernel's buffer may have been full. It keeps the first bytes and loses the next ones.
+        Several reads may empty it. Return ``now`` after the last of them.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
-        goes_on = self._behind_s > BEHIND_S and duration_s > 2 * elapsed_s + BURST_S
-        if (count >= FULL or goes_on) and math.isfinite(elapsed_s):
+        waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S
+        if waited and math.isfinite(elapsed_s):
             return min(now, self.heard_s - self._behind_s + duration_s)
         return now
 
