@@ -47,6 +47,9 @@ largest positive reading of 16 bits is just above it."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a displacement that changed implausibly much, and the
 poses after it."""
+ALIKE: Final = 2.0
+"""Largest ratio of two durations at which their displacements are compared, because the size of an
+implausible change depends on the duration."""
 BACK: Final = 0.25
 """A displacement that changed implausibly much was a spike only if at most this fraction of the
 change remains in the next displacement."""
@@ -96,6 +99,8 @@ class OutlierFilter:
         self._tick_s, self._corrected = tick_s, corrected
         self._imu_leaps = _Spikes(STILL, knocked=3)
         self._motion_leaps = _Spikes(BACK, knocked=0)
+        self._lasted_s = 0.0
+        """Duration of the last displacement that had one, in s."""
         self._held_imu: list[tuple[ImuReading, float]] = []
         self._held_motion: list[Stamped] = []
         """A displacement that changed implausibly much, and the poses after it."""
@@ -167,6 +172,9 @@ class OutlierFilter:
             return []
         was_flip = leaps = False
         if reading.duration_s and not self._corrected:
+            lasted_s, self._lasted_s = self._lasted_s or reading.duration_s, reading.duration_s
+            if not 1 / ALIKE <= reading.duration_s / lasted_s <= ALIKE:
+                self._motion_leaps.forget()  # after a gap, even a steady motion seems to leap
             square_s2 = reading.duration_s * reading.duration_s
             turn = self.limits.fastest_radps2 * square_s2
             way = self.limits.fastest_mps2 * square_s2
