@@ -21,6 +21,9 @@ LATE_S: Final = 0.4
 """Shortest time in s without a report after which the times of several tick reports that arrive
 together are corrected. The odometry expects shorter delays."""
 RATES_KEPT: Final = 15
+TOWARDS_ARRIVAL: Final = 1.01
+"""Factor of the times between reports. If every read is late, the times would drift away from the
+arrival times, because the rate of the clock is not known exactly. So they drift towards them."""
 
 
 @value(frozen=True, slots=True)
@@ -64,7 +67,7 @@ class LateReads:
         for number, (place, ticks) in enumerate(told, 1):
             after = told[number][0] if number < len(told) else len(reports)
             late = after < len(reports) and arrived[place] > self._arrived_s + LATE_S
-            at_s = self._time(ticks, arrived[place], late=late and shown)
+            at_s = self._time(ticks, arrived[place], late=late, shown=shown)
             if self._waited:
                 found[place:after] = [at_s] * (after - place)
                 if number == 1 and before:  # ticks before these reports were discarded
@@ -76,10 +79,11 @@ class LateReads:
         self._arrived_s = arrived[-1] if arrived else self._arrived_s
         return found
 
-    def _time(self, ticks: Ticks, arrived_s: float, *, late: bool) -> float:
+    def _time(self, ticks: Ticks, arrived_s: float, *, late: bool, shown: bool) -> float:
         """Return the time in s of ticks.
 
-        ``late``: whether these ticks waited, because they arrived together with later ones.
+        * ``late``: whether these ticks waited, because they arrived together with later ones.
+        * ``shown``: whether the clock shows the times between these ticks and the last ones.
         """
         last, waited, at_s = self._last, False, arrived_s
         if last is not None:
@@ -89,8 +93,8 @@ class LateReads:
             if restarted:
                 passed = ticks.time_counts
             if self._rates:
-                passed_s = median(self._rates) * passed
-                waited = late or (self._waited and since_s < passed_s / 2)
+                passed_s = TOWARDS_ARRIVAL * median(self._rates) * passed
+                waited = shown and (late or (self._waited and since_s < passed_s / 2))
                 if waited:
                     at_s = min(arrived_s, last.at_s + passed_s)
             if not (waited or restarted) and since_s > 0.0:
