@@ -46,6 +46,8 @@ BEHIND_S: Final = 0.5
 """Shortest delay in s of a read after which the next read may be late too. It is late if it brings
 twice the bytes of its time, and those of a further ``BURST_S``."""
 BURST_S: Final = 0.05
+LEAST_S: Final = 0.2
+"""Shortest delay in s of a read that is corrected. Shorter ones may come from the board's clock."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 
@@ -110,9 +112,8 @@ class Translation:
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S
-        if waited and math.isfinite(elapsed_s):
-            return min(now, self.heard_s - self._behind_s + duration_s)
-        return now
+        sent_s = self.heard_s - self._behind_s + duration_s
+        return sent_s if waited and -math.inf < sent_s < now - LEAST_S else now
 
     def apply(self, happening: Happening) -> None:
         """Apply an event to the mode. Raises RequestRefused if the mode forbids it."""
