@@ -200,6 +200,11 @@ class MotionFilter:
         terms = [term for term in self._way_terms(index) if term[0] != PER_WHEEL * index + COUNT]
         self.filter.disturb(terms, stddev_m**2)
 
+    def doubt_place(self, stddev_m: float) -> None:
+        """Add an error to the robot's position, but not to its heading or its wheels' distances."""
+        for state in (X, Y):
+            self.filter.disturb([(state, 1.0)], stddev_m**2)
+
     def _doubted(self, index: int) -> Terms:
         """Return the states that are wrong if a wheel's estimated distance is wrong by 1 m.
 

@@ -215,9 +215,12 @@ class LoisOdometry:
         ``late_s``: how much later than usual the ticks arrived.
         """
         before, from_s = self._ticks, self._at_s
-        if self._was_silent(now):
+        silent = self._was_silent(now)
+        if silent:
             self._after_silence(now)
         self._advance(now)
+        motion = self._motion
+        yaw_rad, way_m = motion.yaw_rad, motion.way_m(0) + motion.way_m(1)
         self._ticks = ticks
         if before is None:
             self._kind.took_ticks((0, 0))
@@ -234,6 +237,10 @@ class LoisOdometry:
         self._kind.took_ticks(counts)
         for index, count in enumerate(counts):
             self._comparison.count(index, count, now - from_s, late_s)
+        if silent:
+            # The counts show the distance and the turn of the silence, but not the curve.
+            rolled_m = (motion.way_m(0) + motion.way_m(1) - way_m) / 2
+            motion.doubt_place(rolled_m * min(abs(motion.yaw_rad - yaw_rad) / 2, 1.0))
         self._keep(now)
         return [self._estimate()]
 

@@ -171,7 +171,9 @@ def stalled_drive(
     bench.run(3.0)
     for estimate in bench.odometry[seen:]:
         assert estimate.twist is not None
-        assert abs(estimate.twist.vx_mps) < 0.5, "the robot never drove so fast"
+        assert estimate.twist_variances is not None
+        stddev_mps = math.sqrt(estimate.twist_variances[0])
+        assert abs(estimate.twist.vx_mps) < 0.5 + 3 * stddev_mps, "the robot never drove so fast"
     last = bench.odometry[-1]
     off = origin.way_to(last.pose) - begin.way_to(true_pose(bench))
     return off.way_m, math.sqrt(last.covariance.xx + last.covariance.yy)
@@ -250,11 +252,15 @@ def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: f
 @FIRMWARE
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [7.0, 9.0])
+@pytest.mark.parametrize("twist", [FORWARD, BodyTwist(0.2, 0.0, 0.4), BodyTwist(-0.2, 0.0, -0.4)])
 def test_a_full_buffer_leaves_an_error_that_the_covariance_describes(
-    firmware: str, stall_s: float
+    firmware: str, twist: BodyTwist, stall_s: float
 ) -> None:
-    """The kernel's buffer could not hold all reports, so the last ones are lost."""
+    """The kernel's buffer could not hold all reports, so the last ones are lost.
+
+    The next counts show the distance and the turn since then, but not the curve.
+    """
     bench = Bench(firmware)
-    error_m, stddev_m = stalled_drive(bench, stall_s)
+    error_m, stddev_m = stalled_drive(bench, stall_s, twist)
     assert error_m < 3 * stddev_m
-    assert stddev_m < 0.4
+    assert stddev_m < (0.6 if twist == FORWARD else 1.5)
