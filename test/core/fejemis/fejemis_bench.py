@@ -13,6 +13,7 @@ from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.events import Event, Extra, Notice
 from omnibot_driver.core.fejemis.board import FejemisBoard
+from omnibot_driver.core.fejemis.readings import Job, JobDone
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.geometry.steered import SteeredKinematics
 from omnibot_driver.core.geometry.twist import BodyTwist
@@ -158,6 +159,15 @@ class Bench:
         return [line.rstrip() for line in bare if line]
 
 
+def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
+    """Ask the boards for a job, and return its answer."""
+    token = object()
+    bench.board.services.ask(job, token, bench.now)
+    bench.settle()
+    bench.run_until(lambda: any(d.token is token for d in bench.extras(JobDone)), limit_s)
+    return next(done for done in bench.extras(JobDone) if done.token is token)
+
+
 def nominal(
     simulated: SimulatedSettings | None = None,
     settings: FejemisSettings | None = None,
@@ -171,7 +181,7 @@ def nominal(
     return bench
 
 
-__all__ = ["DRIVE", "FRONT", "Bench", "Firmware", "SimulatedSettings", "nominal"]
+__all__ = ["DRIVE", "FRONT", "Bench", "Firmware", "SimulatedSettings", "ask", "nominal"]
 
 
 def drive_until_refused(bench: Bench, limit_s: float = 5.0) -> float:

@@ -1,12 +1,16 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what cancels a requested power off, and of what does not."""
+"""Tests of the power off: how it is confirmed, what cancels it, and what does not."""
 
 import pytest
-from fejemis_bench import DRIVE, FRONT, Bench, nominal
+from fejemis_bench import DRIVE, FRONT, Bench, ask, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.fejemis.readings import Job, JobDone
+from omnibot_driver.core.fejemis.jobs import whole_seconds
+from omnibot_driver.core.fejemis.readings import (
+    Job,
+    JobDone,
+)
 from omnibot_driver.core.fejemis.settings import FejemisSettings
 from omnibot_driver.core.requests import Request
 
@@ -167,3 +171,65 @@ def test_a_power_off_without_an_answer_may_still_come() -> None:
     assert bench.robot.drive.off_at_s is None
     bench.drive_on()
     assert not bench.robot.standing
+
+
+def test_a_power_off_that_no_board_confirms_does_not_claim_to_happen() -> None:
+    """The drive board sends heartbeats but hears nothing. The answer says: not confirmed."""
+    bench = nominal()
+    bench.hears.clear()
+    assert "does not confirm" in ask(bench, Job.POWER_OFF, 5.0).message
+
+
+@pytest.mark.slow
+def test_power_off_is_called_back_by_a_start() -> None:
+    """After a request to power off, motion, brush and lift are refused until ~/start cancels it."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
+    done = ask(bench, Job.POWER_OFF)
+    assert done.success
+    assert "5 s" in done.message
+    assert "power" in bench.board.refusal
+    with pytest.raises(RequestRefused, match="call ~/start"):
+        bench.board.services.set_brush(True, bench.now)
+    with pytest.raises(CommandRefused, match="call ~/start"):
+        bench.board.services.lift(3.0, bench.now)
+    assert bench.ask(Request.START).success
+    bench.run(6.0)
+    assert bench.robot.drive.powered
+    assert not bench.board.refusal
+
+
+def test_power_off_cuts_the_power() -> None:
+    """The user requests a power off. The board cuts its power after the configured delay."""
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))
+    assert ask(bench, Job.POWER_OFF).success
+    bench.run(4.0)
+    assert not bench.robot.drive.powered
+
+
+@pytest.mark.slow
+def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
+    """After a request to power off, the drive board restarts. The restart cancels the power off.
+
+    The driver accepts motion again.
+    """
+    bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
+    assert ask(bench, Job.POWER_OFF).success
+    with pytest.raises(CommandRefused, match="power"):
+        bench.drive()
+    bench.robot.drive.reboot()
+    bench.run(4.0)
+    bench.drive_on()
+    assert not bench.robot.standing
+
+
+@pytest.mark.parametrize(
+    ("wanted_s", "seconds"), [(10.0, 10), (0.2, 1), (300.0, 311), (12.0, 13), (120.0, 131)]
+)
+def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
+    wanted_s: float, seconds: int
+) -> None:
+    """If the command ``off 300`` loses its 3 and a 0, its checksum still fits.
+
+    So the driver sends a longer delay that has no such pair of digits.
+    """
+    assert whole_seconds(wanted_s) == seconds

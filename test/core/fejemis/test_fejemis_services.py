@@ -1,33 +1,20 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of requests other than motion, such as calibrations, and of the sensor readings."""
+"""Tests of requests other than motion, such as calibrations and the configuration."""
 
 import pytest
-from fejemis_bench import DRIVE, FRONT, Bench, nominal
+from fejemis_bench import DRIVE, FRONT, Bench, ask, nominal
 
 from omnibot_driver.core.errors import CommandRefused, RequestRefused
-from omnibot_driver.core.fejemis.jobs import Jobs, whole_seconds
+from omnibot_driver.core.fejemis.jobs import Jobs
 from omnibot_driver.core.fejemis.messages import Comment, Status, WheelConfiguration
 from omnibot_driver.core.fejemis.readings import (
-    BatteryReading,
     Job,
     JobDone,
-    MagneticReading,
-    OrientedImuReading,
-    RangeReading,
-    SteeringReading,
 )
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
 from omnibot_driver.core.requests import Request
 from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
-
-
-def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
-    token = object()
-    bench.board.services.ask(job, token, bench.now)
-    bench.settle()
-    bench.run_until(lambda: any(d.token is token for d in bench.extras(JobDone)), limit_s)
-    return next(done for done in bench.extras(JobDone) if done.token is token)
 
 
 def test_the_gyro_is_calibrated_by_the_board() -> None:
@@ -136,13 +123,6 @@ def test_boards_that_fall_silent_do_not_delay_an_answer(job: Job) -> None:
     assert not ask(bench, job, 5.0).success
 
 
-def test_a_power_off_that_no_board_confirms_does_not_claim_to_happen() -> None:
-    """The drive board sends heartbeats but hears nothing. The answer says: not confirmed."""
-    bench = nominal()
-    bench.hears.clear()
-    assert "does not confirm" in ask(bench, Job.POWER_OFF, 5.0).message
-
-
 def test_the_accelerometer_is_calibrated_by_the_board() -> None:
     """The board calibrates its accelerometer, and the published force is then gravity alone."""
     bench = nominal(Simulated(accel_bias_mps2=(0.2, -0.1, 0.3)))
@@ -234,61 +214,6 @@ def test_a_configuration_is_saved_and_loaded() -> None:
 
 
 @pytest.mark.slow
-def test_power_off_is_called_back_by_a_start() -> None:
-    """After a request to power off, motion, brush and lift are refused until ~/start cancels it."""
-    bench = nominal(settings=FejemisSettings(power_off_delay_s=5.0))
-    done = ask(bench, Job.POWER_OFF)
-    assert done.success
-    assert "5 s" in done.message
-    assert "power" in bench.board.refusal
-    with pytest.raises(RequestRefused, match="call ~/start"):
-        bench.board.services.set_brush(True, bench.now)
-    with pytest.raises(CommandRefused, match="call ~/start"):
-        bench.board.services.lift(3.0, bench.now)
-    assert bench.ask(Request.START).success
-    bench.run(6.0)
-    assert bench.robot.drive.powered
-    assert not bench.board.refusal
-
-
-def test_power_off_cuts_the_power() -> None:
-    """The user requests a power off. The board cuts its power after the configured delay."""
-    bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))
-    assert ask(bench, Job.POWER_OFF).success
-    bench.run(4.0)
-    assert not bench.robot.drive.powered
-
-
-def test_all_sensors_are_told_in_si_units() -> None:
-    """All sensor readings are published in SI units.
-
-    These are battery, magnetometer, orientation, four ranges and the angle of the front wheel.
-    """
-    bench = nominal(Simulated(front_m=0.3))
-    bench.run(1.0)
-    battery = bench.extras(BatteryReading)[-1]
-    assert battery.volts == pytest.approx(24.9, abs=0.1)
-    assert battery.amps < 0.0
-    assert battery.cells == 6
-    assert not battery.low
-    assert bench.extras(MagneticReading)[-1].field_t == pytest.approx((17e-6, 0.0, -47e-6))
-    oriented = bench.extras(OrientedImuReading)[-1]
-    assert oriented.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=0.01)
-    assert oriented.specific_force[2] == pytest.approx(9.81, abs=0.4)
-    ranges = {reading.name: reading.distance_m for reading in bench.extras(RangeReading)}
-    assert ranges == pytest.approx({"tof": 0.3, "sonar": 0.3, "ir1": 0.3, "ir2": 0.3}, abs=0.01)
-    assert bench.extras(SteeringReading)[-1].angle_rad == pytest.approx(0.0, abs=0.01)
-
-
-def test_a_low_battery_is_told_once_a_minute() -> None:
-    """The voltage per cell is low. The driver reports it once within a minute."""
-    bench = nominal(Simulated(volts=20.4))
-    bench.run(4.0)
-    assert bench.extras(BatteryReading)[-1].low
-    assert sum("battery is low" in text for text in bench.notices) == 1
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
     """During a calibration or a loading, motion is refused, because the robot must be at rest."""
@@ -373,32 +298,3 @@ def test_loading_stops_the_robot_before_it_loads() -> None:
     assert lines.index("rc 2 0 0") < lines.index("eer")
     begun = [at for at, _, data in bench.written if at >= mark and data.startswith(b";20eer")]
     assert begun[0] - mark > 0.4
-
-
-@pytest.mark.slow
-def test_a_drive_board_that_restarts_has_forgotten_the_power_off() -> None:
-    """After a request to power off, the drive board restarts. The restart cancels the power off.
-
-    The driver accepts motion again.
-    """
-    bench = nominal(settings=FejemisSettings(power_off_delay_s=100.0))
-    assert ask(bench, Job.POWER_OFF).success
-    with pytest.raises(CommandRefused, match="power"):
-        bench.drive()
-    bench.robot.drive.reboot()
-    bench.run(4.0)
-    bench.drive_on()
-    assert not bench.robot.standing
-
-
-@pytest.mark.parametrize(
-    ("wanted_s", "seconds"), [(10.0, 10), (0.2, 1), (300.0, 311), (12.0, 13), (120.0, 131)]
-)
-def test_a_power_off_waits_no_less_whichever_two_digits_are_lost(
-    wanted_s: float, seconds: int
-) -> None:
-    """If the command ``off 300`` loses its 3 and a 0, its checksum still fits.
-
-    So the driver sends a longer delay that has no such pair of digits.
-    """
-    assert whole_seconds(wanted_s) == seconds

@@ -1,0 +1,44 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Tests of what the sensors of the Teensy boards measure, in SI units."""
+
+import pytest
+from fejemis_bench import nominal
+
+from omnibot_driver.core.fejemis.readings import (
+    BatteryReading,
+    MagneticReading,
+    OrientedImuReading,
+    RangeReading,
+    SteeringReading,
+)
+from omnibot_driver.simulator.fejemis import FejemisSettings as Simulated
+
+
+def test_all_sensors_are_told_in_si_units() -> None:
+    """All sensor readings are published in SI units.
+
+    These are battery, magnetometer, orientation, four ranges and the angle of the front wheel.
+    """
+    bench = nominal(Simulated(front_m=0.3))
+    bench.run(1.0)
+    battery = bench.extras(BatteryReading)[-1]
+    assert battery.volts == pytest.approx(24.9, abs=0.1)
+    assert battery.amps < 0.0
+    assert battery.cells == 6
+    assert not battery.low
+    assert bench.extras(MagneticReading)[-1].field_t == pytest.approx((17e-6, 0.0, -47e-6))
+    oriented = bench.extras(OrientedImuReading)[-1]
+    assert oriented.orientation == pytest.approx((0.0, 0.0, 0.0, 1.0), abs=0.01)
+    assert oriented.specific_force[2] == pytest.approx(9.81, abs=0.4)
+    ranges = {reading.name: reading.distance_m for reading in bench.extras(RangeReading)}
+    assert ranges == pytest.approx({"tof": 0.3, "sonar": 0.3, "ir1": 0.3, "ir2": 0.3}, abs=0.01)
+    assert bench.extras(SteeringReading)[-1].angle_rad == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_low_battery_is_told_once_a_minute() -> None:
+    """The voltage per cell is low. The driver reports it once within a minute."""
+    bench = nominal(Simulated(volts=20.4))
+    bench.run(4.0)
+    assert bench.extras(BatteryReading)[-1].low
+    assert sum("battery is low" in text for text in bench.notices) == 1
