@@ -11,8 +11,9 @@ import sys
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Any, Final
 
+from breakable_line import TICK_S
 from ports import Terminal
 from published import Key, imu_key, odom_key, same, sent_imu_key, sent_odom_key
 from rig import Rig
@@ -36,21 +37,56 @@ to the message, the message is wrong.
 class PiecesTerminal(Terminal):
     """A terminal that delivers a few bytes at a time, as fast as the line carries them.
 
+    Board and adapter do not depend on the computer: if this thread is delayed, bytes that arrived
+    in the meantime are delivered together.
+
     ``silent_s``: the longest pause of the board so far, in s.
     """
 
     silent_s = 0.0
     _sent_at = math.inf
+    _tick_at = 0.0
+    """When the newest tick began, in s of the monotonic clock."""
+    _is_newest = True
+    """Whether the board's next output is that of the newest tick."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._held = b""
+        """Bytes of the line that are not delivered yet."""
+
+    def _due(self, due_s: float) -> tuple[int, float]:
+        ticks, next_s = super()._due(due_s)
+        self._tick_at = next_s - TICK_S
+        return ticks, next_s
+
+    def _let_pass(self, ticks: int) -> None:
+        for left in reversed(range(ticks)):
+            self._is_newest = not left
+            super()._let_pass(1)
 
     def _send(self, channel: int, data: bytes) -> int:
-        sent, now = 0, time.monotonic()
-        self.silent_s = max(self.silent_s, now - self._sent_at)
-        self._sent_at = now
-        for at in range(0, len(data), PIECE):
-            piece = data[at : at + PIECE]
-            time.sleep(len(piece) * BYTE_S)  # this simulates the pace of the line
-            sent += super()._send(channel, piece)
-        return sent
+        self._held += data
+        if not self._is_newest:
+            return len(data)
+        lost, to_come = 0, len(data)  # all bytes of earlier ticks have arrived
+        while to_come:
+            time.sleep(max(0.0, self._arrival_s(len(data), to_come) - time.monotonic()))
+            now = time.monotonic()
+            if to_come < len(data) and now > self._tick_at + TICK_S:
+                break  # the rest of this tick comes together with the next tick
+            while to_come and self._arrival_s(len(data), to_come) <= now:
+                to_come -= min(PIECE, to_come)
+            piece = self._held[: len(self._held) - to_come]
+            self._held = self._held[len(piece) :]
+            lost += len(piece) - super()._send(channel, piece)
+            self.silent_s = max(self.silent_s, now - self._sent_at)
+            self._sent_at = now
+        return len(data) - lost
+
+    def _arrival_s(self, count: int, to_come: int) -> float:
+        """Return when the next piece of a tick of ``count`` bytes is complete."""
+        return self._tick_at + (count - to_come + min(PIECE, to_come)) * BYTE_S
 
 
 class PiecesRig(Rig):
