@@ -139,6 +139,8 @@ class Reader:
                 if not data:
                     continue
                 now = time.monotonic()
+                if self._shared.heed_stall():  # before these bytes, which have waited meanwhile
+                    self._shared.settle()
                 self._wait_s = self.reconnect_interval_s
                 self.received_bytes += len(data)
                 self._count(port, now)
@@ -164,8 +166,7 @@ class Reader:
 
         The measurements in these bytes are already delivered. The caller holds the lock.
         """
-        stopped = self._shared.heed_stall()
-        if self._session.inbound.process(now) or stopped:
+        if self._session.inbound.process(now):
             self._shared.settle()
         else:
             self._shared.tell_guard()

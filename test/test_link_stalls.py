@@ -4,7 +4,7 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import pytest
@@ -13,6 +13,7 @@ from listener import PATIENCE_S, STOP, Listener, kinds, link_to, session
 from omnibot_driver import stall_detector
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.geometry.twist import BodyTwist
+from omnibot_driver.core.readings import Reading
 from omnibot_driver.core.session import Session
 from omnibot_driver.simulator.omnibot import PtyBoard
 
@@ -103,4 +104,41 @@ def test_a_suspended_host_has_stood_still(board: PtyBoard, monkeypatch: pytest.M
         drive([time.time_ns() - 1_000_000_000])  # sent during the suspension
     listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))
     assert board.wait_for(lambda b: kinds(b)[-1:] == ["velocity"], PATIENCE_S)
+    link.close("stop")
+
+
+def test_a_stall_is_noticed_before_the_bytes_that_waited_are_decoded(
+    board: PtyBoard, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A thread holds the session's lock for half a second, so bytes wait to be read.
+
+    The board's codec is informed of the stall before it receives these bytes.
+    """
+    listener, ours = Listener(), session()
+    link = link_to(board.path, listener, ours)
+    link.start()
+    listener.wait_for(lambda: ours.state == "nominal")
+    codec, order = ours.board, list[str]()
+    receive, stalled = codec.receive, codec.stalled
+
+    def hear(data: bytes, now: float, channel: int = 0) -> Sequence[Reading]:
+        order.append("bytes")
+        return receive(data, now, channel)
+
+    def stall() -> None:
+        order.append("stall")
+        stalled()
+
+    monkeypatch.setattr(codec, "receive", hear)
+    monkeypatch.setattr(codec, "stalled", stall)
+    heard: list[int] = []
+
+    def hang(_session: Session, _now: float) -> None:
+        heard.append(len(order))
+        end = board.board.tick + 60
+        assert board.wait_for(lambda b: b.tick >= end, PATIENCE_S)
+
+    link.call(hang)
+    listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
+    assert order[heard[0]] == "stall"
     link.close("stop")
