@@ -172,6 +172,8 @@ class FejemisBoard(Board):
         silence of the boards.
         """
         self._inbound.watch.stalled()
+        for half in self._ports.halves:
+            half.clock.stalled()
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 

@@ -20,6 +20,8 @@ EARLY_S: Final = 0.005
 is implausible."""
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
+WAITED_S: Final = 1.0
+"""Time in s after a stall of the driver in which a line may be late by any time."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
@@ -59,6 +61,11 @@ class TeensyClock:
         self._earlies: list[tuple[float, float]] = []
         """Times that seem early, but are otherwise plausible, each with its arrival."""
         self._last_s = 0.0
+        self._stalled, self._waited_until = False, -math.inf
+
+    def stalled(self) -> None:
+        """Record a stall of the driver. The next lines may have waited until its end."""
+        self._stalled = True
 
     @property
     def known(self) -> bool:
@@ -85,9 +92,12 @@ class TeensyClock:
     def see(self, board_s: float, now: float) -> bool:
         """Receive the board time of a line that came at ``now``; return whether it is plausible."""
         self.restarted = False
+        if self._stalled:
+            self._stalled, self._waited_until = False, now + WAITED_S
         if self._fit is not None:
             late_s = now - self.host_s(board_s)
-            plausible = -EARLY_S <= late_s <= LATE_S and board_s >= self._last_s - EARLY_S
+            latest_s = math.inf if now < self._waited_until else LATE_S
+            plausible = -EARLY_S <= late_s <= latest_s and board_s >= self._last_s - EARLY_S
             early = -LATE_S <= late_s < -EARLY_S and self._began_late(board_s, now)
             if not plausible and not early and not self._is_new_time(board_s, now):
                 return False

@@ -8,7 +8,8 @@ from fejemis_bench import DRIVE, FRONT, Bench, nominal
 from omnibot_driver.core.geometry.se2 import Pose
 
 READ = 4095
-"""Largest number of bytes that a read of a terminal returns."""
+"""Largest number of bytes that a read of a terminal returns, and that wait in its buffer."""
+EVERYTHING = 10**6
 
 
 def true_pose(bench: Bench) -> Pose:
@@ -16,32 +17,60 @@ def true_pose(bench: Bench) -> Pose:
     return Pose(truth.x_m, truth.y_m, truth.yaw_rad)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("phase_s", [0.0, 0.03, 0.05, 0.07])
-@pytest.mark.parametrize("stall_s", [3.3, 4.5])
-def test_the_motion_of_a_stall_is_in_odom(stall_s: float, phase_s: float) -> None:
-    """The robot drives a curve while the driver stalls. Nothing is lost, but lines are too old.
+def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> None:
+    """Let the driver stall; then let it read the first ``room`` bytes that each board sent.
 
-    So the first displacement covers seconds, and the next one 20 ms, at the same speed.
+    ``noticed``: whether the driver notices the stall. If not, only the reads were late.
     """
-    bench = nominal()
-    origin, begin = bench.odometry[-1].pose, true_pose(bench)
-    bench.drive_on(0.3, 0.2, 2.0)
-    bench.run(phase_s)
     held = {DRIVE: b"", FRONT: b""}
     for _ in range(round(stall_s / bench.robot.tick_s)):
         bench.now += bench.robot.tick_s
         for channel, data in bench.robot.advance():
-            held[channel] += data
-    bench.session.stood_still(stall_s, bench.now)
+            held[channel] = (held[channel] + data)[:room]
+    if noticed:
+        bench.session.stood_still(stall_s, bench.now)
     while any(held.values()):
         for channel, data in held.items():
             bench.session.inbound.receive(data[:READ], bench.now, channel)
             bench.settle()
             bench.now += 0.0005
             held[channel] = data[READ:]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("phase_s", [0.0, 0.03, 0.05, 0.07])
+@pytest.mark.parametrize("stall_s", [3.3, 4.5])
+@pytest.mark.parametrize("noticed", [True, False])
+def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
+    """The robot drives a curve while the driver stalls, or reads late. Nothing is lost.
+
+    Without a stall, lines of more than a second ago are implausible. So the first displacement
+    covers seconds, and the next one 20 ms, at the same speed.
+    """
+    bench = nominal()
+    origin, begin = bench.odometry[-1].pose, true_pose(bench)
+    bench.drive_on(0.3, 0.2, 2.0)
+    bench.run(phase_s)
+    stall(bench, stall_s, room=EVERYTHING, noticed=noticed)
     bench.run(2.0)
     off = origin.way_to(bench.odometry[-1].pose) - begin.way_to(true_pose(bench))
     assert off.way_m < 0.01
     assert abs(off.yaw_rad) < 0.01
     assert not any("implausible" in notice for notice in bench.notices)
+
+
+@pytest.mark.parametrize("stall_s", [0.8, 1.3, 3.0])
+@pytest.mark.parametrize("room", [READ, EVERYTHING])
+def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
+    """The driver stalls. The terminal's buffer keeps the lines of 0.37 s, or all lines.
+
+    All samples in the buffer are published, with the times at which the board took them.
+    """
+    bench = nominal()
+    bench.run(1.0)
+    begin_s, before = bench.now, len(bench.imu)
+    stall(bench, stall_s, room=room)
+    stamps_s = [estimate.stamp_s - begin_s for estimate in bench.imu[before:]]
+    assert len(stamps_s) == (37 if room == READ else round(100 * stall_s))
+    assert stamps_s == pytest.approx([0.01 * (n + 1) for n in range(len(stamps_s))], abs=2e-3)
+    assert not bench.notices[-1:] or "stalled" in bench.notices[-1]
