@@ -83,7 +83,8 @@ class Driver:
             self._listener.join()
             assert self.process.stdout is not None
             self.process.stdout.close()
-            print(self.output)  # pytest shows it if the test has failed
+            if "PYTEST_CURRENT_TEST" in os.environ:
+                print(self.output)  # pytest shows it if the test has failed
 
     @property
     def output(self) -> str:
