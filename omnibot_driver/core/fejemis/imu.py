@@ -62,12 +62,16 @@ class ImuSamples:
         self.forces = (scale * acceleration.x, scale * acceleration.y, scale * acceleration.z)
         return ImuReading(self.forces, self.rates)
 
-    def sampled_s(self, arrived_s: float, not_before_s: float, skipped: int) -> float:
+    def sampled_s(
+        self, arrived_s: float, not_before_s: float, next_pose_s: float, skipped: int
+    ) -> float:
         """Return when the board took the next sample, in s of the board's clock.
 
         ``arrived_s``: when the sample arrived, by that clock.
 
         ``not_before_s``: time of the last pose before the sample.
+
+        ``next_pose_s``: time of the pose that arrived next; infinity if none has arrived yet.
 
         ``skipped``: how many incomplete samples were left out before it.
         """
@@ -81,13 +85,15 @@ class ImuSamples:
         # A sample that arrives after a pose is not older than the pose.
         lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S
+        waited = arrived_s > next_pose_s + PERIOD_S  # to be read, as the pose has
         if delay_s < -PERIOD_S / 2:
             lost += (more := round(delay_s / PERIOD_S))
             delay_s -= more * PERIOD_S
         elif since_s > REGULAR * PERIOD_S and min(delay_s, self._delay_s) > LATE * PERIOD_S:
-            lost += (more := int(min(delay_s, self._delay_s) / PERIOD_S + 1.0 - LATE))
+            more = 0 if waited else int(min(delay_s, self._delay_s) / PERIOD_S + 1.0 - LATE)
+            lost += more
             delay_s -= more * PERIOD_S
-        self._delay_s = delay_s
+        self._delay_s = 0.0 if waited else delay_s
         self._count += lost
         self._follow(delay_s)
         return self._phase_s + self._count * PERIOD_S

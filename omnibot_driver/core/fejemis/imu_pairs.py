@@ -63,6 +63,8 @@ class Pair:
 
     ``doubtful``: whether the pair may be false, or follows a silence, and so must wait for the next
     pose.
+
+    ``next_pose_s``: the board's time of the next pose, if it arrived before the pair was taken.
     """
 
     gyro: Gyro
@@ -71,6 +73,7 @@ class Pair:
     pose_s: float
     skipped: int
     doubtful: bool
+    next_pose_s: float = math.inf
 
 
 Oriented = tuple[Attitude, float]
@@ -149,7 +152,7 @@ class ImuPairs:
         for pair in [item for item in self._queue if isinstance(item, Pair)]:
             if lacking or not counted:
                 self._reject(pair)
-            pair.doubtful = False
+            pair.doubtful, pair.next_pose_s = False, time_s
         self._silent = False
         self._pose_s = time_s
         self._counts = {"gyro": 0, "acc": 0}

@@ -146,7 +146,8 @@ class Translation:
         stamp_s = pair.at
         if clock.known:
             board_s = clock.board_s(pair.at)
-            stamp_s = clock.host_s(self._imu.sampled_s(board_s, pair.pose_s, pair.skipped))
+            poses_s = pair.pose_s, pair.next_pose_s
+            stamp_s = clock.host_s(self._imu.sampled_s(board_s, *poses_s, pair.skipped))
         self._imu_at, self._imu_stamp_s = pair.at, min(stamp_s, pair.at)
         self.stamped.add(self._imu.reading(pair), stamp_s, pair.at)
 

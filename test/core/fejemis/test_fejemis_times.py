@@ -71,7 +71,9 @@ def test_stamps_are_those_of_the_board(ppm: float, loss: float) -> None:
             for pair in pairs.take():
                 assert isinstance(pair, Pair)
                 assert pair.at == arrived
-                sampled_s = imu.sampled_s(clock.board_s(pair.at), pair.pose_s, pair.skipped)
+                sampled_s = imu.sampled_s(
+                    clock.board_s(pair.at), pair.pose_s, pair.next_pose_s, pair.skipped
+                )
                 off["imu"].append(min(arrived, clock.host_s(sampled_s)) - true_s)
     assert within(off["pose"][200:]) < 5e-5
     assert within(off["imu"][400:]) < 2e-4
