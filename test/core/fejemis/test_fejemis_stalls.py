@@ -65,6 +65,7 @@ def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s
     assert not any("implausible" in notice for notice in bench.notices)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.3, 3.0])
 @pytest.mark.parametrize("room", [READ, EVERYTHING])
 def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float) -> None:
@@ -82,6 +83,7 @@ def test_samples_that_waited_get_their_sampling_times(room: int, stall_s: float)
     assert not bench.notices[-1:] or "stalled" in bench.notices[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 1.5])
 def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: float) -> None:
     """After a stall, the driver is busy with the first read, so the second one is late as well.
