@@ -180,6 +180,7 @@ def test_a_pose_that_is_not_finite_is_ignored(bad: float) -> None:
 # Attaching and resetting
 
 
+@pytest.mark.slow
 @given(
     st.lists(small_moves, min_size=1, max_size=8),
     st.lists(small_moves, min_size=1, max_size=4),

@@ -142,6 +142,7 @@ def test_what_was_written_and_read_once_is_not_written_again() -> None:
     assert bench.board._upkeep.configurations["front"].told["confs"] == (0.43, 0.41)
 
 
+@pytest.mark.slow
 def test_a_small_change_by_the_user_is_written() -> None:
     """The user changes a setting very little. The driver still writes it."""
     first, second = (0.0775, 0.0775, 19.0, 68.0, 0.4), (0.0772, 0.0778, 19.0, 68.0, 0.4)

@@ -265,6 +265,7 @@ def test_every_kind_of_firmware_is_driven(firmware: Firmware) -> None:
     assert not bench.notices
 
 
+@pytest.mark.slow
 def test_ports_that_change_places_while_they_are_away_are_found_out_each_time() -> None:
     """The cables of the two boards are exchanged while the ports are closed.
 

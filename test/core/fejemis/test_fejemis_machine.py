@@ -167,6 +167,7 @@ def test_the_lights_are_given_back_at_the_end() -> None:
     assert any(b"leds" in data for _, data in bench.board.switch_off())
 
 
+@pytest.mark.slow
 def test_the_guard_and_the_exit_stop_all_that_turns_on_both_lines() -> None:
     """The watchdog process sends lines that stop wheels, brush and lift, with or without an e-stop.
 

@@ -234,6 +234,7 @@ def test_a_figure_eight_with_losses_both_ways_ends_where_it_is(seed: int) -> Non
     assert bench.robot.standing
 
 
+@pytest.mark.slow
 def test_joint_states_follow_the_wheels() -> None:
     """The robot drives a curve.
 

@@ -198,6 +198,7 @@ def test_power_off_is_called_back_by_a_start() -> None:
     assert not bench.board.refusal
 
 
+@pytest.mark.slow
 def test_power_off_cuts_the_power() -> None:
     """The user requests a power off. The board cuts its power after the configured delay."""
     bench = nominal(settings=FejemisSettings(power_off_delay_s=4.0))

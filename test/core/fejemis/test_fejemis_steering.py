@@ -80,6 +80,7 @@ def test_the_equations_are_those_of_the_manual(v: float, w: float, theta_rad: fl
     assert (body.vx_mps, body.yaw_rate_radps) == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.slow
 @given(speeds, rates)
 def test_the_inversion_moves_the_body_as_commanded(v: float, w: float) -> None:
     """The front wheel is at its commanded angle. The set-points then give the commanded motion."""

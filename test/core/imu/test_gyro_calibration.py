@@ -79,6 +79,7 @@ def test_moments_are_those_of_the_textbook(values: list[Vector3]) -> None:
         assert deviation(values)[axis] == pytest.approx(math.sqrt(variance), abs=1e-9)
 
 
+@pytest.mark.slow
 @given(biases, st.integers(0, 2**16))
 def test_a_planted_bias_is_found_and_told(bias: Vector3, seed: int) -> None:
     """A calibration uses 2 s of noisy readings at rest.
@@ -215,6 +216,7 @@ def test_nothing_is_refined_unless_it_is_wanted_and_the_wheels_say_that_they_sta
     assert calibration.bias == NONE
 
 
+@pytest.mark.slow
 @given(st.lists(vectors, max_size=400), st.booleans())
 def test_whatever_the_gyro_says_no_bias_is_larger_than_a_sensor_can_have(
     rates: list[Vector3], measure: bool

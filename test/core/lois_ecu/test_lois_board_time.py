@@ -85,6 +85,7 @@ def test_a_stall_of_the_reader_ends_with_twenty_groups_in_one_read() -> None:
     assert board.stddev_s < 0.015
 
 
+@pytest.mark.slow
 @given(
     st.lists(
         st.tuples(st.sampled_from([0.0, 1e-6, 0.01, 0.2, 4.0]), st.integers(0, 400)), min_size=8

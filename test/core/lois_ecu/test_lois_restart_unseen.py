@@ -78,6 +78,7 @@ def test_a_restart_shows_although_the_clock_wraps_at_that_time(
     assert turn_rad < 0.15
 
 
+@pytest.mark.slow
 def test_a_restart_at_rest_shows_although_the_clock_wraps_at_that_time() -> None:
     """The board restarts at rest, shortly before its clock would wrap.
 

@@ -33,6 +33,7 @@ def test_two_speeds_tell_a_third_one(slope: float, dead: float) -> None:
     assert line.units(slope * (10.0 - dead)) == pytest.approx(10.0, abs=0.8)
 
 
+@pytest.mark.slow
 @given(SLOPES, st.floats(0.95, 1.0))
 def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     slope: float, part: float

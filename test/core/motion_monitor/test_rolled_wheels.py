@@ -68,6 +68,7 @@ def test_wheels_from_the_bodys_displacements_and_back(
     assert back.yaw_rate_radps == pytest.approx(rolled.yaw_rad, abs=1e-9)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(*[st.integers(-300, 300)] * 3), min_size=1, max_size=20))
 def test_wheel_counts_are_the_wheels_angles_exactly(counts: list[tuple[int, int, int]]) -> None:
     """Wheel counts are converted to motions of the body and back to wheel angles.

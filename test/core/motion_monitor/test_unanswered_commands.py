@@ -56,6 +56,7 @@ def test_a_robot_that_somebody_holds_may_leap_when_it_is_released(
     assert bench.session.figures(bench.now).commands.trips == 0
 
 
+@pytest.mark.slow
 def test_a_robot_that_has_obeyed_meanwhile_is_told_of_again() -> None:
     """The line to the board is cut twice, so the robot does not obey. In between, it obeys.
 
@@ -102,6 +103,7 @@ def test_in_imu_only_mode_nothing_is_found() -> None:
     assert bench.session.figures(bench.now).commands.trips == 0
 
 
+@pytest.mark.slow
 def test_a_robot_that_did_not_hear_stop_is_stopped_when_it_can_hear_again(bench: Bench) -> None:
     """The robot has missed the first Stops. Its deltas show motion, so Stop is sent again."""
     bench.hears = False

@@ -198,6 +198,7 @@ def test_settling_removes_nothing_but_the_gap() -> None:
     assert after.covariance.yaw_yaw == pytest.approx(before.covariance.yaw_yaw)
 
 
+@pytest.mark.slow
 def test_the_twist_is_as_good_as_its_default_covariance_says() -> None:
     """Robots slip, speed up and brake. The RMS errors of the twist fit its default covariance.
 

@@ -301,6 +301,7 @@ def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
         assert step.way_m <= 2.0 * seconds + 1e-6
 
 
+@pytest.mark.slow
 @given(
     st.lists(
         st.one_of(

@@ -52,6 +52,7 @@ def test_a_pause_takes_up_the_count(count: int, paused_s: float) -> None:
     assert step == Step(0, None, restarted=count == 255)
 
 
+@pytest.mark.slow
 @given(counts, st.integers(0, 5), st.floats(1.0, 1000.0))
 def test_a_restart_begins_the_count_anew(count: int, lost: int, after_s: float) -> None:
     """After a pause, a count can mean a restart, or lost deltas of a board that ran on.

@@ -197,6 +197,7 @@ def test_lost_frames_shift_no_later_stamps(chunker: Chunker) -> None:
         assert sum(abs(error - usual_s) < 0.5e-3 for error in errors) > 0.98 * len(errors)
 
 
+@pytest.mark.slow
 def test_without_displacements_lost_samples_are_counted_by_their_arrival() -> None:
     """The board sends no displacements, so no counter shows which samples are lost.
 
@@ -281,6 +282,7 @@ def test_an_outage_that_nobody_told_of_is_found_by_arrival() -> None:
     assert after.unevenness() < 0.2e-3
 
 
+@pytest.mark.slow
 def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
     """An adapter may cut the stream between a displacement and the IMU sample of the same tick.
 

@@ -85,6 +85,7 @@ def test_without_the_angle_drive_goes_straight() -> None:
     assert rig.board.truth.yaw_rad == pytest.approx(0.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_no_command_ends_by_itself() -> None:
     """The host sends one command and then no more. After 20 s the robot still drives."""
     rig = Rig().booted()
