@@ -140,5 +140,5 @@ def test_a_stall_is_noticed_before_the_bytes_that_waited_are_decoded(
 
     link.call(hang)
     listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
-    assert order[heard[0]] == "stall"
     link.close("stop")
+    assert order[heard[0]] == "stall"
