@@ -138,6 +138,8 @@ def test_a_stall_is_noticed_before_the_bytes_that_waited_are_decoded(
         end = board.board.tick + 60
         assert board.wait_for(lambda b: b.tick >= end, PATIENCE_S)
 
+    drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
+    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))  # no other stall is on
     link.call(hang)
     listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
     link.close("stop")

@@ -40,7 +40,7 @@ class PiecesTerminal(Terminal):
     Board and adapter do not depend on the computer: if this thread is delayed, bytes that arrived
     in the meantime are delivered together.
 
-    ``silent_s``: the longest pause of the board so far, in s.
+    ``silent_s``: the longest time between two deliveries so far, in s.
     """
 
     silent_s = 0.0
