@@ -174,6 +174,7 @@ class FejemisBoard(Board):
         self._inbound.watch.stalled()
         for half in self._ports.halves:
             half.clock.stalled()
+        self._translation.stalled()
         if self._upkeep.machine.active:
             self._upkeep.machine.off()
 

@@ -32,6 +32,9 @@ SILENT_S: Final = 0.1
 The pose shows whether the board was silent, or the host only read late. After a silence, the
 sampling time of the pair is unknown, so the pair is rejected.
 """
+WARY_S: Final = 1.0
+"""Time in s after a stall of the driver in which every pair must wait for the next pose. Lines were
+lost if the kernel's buffer was full, although no silence shows it."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """``KNOWN_S``: difference in s that shows which line of a sample comes first. It is the sum of the
@@ -108,10 +111,15 @@ class ImuPairs:
         self._skipped = 0
         self._silent = False
         """Whether a silence precedes the lines since the last pose."""
+        self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf
         self._counts: dict[Kind, int] = {"gyro": 0, "acc": 0}
         """How many gyro and acceleration lines arrived since the last pose."""
+
+    def stalled(self) -> None:
+        """Record a stall of the driver, after which lines may be missing."""
+        self._stalled = True
 
     def gyro(self, gyro: Gyro, now: float) -> None:
         """Receive a gyro line."""
@@ -190,6 +198,8 @@ class ImuPairs:
         if last is not None and last[:2] == (kind, line):
             return  # the same line came twice
         self._last = kind, line, now
+        if self._stalled:
+            self._stalled, self._wary_until = False, now + WARY_S
         between, self._between = self._between, set()
         self._counts[kind] += 1
         self._silent |= last is not None and now - last[2] > SILENT_S
@@ -225,7 +235,7 @@ class ImuPairs:
         gyro, acceleration = (first, line) if isinstance(first, Gyro) else (line, first)
         assert isinstance(gyro, Gyro)
         assert isinstance(acceleration, Acceleration)
-        doubtful = late or self._silent
+        doubtful = late or self._silent or now < self._wary_until
         pair = Pair(gyro, acceleration, now, self._pose_s, self._skipped, doubtful)
         self._queue.append(pair)
         self._skipped = 0

@@ -80,6 +80,10 @@ class Translation:
         self.odometry.forget()
         self._begin_imu()
 
+    def stalled(self) -> None:
+        """Record a stall of the driver, after which lines may be missing."""
+        self._pairs.stalled()
+
     def _begin_imu(self) -> None:
         self._imu.begin()
         self._pairs.begin()
