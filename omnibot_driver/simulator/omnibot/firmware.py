@@ -207,7 +207,8 @@ class SimulatedBoard:
             sent = [imu_frame(*self._imu.read(self._world))]
             if self.mode is BoardMode.NOMINAL:
                 sent += self._output.odometry_frames(self._ticks_since_boot, self._odometry)
-        self.sent.extend(SentFrame(self.tick, data) for data in sent)
+        for data in sent:
+            self.sent.append(SentFrame(self.tick, data))
         return b"".join(sent)
 
     def advance(self) -> list[Packet]:
@@ -270,18 +271,18 @@ class SimulatedBoard:
 
     def _control(self) -> None:
         """Run one pass of the 100 Hz control loop (manual, Odometry equation and Wheel control)."""
-        encoders = self._world.encoders
-        a, b, c = (new - old for new, old in zip(encoders, self._encoders, strict=True))
-        self._encoders = encoders
-        self._odometry.integrate((a, b, c))
+        old_a, old_b, old_c = self._encoders
+        self._encoders = new_a, new_b, new_c = self._world.encoders
+        a, b, c = turned = new_a - old_a, new_b - old_b, new_c - old_c
+        self._odometry.integrate(turned)
         if self._goal is not None:
             twist = approach(self._odometry.pose, self._goal)
             self._targets = targets.from_twist(twist, self.settings)
         if self.mode in _RUNNING and not self.estopped:
-            pwm_a, pwm_b, pwm_c = (
-                controller.update(target, measured)
-                for controller, target, measured in zip(
-                    self._controllers, self._targets, (a, b, c), strict=True
-                )
+            controller_a, controller_b, controller_c = self._controllers
+            target_a, target_b, target_c = self._targets
+            self._pwm = (
+                controller_a.update(target_a, a),
+                controller_b.update(target_b, b),
+                controller_c.update(target_c, c),
             )
-            self._pwm = (pwm_a, pwm_b, pwm_c)

@@ -19,9 +19,12 @@ STANDARD_GRAVITY_MPS2 = 9.80665
 COUNTS_PER_G = 16384.0
 COUNTS_PER_DPS = 131.0
 
+Vector = tuple[float, float, float]
+
 
 def _counts(value: float) -> int:
-    return max(-32768, min(32767, round(value)))
+    counts = round(value)
+    return counts if -32768 <= counts <= 32767 else max(-32768, min(32767, counts))
 
 
 class Mpu6050:
@@ -36,32 +39,34 @@ class Mpu6050:
 
     def read(self, world: World) -> tuple[Triple, Triple]:
         """Return accelerometer and gyro readings, in raw counts along the sensor's axes."""
-        gauss, settings, held = self._random.gauss, self._settings, world.held
+        settings, (roll_rad, pitch_rad, held_yaw_rate) = self._settings, world.held
         ax_mps2, ay_mps2 = world.acceleration
-        level = cos(held.pitch_rad)
-        up = (-sin(held.pitch_rad), level * sin(held.roll_rad), level * cos(held.roll_rad))
+        level = cos(pitch_rad)
         force_g = self._seen(
-            up[0] + ax_mps2 / STANDARD_GRAVITY_MPS2, up[1] + ay_mps2 / STANDARD_GRAVITY_MPS2, up[2]
+            -sin(pitch_rad) + ax_mps2 / STANDARD_GRAVITY_MPS2,
+            level * sin(roll_rad) + ay_mps2 / STANDARD_GRAVITY_MPS2,
+            level * cos(roll_rad),
         )
-        rates_dps = self._seen(0.0, 0.0, degrees(world.truth.yaw_rate + held.yaw_rate))
-        ax, ay, az = (
-            _counts((g + bias + gauss(0.0, settings.accel_noise_g)) * COUNTS_PER_G)
-            for g, bias in zip(force_g, settings.accel_bias_g, strict=True)
-        )
+        accel = self._measured(force_g, settings.accel_bias_g, settings.accel_noise_g, COUNTS_PER_G)
         if settings.gyro_walk_dps:
             self._wander()
-        gx, gy, gz = (
-            _counts((rate + bias + gauss(0.0, settings.gyro_noise_dps)) * COUNTS_PER_DPS)
-            for rate, bias in zip(rates_dps, self._bias_dps, strict=True)
-        )
-        return (ax, ay, az), settings.gyro_stuck or (gx, gy, gz)
+        rates_dps = self._seen(0.0, 0.0, degrees(world.yaw_rate + held_yaw_rate))
+        gyro = self._measured(rates_dps, self._bias_dps, settings.gyro_noise_dps, COUNTS_PER_DPS)
+        return accel, settings.gyro_stuck or gyro
 
-    def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def _seen(self, x: float, y: float, z: float) -> Vector:
         """Convert a vector from the body's axes to the sensor's axes."""
-        along_x, along_y, along_z = (
-            axis[0] * x + axis[1] * y + axis[2] * z for axis in self._sensor_axes
+        (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = self._sensor_axes
+        return xx * x + xy * y + xz * z, yx * x + yy * y + yz * z, zx * x + zy * y + zz * z
+
+    def _measured(self, true: Vector, bias: Vector, rms: float, counts_per_unit: float) -> Triple:
+        """Return the counts for a true vector in the sensor's axes, with bias and noise."""
+        (x, y, z), (bias_x, bias_y, bias_z), gauss = true, bias, self._random.gauss
+        return (
+            _counts((x + bias_x + gauss(0.0, rms)) * counts_per_unit),
+            _counts((y + bias_y + gauss(0.0, rms)) * counts_per_unit),
+            _counts((z + bias_z + gauss(0.0, rms)) * counts_per_unit),
         )
-        return along_x, along_y, along_z
 
     def _wander(self) -> None:
         step_dps = self._settings.gyro_walk_dps * sqrt(TICK_S)
@@ -69,7 +74,7 @@ class Mpu6050:
         self._bias_dps = x, y, z
 
 
-def _axes(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
+def _axes(roll: float, pitch: float, yaw: float) -> tuple[Vector, Vector, Vector]:
     """Return the sensor's axes in body coordinates.
 
     ``roll``, ``pitch``, ``yaw``: turns about fixed axes, in rad, in this order.

@@ -119,4 +119,4 @@ class WheelController:
         if abs(effort) < PWM_LIMIT or effort * error < 0:
             self._feedback += gains.integral * error
             effort += gains.integral * error
-        return max(-PWM_LIMIT, min(PWM_LIMIT, effort))
+        return effort if abs(effort) <= PWM_LIMIT else copysign(PWM_LIMIT, effort)

@@ -22,6 +22,7 @@ class Odometry:
     def __init__(self, settings: BoardSettings, pose: BoardPose) -> None:
         self.pose = PlanarPose(pose.x_mm / 1000, pose.y_mm / 1000, pose.theta_mrad / 1000)
         self._settings = settings
+        self._rim_m_per_count = settings.rim_m_per_count
         self._begin_difference()
 
     @property
@@ -31,15 +32,15 @@ class Odometry:
 
     def integrate(self, counts: Triple) -> None:
         """Add the encoder counts of wheels A, B, C in one control tick."""
-        settings = self._settings
-        a_m, b_m, c_m = (n * settings.rim_m_per_count for n in counts)
-        moved = body_from_rims((a_m, b_m, c_m), settings.base_radius_m)
-        dx, dy, dyaw = (sign * way for sign, way in zip(settings.axis_signs, moved, strict=True))
+        (a, b, c), rim_m = counts, self._rim_m_per_count
+        moved = body_from_rims((a * rim_m, b * rim_m, c * rim_m), self._settings.base_radius_m)
+        (dx, dy, dyaw), (x_sign, y_sign, yaw_sign) = moved, self._settings.axis_signs
+        dx, dy, dyaw = x_sign * dx, y_sign * dy, yaw_sign * dyaw
         self.pose = self.pose.moved(dx, dy, dyaw)
         x, y, yaw = self._body_unsent
         self._body_unsent = (x + dx, y + dy, yaw + dyaw)
-        a, b, c = self._counts_unsent
-        self._counts_unsent = (a + counts[0], b + counts[1], c + counts[2])
+        a_unsent, b_unsent, c_unsent = self._counts_unsent
+        self._counts_unsent = (a_unsent + a, b_unsent + b, c_unsent + c)
 
     def difference(self) -> Triple:
         """Return the motion since the last 25 Hz frame, in the units of such a frame.

@@ -8,7 +8,7 @@ firmware assumes, commands or sends.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import copysign, cos, exp, sin, sqrt
+from math import cos, exp, sin, sqrt
 from random import Random
 from typing import NamedTuple
 
@@ -20,6 +20,8 @@ from omnibot_driver.simulator.omnibot.chassis import (
 )
 from omnibot_driver.simulator.omnibot.motors import TICK_S, Motor
 from omnibot_driver.simulator.omnibot.settings import BoardSettings
+
+_AS_NUMBERED = (1, 2, 3)
 
 SLIP_CORRELATION_M = 0.1
 """Rim distance over which the slip of a wheel becomes uncorrelated, in m."""
@@ -73,7 +75,7 @@ class World:
     def __init__(self, settings: BoardSettings) -> None:
         self._random = Random(f"slip {settings.seed}")
         self._motors = tuple(Motor(constants) for constants in settings.motors)
-        self._wiring = [(abs(motor) - 1, copysign(1, motor)) for motor in settings.motor_wiring]
+        self._wiring = settings.motor_wiring
         self._rim_m_per_count = [
             settings.rim_m_per_count * scale for scale in settings.wheel_radius_scale
         ]
@@ -98,6 +100,11 @@ class World:
         return TruePose(*self._pose, *self._twist)
 
     @property
+    def yaw_rate(self) -> float:
+        """True left turn rate of the robot, in rad/s."""
+        return self._twist[2]
+
+    @property
     def encoders(self) -> tuple[int, int, int]:
         """Encoder counts of wheels A, B, C since construction."""
         a, b, c = self._motors
@@ -106,11 +113,8 @@ class World:
     @property
     def rim_speeds_mps(self) -> Wheels:
         """Current rim speeds of wheels A, B, C, in m/s."""
-        a, b, c = (
-            motor.speed / TICK_S * rim_m
-            for motor, rim_m in zip(self._motors, self._rim_m_per_count, strict=True)
-        )
-        return a, b, c
+        (a, b, c), (a_m, b_m, c_m) = self._motors, self._rim_m_per_count
+        return a.speed / TICK_S * a_m, b.speed / TICK_S * b_m, c.speed / TICK_S * c_m
 
     def advance(self, pwm: Wheels) -> None:
         """Advance by one tick.
@@ -130,24 +134,29 @@ class World:
             (vy - old_vy) / TICK_S + yaw_rate * vx,
         )
 
-    def _wired(self, pwm: Wheels) -> list[float]:
+    def _wired(self, pwm: Wheels) -> Sequence[float]:
         """Return the efforts that reach the motors of wheels A, B, C, as the motors are wired."""
+        if self._wiring == _AS_NUMBERED:
+            return pwm
         reached = [0.0] * 3
-        for effort, (motor, sign) in zip(pwm, self._wiring, strict=True):
-            reached[motor] += sign * effort
+        for effort, motor in zip(pwm, self._wiring, strict=True):
+            reached[abs(motor) - 1] += effort if motor > 0 else -effort
         return reached
 
     def _turn_wheels(self, efforts: Sequence[float]) -> list[float]:
         """Turn the wheels for one tick; return their rim motion, in m."""
-        wheels = zip(self._motors, efforts, self._rim_m_per_count, strict=True)
         if self.gripped is not None:
             moved = rims_from_body(*self.gripped, self._base_radius_m)
-            for (motor, effort, rim_m_per_count), rim_mps in zip(wheels, moved, strict=True):
+            wheels = zip(self._motors, efforts, self._rim_m_per_count, moved, strict=True)
+            for motor, effort, rim_m_per_count, rim_mps in wheels:
                 motor.turn(rim_mps * TICK_S / rim_m_per_count, effort)
             return [rim_mps * TICK_S for rim_mps in moved]
+        (a, b, c), (a_m, b_m, c_m) = self._motors, self._rim_m_per_count
+        (a_pwm, b_pwm, c_pwm), (a_load, b_load, c_load) = efforts, self._loads()
         return [
-            motor.advance(effort, load) * rim_m_per_count
-            for (motor, effort, rim_m_per_count), load in zip(wheels, self._loads(), strict=True)
+            a.advance(a_pwm, a_load) * a_m,
+            b.advance(b_pwm, b_load) * b_m,
+            c.advance(c_pwm, c_load) * c_m,
         ]
 
     def _loads(self) -> Wheels:
@@ -159,8 +168,8 @@ class World:
         return rims_from_body(x, y, turning, 1.0)
 
     def _on_floor(self, rims: Sequence[float]) -> Wheels:
-        a, b, c = (rim * (1 - slip) for rim, slip in zip(rims, self._slip, strict=True))
-        return a, b, c
+        (a, b, c), (a_slip, b_slip, c_slip) = rims, self._slip
+        return a * (1 - a_slip), b * (1 - b_slip), c * (1 - c_slip)
 
     def _wander(self, slip: float, rim_m: float) -> float:
         """Return the wheel's slip after ``rim_m`` of rim motion, from 0 to 1.
