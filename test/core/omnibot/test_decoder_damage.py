@@ -55,11 +55,11 @@ def assert_back_in_step(
 
 
 def damage_places(sent: list[tuple[int, Frame]]) -> list[tuple[int, int]]:
-    """Return the position of each byte of frames 20 to 44, with the number of its frame."""
+    """Return the position of each byte of frames 20 to 37, with the number of its frame."""
     ends = [at for at, _ in sent[1:]]
     return [
         (place, number)
-        for number in range(20, 45)
+        for number in range(20, 38)
         for place in range(sent[number][0], ends[number])
     ]
 
@@ -71,7 +71,7 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
 
     The decoder finds the true frames again within two frames.
     """
-    stream = b"".join(ticks_of(name)[:80])
+    stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)
     for place, number in damage_places(sent):
         # Losing either of two equal neighbours has one result: the damage may be in either frame.
@@ -91,10 +91,10 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 
     Afterwards, the decoder is in step again: it finds the true frames.
     """
-    stream = b"".join(ticks_of(name)[:80])
+    stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
-    for place, number in damage_places(sent):
+    for place, number in damage_places(sent)[extra % 3 :: 3]:
         found = decoded([stream[:place] + bytes([extra]) + stream[place:]])
         before, after = truth[: number - 1], truth[number + 4 :]
         assert found[: len(before)] == before, f"damage at {place}"
@@ -111,15 +111,15 @@ def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
 
     At most 1 in 30 inserted bytes makes a false frame.
     """
-    stream = b"".join(ticks_of(name)[:80])
+    stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)
     truth = [frame for _, frame in sent]
-    random, false = Random(13), 0
-    for place, _ in damage_places(sent) * 3:
+    random, false, places = Random(13), 0, damage_places(sent) * 2
+    for place, _ in places:
         extra = bytes([random.randrange(256)])
         found = decoded([stream[:place] + extra + stream[place:]])
         false += not is_subsequence(found, truth)
-    assert false <= len(damage_places(sent)) * 3 / 30
+    assert false <= len(places) / 30
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_a_frame_that_lost_one_byte_and_took_the_next_headers_does_not_come_out(
     """
     ticks = ticks_of(name)[:30]
     truth = [frame for _, frame in frames_of(b"".join(ticks))]
-    for number in range(8, 24):
+    for number in range(9, 21, 2):
         tick = ticks[number]
         for place in range(2, len(tick)):
             if tick[place] == 0xFF or tick[place - 1] == 0xFF or tick[place - 2] == 0xFF:

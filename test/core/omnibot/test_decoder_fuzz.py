@@ -19,7 +19,7 @@ from omnibot_driver.core.omnibot.decoder import DOUBT_BYTES
 from omnibot_driver.core.omnibot.frames import LENT, Frame, decode_measured, measure
 
 REST = encode(ImuFrame((120, -80, -16384), (1, 2, 3)))
-THIRD = 300
+THIRD = 180
 """Number of bytes in a third of a stream. The decoder's buffers are full after the first third."""
 times_s = st.sampled_from([0.0, 1e-4, 0.005, 0.01, 0.016, 0.099, 0.2, 5.0])
 
@@ -163,17 +163,24 @@ def work(
 
 @interpreted_only
 @pytest.mark.slow
-@pytest.mark.parametrize("pattern", ADVERSARIES.values(), ids=ADVERSARIES.keys())
-@pytest.mark.parametrize(("chunk_length", "pause_s"), [(1, 0), (1, 0.005), (13, 0), (1_000_000, 0)])
+@pytest.mark.parametrize(
+    ("name", "chunk_length", "pause_s"),
+    [
+        (name, *chunks)
+        for name in ADVERSARIES
+        for chunks in [(1, 0), (1, 0.005), (13, 0), (1_000_000, 0)]
+        if chunks != (1, 0.005) or name not in ("FF FA", "FF FB")  # "all headers" contains these
+    ],
+)
 def test_work_is_linear_and_memory_bounded(
-    monkeypatch: pytest.MonkeyPatch, pattern: bytes, chunk_length: int, pause_s: float
+    monkeypatch: pytest.MonkeyPatch, name: str, chunk_length: int, pause_s: float
 ) -> None:
     """A pattern of bytes that is hard to decode is repeated. The work grows only in proportion.
 
     So the last third of the stream costs about as much work as the second third. The decoder holds
     fewer bytes than its limit.
     """
-    stream = pattern * (THIRD // len(pattern))
+    stream = ADVERSARIES[name] * (THIRD // len(ADVERSARIES[name]))
     if chunk_length < THIRD:
         sums, most = work(monkeypatch, stream * 3, chunk_length, pause_s)
         chunks = len(sums) - 1
