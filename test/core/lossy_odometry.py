@@ -24,7 +24,7 @@ def loses_nothing(_data: bytes, _now: float) -> bool:
 
 
 class Line:
-    """A simulated board and the odometry from its frames.
+    """A simulated board and the odometry from its frames. All readings of its IMU are zero.
 
     ``loses``: function that decides, from a frame's bytes and time, whether the frame is lost.
     """
@@ -38,6 +38,7 @@ class Line:
         seed: int = 0,
     ) -> None:
         self.board = SimulatedBoard(board)
+        self.board._imu.read = lambda _world: ((0, 0, 0), (0, 0, 0))  # type: ignore[method-assign]
         self.translation = Translation(
             OmniBotSettings(delta_frame=board.frame, delta_period_s=board.delta_period_s)
         )

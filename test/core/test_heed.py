@@ -28,7 +28,7 @@ def opened(*, run: bool = True) -> Session:
     return session
 
 
-REQUESTS = {500: Request.START, 1000: Request.PAUSE, 1500: Request.START, 2000: Request.RESET}
+REQUESTS = {400: Request.START, 700: Request.PAUSE, 1000: Request.START, 1300: Request.RESET}
 
 
 @pytest.mark.slow
@@ -40,7 +40,7 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
     """After a read that contains only IMU readings, the session writes and reports nothing."""
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
-    for tick in range(3000):
+    for tick in range(2000):
         now = tick * TICK_S
         data = board.step()
         if tick in REQUESTS:
@@ -58,8 +58,8 @@ def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
                 assert session.take_events() == []
         if session.wake_at <= now:
             session.tick(now)
-    assert nothing_left > 1200
-    assert told > 500
+    assert nothing_left > 750
+    assert told > 300
 
 
 def test_data_from_before_a_request_do_not_answer_it() -> None:

@@ -98,7 +98,7 @@ def begins(data: bytes, kind: bytes) -> int:
 @example((DELTA, 0, 7, 4))
 @example((POSE, 4, 0, 8))
 @example((POSE, 12, 0, 8))
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
     flip: tuple[bytes, int, int, int],
 ) -> None:
@@ -122,7 +122,7 @@ def test_a_changed_bit_leaves_little_for_half_a_second_and_then_nothing(
 
 @pytest.mark.slow
 @given(flips.filter(lambda flip: flip[0] == IMU))
-@settings(max_examples=40)
+@settings(max_examples=30)
 def test_an_imu_word_is_published_wrong_by_half_a_g_at_the_most(
     flip: tuple[bytes, int, int, int],
 ) -> None:
@@ -168,8 +168,10 @@ def test_what_is_refused_is_counted_and_told() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bit", range(8))
-@pytest.mark.parametrize("byte", range(4))
+@pytest.mark.parametrize(
+    ("byte", "bit"),
+    [(byte, bit) for byte in range(4) for bit in (range(8) if byte < 2 else (0, 7))],
+)
 def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int) -> None:
     """The first pose of the board has a wrong heading. The next two poses agree with each other.
 
@@ -184,7 +186,7 @@ def test_the_first_pose_of_all_turns_nothing_if_it_is_wrong(byte: int, bit: int)
     drive.attached = drive.told()
     drive.arm(POSE, 8 + byte, bit)
     drive.bench.open()
-    drive.run(3.0)
+    drive.run(2.0)
     assert drive.flipped
     assert drive.last.way_m < 1.5e-3
     assert abs(drive.last.yaw_rad) < 1.5e-3

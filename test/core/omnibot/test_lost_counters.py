@@ -34,7 +34,7 @@ def test_a_second_after_any_gap_odom_is_the_boards_own_pose_again(lost: int, fra
 
     After 1 s, odom is the board's own pose again.
     """
-    for seed in range(5):
+    for seed in range(5 if lost < 60 else 2):
         on = line(seed, frame=frame)
         lose(on, lost * PERIOD_S)
         on.run(1.0)
@@ -87,7 +87,7 @@ def test_no_step_is_larger_than_the_robot_could_have_moved(lost: int, frame: str
     The first step is not faster either: it contains the motion of the whole gap, over its whole
     duration.
     """
-    for seed in range(5):
+    for seed in range(5 if lost < 60 else 2):
         on = line(seed, frame=frame)
         before = on.estimates[-1]
         lose(on, lost * PERIOD_S)
@@ -284,7 +284,7 @@ Only deltas and poses are counted.
 
 @pytest.mark.slow
 @given(losses, st.integers(0, 3), st.sampled_from(["earth", "body"]))
-@settings(max_examples=40)
+@settings(max_examples=30)
 def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
     pattern: list[tuple[int, int]], seed: int, frame: str
 ) -> None:
