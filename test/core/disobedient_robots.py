@@ -21,7 +21,7 @@ def started(board: BoardSettings, **options: object) -> Bench:
     bench = Bench(board, **options)  # type: ignore[arg-type]
     bench.open()
     bench.run_until_state("nominal")
-    bench.run(2.0)
+    bench.run(1.0)
     bench.events.clear()
     return bench
 

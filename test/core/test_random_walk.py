@@ -242,7 +242,7 @@ STEPS = st.lists(
     st.booleans(),
     st.sampled_from([0.05, 0.3, 1.0]),
 )
-@settings(max_examples=20)
+@settings(max_examples=15)
 def test_whatever_happens_the_robot_obeys_fresh_commands_only_and_ends_in_the_wanted_mode(
     steps: list[tuple[str, float]], seed: int, latency_s: float, run: bool, boot_time_s: float
 ) -> None:

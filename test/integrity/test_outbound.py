@@ -67,7 +67,7 @@ def test_the_bounds_of_the_outbound_report_hold(scene: str) -> None:
 
     Every receiver keeps the limits that a short run can check.
     """
-    scores, _ = one(0.05, (scene, 0), LOSSES)
+    scores, _ = one(0.025, (scene, 0), LOSSES)
     for fault in LOSSES:
         score = Score()
         for key, more in scores.items():
@@ -179,7 +179,7 @@ def test_passing_over_what_arrives_whole_changes_no_score(fault: str) -> None:
 
     for scene in ("switch", "e-stop", "drive 100"):
         course = Course({**ENDED, **DRIVES}[scene](Random(scene)))
-        for seed in range(10):
+        for seed in range(4):
             quick, slow = Score(), Score()
             Trial(course, COUNTING, {}).run(FAULTS[fault](Random(seed)), quick)
             Slow(course, COUNTING, {}).run(FAULTS[fault](Random(seed)), slow)

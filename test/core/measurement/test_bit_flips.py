@@ -42,7 +42,7 @@ class Drive:
         self.bench.board.step = lambda: self.flip(step())  # type: ignore[method-assign]
         self.attached = self.told()
         self.bench.open()
-        self.run(2.0)
+        self.run(1.2)
 
     def told(self) -> Pose:
         pose = self.bench.board.odometry

@@ -157,7 +157,7 @@ def test_the_error_of_many_slipping_robots_is_what_the_covariance_says() -> None
         a, b, c = (1 + random.gauss(0.0, 0.01) for _ in range(3))
         board = BoardSettings(seed=seed, running=True, slip=0.02, wheel_radius_scale=(a, b, c))
         on = Line(board, seed=seed)
-        estimate = on.run(12.0)[-1]
+        estimate = on.run(8.0)[-1]
         true = on.board.truth
         off = estimate.pose - Pose(true.x_m, true.y_m, true.yaw_rad)
         total += squared(off, estimate)

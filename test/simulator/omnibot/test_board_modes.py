@@ -232,7 +232,7 @@ def test_what_was_received_and_obeyed_is_on_record() -> None:
 @pytest.mark.slow
 def test_the_record_of_received_bytes_is_bounded() -> None:
     """The board receives more than a million bytes. Its record keeps about the newest million."""
-    board = SimulatedBoard(RUNNING)
+    board = SimulatedBoard()
     for _ in range(12):
         board.receive(bytes(100_000))
     board.receive(b"end")
