@@ -54,6 +54,7 @@ class SimulatedLois:
         self._steps = 0
         self._random = Random(f"lois {settings.seed}")
         self._vehicle = Vehicle(settings, CORRECTIONS, self._random)
+        self._control_period_s = 0.091 if settings.quirks.fast_control else 0.2
         self.motors = self._vehicle.motors
         self._boot()
         if settings.running:
@@ -193,18 +194,21 @@ class SimulatedLois:
         """Advance by one tick of 10 ms. Return the bytes sent in this tick."""
         self.tick += 1
         sent = bytearray()
+        uart, vehicle, terminal = self._uart, self._vehicle, self._terminal
         for _ in range(STEPS_PER_TICK):
             self._steps += 1
-            for edge in self._vehicle.advance(self._applied_duty, self.now_s, STEP_S):
+            now_s = self.now_s
+            for edge in vehicle.advance(self._applied_duty, now_s, STEP_S):
                 self._edge(edge.index, edge.at_s, edge.is_long, edge.direction)
-            self._terminal.heard(self._uart.listen())
-            if self.now_s < self._boots_until_s:
+            if heard := uart.listen():
+                terminal.heard(heard)
+            if now_s < self._boots_until_s:
                 self._clock_ms += 1
                 continue
-            self._interrupts()
-            if self._uart.send(sent):
+            self._interrupts(now_s)
+            if uart.send(sent):
                 self._catch_up()
-            if not self._uart.sending and not self._terminal.busy:
+            if not uart.sending and not terminal.busy:
                 self._main_loop()
         return bytes(sent)
 
@@ -222,33 +226,32 @@ class SimulatedLois:
         if isinstance(self.odometry, FirmwareOdometry):
             self.odometry.tick(at_s, self.wheels[0].rpm, self.wheels[1].rpm)
 
-    def _interrupts(self) -> None:
-        quirks = self.settings.quirks
-        if not (self._uart.deaf and quirks.clock_stops_while_sending):
+    def _interrupts(self, now_s: float) -> None:
+        deaf = self._uart.deaf
+        if not (deaf and self.settings.quirks.clock_stops_while_sending):
             self._clock_ms += 1
-        period_s = 0.091 if quirks.fast_control else 0.2
-        if self.now_s >= self._control_at_s + period_s:
-            self._control_at_s += period_s
+        if now_s >= self._control_at_s + self._control_period_s:
+            self._control_at_s += self._control_period_s
             self._control_late = True
-        if self._control_late and not self._uart.deaf:
+        if self._control_late and not deaf:
             self._control_late = False
             for channel in self.wheels:
-                channel.settle(self.now_s)
+                channel.settle(now_s)
                 channel.control()
             left, right = self.wheels
             self._applied_duty = (left.duty_percent, right.duty_percent)
             self._records.control()
-        if not isinstance(self.odometry, FirmwareOdometry) and self._steps % 5 == 0:
+        if self._steps % 5 == 0 and not isinstance(self.odometry, FirmwareOdometry):
             self.odometry.move(*(channel.turned_ticks for channel in self.wheels))
             self.odometry.measure(*(channel.exact_rpm for channel in self.wheels))
             for channel in self.wheels:
                 channel.turned_ticks = 0
-        if self.now_s >= self._compass_at_s + self.settings.compass_period_s:
+        if now_s >= self._compass_at_s + self.settings.compass_period_s:
             self._compass_at_s += self.settings.compass_period_s
             self._compass_reads()
-        if self.now_s >= self._gps_at_s + GPS_SENTENCE_S:
-            self._gps_at_s = self.now_s
-            fix = self._sayings.fix(self.now_s)
+        if now_s >= self._gps_at_s + GPS_SENTENCE_S:
+            self._gps_at_s = now_s
+            fix = self._sayings.fix(now_s)
             clock = "".join(f"{number:02d}" for number in fix.time)
             self._pass_on(self._terminal.sensor(GPS, sentence(f"GPRMC,{clock}.00,A")))
         self._pass_on(self._terminal.mixed())
@@ -282,10 +285,14 @@ class SimulatedLois:
         """
         for _ in range(2):
             if not self._scan:
-                self._read_input()
-                self._say_record(self._records.of_wheels())
+                if self._uart.input:
+                    self._read_input()
+                if self._records.number is not None:
+                    self._say_record(self._records.of_wheels())
                 if self._uart.sending or self._timers.any_due(self._clock_ms):
                     self._scan = list(self._timers)
+                elif self._button_news is None:
+                    return
             while self._scan and not self._uart.sending:
                 self._periodic(self._scan.pop(0))
             if not self._scan and not self._uart.sending and self._button_news is not None:

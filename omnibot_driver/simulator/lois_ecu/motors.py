@@ -24,7 +24,7 @@ class Motor:
         self.rpm = 0.0
         self.held = False
         self._settings = settings
-        self._step_s = self._part = 0.0
+        self._step_s = 0.0
         self._load_percent, self._random = load_percent, random
         self._load = random.gauss(0.0, load_percent)
         self._on_the_way: deque[float] = deque()
@@ -37,16 +37,15 @@ class Motor:
             self.rpm = 0.0
             return 0.0
         settings = self._settings
+        if dt_s != self._step_s:
+            self._prepare(dt_s)
         if settings.dead_time_s:
-            duty_percent = self._late(duty_percent, dt_s)
+            duty_percent = self._late(duty_percent)
         if not (duty_percent or self.rpm or self._lagged_rpm):
             return 0.0
-        if dt_s != self._step_s:
-            self._step_s, self._part = dt_s, 1 - exp(-dt_s / settings.time_constant_s)
         if self._load_percent:
-            keep = exp(-dt_s / LOAD_CHANGES_S)
             change = self._random.gauss(0.0, self._load_percent)
-            self._load = keep * self._load + (1 - keep * keep) ** 0.5 * change
+            self._load = self._load_kept * self._load + self._load_changed * change
         effort = abs(duty_percent) - settings.dead_zone_percent
         if duty_percent and effort > 0:
             effort = max(effort + self._load, 0.0)
@@ -54,8 +53,7 @@ class Motor:
         else:
             final = 0.0
         if settings.second_time_constant_s:
-            part = 1 - exp(-dt_s / settings.second_time_constant_s)
-            self._lagged_rpm += (final - self._lagged_rpm) * part
+            self._lagged_rpm += (final - self._lagged_rpm) * self._second_part
             if not final and abs(self._lagged_rpm) < 1e-3:
                 self._lagged_rpm = 0.0
             final = self._lagged_rpm
@@ -64,12 +62,23 @@ class Motor:
         if not final:
             slower = max(abs(self.rpm) - settings.friction_rpm_per_s * dt_s, 0.0)
             self.rpm = copysign(slower, self.rpm) if slower else 0.0
-        return self._through_gap((before + self.rpm) / 2 * dt_s / 60)
+        turns = (before + self.rpm) / 2 * dt_s / 60
+        return self._through_gap(turns) if settings.backlash_turns else turns
 
-    def _late(self, duty_percent: float, dt_s: float) -> float:
+    def _prepare(self, dt_s: float) -> None:
+        """Calculate the coefficients of steps of ``dt_s``."""
+        settings, self._step_s = self._settings, dt_s
+        self._part = 1 - exp(-dt_s / settings.time_constant_s)
+        if settings.second_time_constant_s:
+            self._second_part = 1 - exp(-dt_s / settings.second_time_constant_s)
+        self._load_kept = exp(-dt_s / LOAD_CHANGES_S)
+        self._load_changed = (1 - self._load_kept * self._load_kept) ** 0.5
+        self._dead_steps = round(settings.dead_time_s / dt_s)
+
+    def _late(self, duty_percent: float) -> float:
         """Return the duty in percent that was commanded one dead time ago."""
         self._on_the_way.append(duty_percent)
-        if len(self._on_the_way) <= round(self._settings.dead_time_s / dt_s):
+        if len(self._on_the_way) <= self._dead_steps:
             return 0.0
         return self._on_the_way.popleft()
 
@@ -78,11 +87,8 @@ class Motor:
 
         The backlash between motor and wheel absorbs the rest.
         """
-        backlash = self._settings.backlash_turns
-        if not backlash:
-            return turns
         gap = self._gap + turns
-        self._gap = min(max(gap, 0.0), backlash)
+        self._gap = min(max(gap, 0.0), self._settings.backlash_turns)
         return gap - self._gap
 
 
@@ -98,6 +104,8 @@ class Encoder:
 
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
+        self._level_from = self._level_to = 0.0
+        """Positions of the ends of the level at the sensor since the last edge, in periods."""
         self._per_turn = steps / 2
         self._short = short
         # The distance between two marks has the errors of both, hence the square root of 2.
@@ -113,7 +121,11 @@ class Encoder:
         """
         before = self._periods
         after = self._periods = before + turns * self._per_turn
+        begin, end = self._level_from, self._level_to
+        if begin <= before < end and begin <= after < end:
+            return None
         level_before, level_after = self._level(before), self._level(after)
+        self._level_from, self._level_to = self._place(level_after), self._place(level_after + 1)
         if level_before == level_after:
             return None
         forward = after > before

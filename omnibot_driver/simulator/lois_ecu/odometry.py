@@ -34,6 +34,8 @@ class DocumentedOdometry:
 
     def move(self, left_ticks: int, right_ticks: int) -> None:
         """Move the pose by the given numbers of new ticks."""
+        if not (left_ticks or right_ticks):
+            return
         way = (left_ticks + right_ticks) * self._tick_m / 2
         turn = (right_ticks - left_ticks) * self._tick_m / self._track_m
         x, y, yaw = self.pose

@@ -62,5 +62,7 @@ class Terminal:
             speed = CHARACTERS_PER_STEP.get(self.mode, BYTES_PER_STEP)
             self._to_sensor = max(self._to_sensor - speed, 0.0)
             return b""
+        if not any(self._waiting.values()):
+            return b""
         mixed = bytes(waiting.popleft() for waiting in self._waiting.values() if waiting)
         return mixed if self.on else b""

@@ -11,6 +11,7 @@ ends.
 from collections import deque
 
 BYTES_PER_STEP = 11.52
+MOST_CREDIT = 2 * BYTES_PER_STEP
 INPUT_DEPTH = 600
 
 
@@ -63,20 +64,22 @@ class Uart:
     def listen(self) -> int:
         """Receive for one step of 1 ms. Return the number of characters received."""
         came = heard = 0
-        self._in_credit = min(self._in_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
-        while self._inbound and self._in_credit >= 1.0:
-            self._in_credit -= 1.0
+        credit = min(self._in_credit + BYTES_PER_STEP, MOST_CREDIT)
+        hears = not (self._loses and self.deaf)
+        while self._inbound and credit >= 1.0:
+            credit -= 1.0
             byte = self._inbound.popleft()
             came += 1
             if self._misses and came == 2:
                 self.lost_bytes += 1
-            elif not (self.deaf and self._loses):
+            elif hears:
                 self._hear(byte)
                 heard += 1
             elif self._kept is None:
                 self._kept = byte
             else:
                 self.lost_bytes += 1
+        self._in_credit = credit
         self._misses = False
         return heard
 
@@ -85,7 +88,7 @@ class Uart:
 
         Return whether interrupts are on again. The caller must then call ``hear_kept``.
         """
-        self._out_credit = min(self._out_credit + BYTES_PER_STEP, 2 * BYTES_PER_STEP)
+        self._out_credit = min(self._out_credit + BYTES_PER_STEP, MOST_CREDIT)
         while self._sending and self._out_credit >= 1.0:
             burst, deaf = self._sending[0]
             count = min(int(self._out_credit), len(burst))

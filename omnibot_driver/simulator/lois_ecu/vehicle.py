@@ -6,7 +6,7 @@ This module knows duties and the positions of the encoder marks. It does not kno
 """
 
 from dataclasses import dataclass
-from math import cos, pi, sin
+from math import cos, sin, tau
 from random import Random
 
 from omnibot_driver.simulator.lois_ecu.motors import Encoder, Motor
@@ -40,7 +40,7 @@ class Edge:
 
 
 class Vehicle:
-    """The robot. ``truth``: its true pose and motion.
+    """The robot.
 
     ``corrections``: the board's factors for each encoder's short and long level. The true lengths
     of the levels fit these factors exactly.
@@ -53,7 +53,8 @@ class Vehicle:
         random: Random,
     ) -> None:
         self._settings, self._random = settings, random
-        self.truth = TrueState(0.0, 0.0, 0.0, 0.0, 0.0)
+        self._x_m = self._y_m = self._yaw_rad = 0.0
+        self._speed_mps = self._yaw_rate_radps = 0.0
         self.motors = tuple(
             Motor(motor, settings.load_percent, random) for motor in settings.motors
         )
@@ -66,6 +67,18 @@ class Vehicle:
             )
             for short, long in corrections
         )
+        self._wheels = tuple(
+            (index, motor, encoder, settings.wheel_radius_m * scale)
+            for index, (motor, encoder, scale) in enumerate(
+                zip(self.motors, self.encoders, settings.wheel_radius_scale, strict=True)
+            )
+        )
+        self._track_m = settings.track_m * settings.track_scale
+
+    @property
+    def truth(self) -> TrueState:
+        """True pose and motion of the robot."""
+        return TrueState(self._x_m, self._y_m, self._yaw_rad, self._speed_mps, self._yaw_rate_radps)
 
     @property
     def standing(self) -> bool:
@@ -74,35 +87,33 @@ class Vehicle:
 
     def advance(self, duties: tuple[float, float], now_s: float, step_s: float) -> list[Edge]:
         """Advance by the step that ends at ``now_s``. Return the encoder edges in order of time."""
-        settings, state = self._settings, self.truth
+        slip = self._settings.slip
         ways: list[float] = []
         edges: list[Edge] = []
-        for index, (motor, encoder) in enumerate(zip(self.motors, self.encoders, strict=True)):
+        for index, motor, encoder, radius_m in self._wheels:
             turns = motor.advance(duties[index], step_s)
+            way_m = turns * tau * radius_m
             if turns and (edge := encoder.turn(turns)) is not None:
                 part, is_long, direction = edge
                 edges.append(Edge(now_s - step_s * (1 - part), index, is_long, direction))
-            radius_m = settings.wheel_radius_m * settings.wheel_radius_scale[index]
-            way_m = turns * 2 * pi * radius_m
-            if settings.slip and way_m:
-                way_m += self._random.gauss(0.0, settings.slip) * abs(way_m) ** 0.5
+            if slip and way_m:
+                way_m += self._random.gauss(0.0, slip) * abs(way_m) ** 0.5
             ways.append(way_m)
         left_m, right_m = ways
         if left_m or right_m:
             self._roll(left_m, right_m, step_s)
-        elif state.speed_mps or state.yaw_rate_radps:
-            self.truth = TrueState(state.x_m, state.y_m, state.yaw_rad, 0.0, 0.0)
-        return sorted(edges, key=lambda edge: (edge.at_s, edge.index))
+        else:
+            self._speed_mps = self._yaw_rate_radps = 0.0
+        if len(edges) > 1:
+            edges.sort(key=lambda edge: (edge.at_s, edge.index))
+        return edges
 
     def _roll(self, left_m: float, right_m: float, step_s: float) -> None:
-        settings, state = self._settings, self.truth
         way_m = (left_m + right_m) / 2
-        turn_rad = (right_m - left_m) / (settings.track_m * settings.track_scale)
-        middle_rad = state.yaw_rad + turn_rad / 2
-        self.truth = TrueState(
-            state.x_m + way_m * cos(middle_rad),
-            state.y_m + way_m * sin(middle_rad),
-            state.yaw_rad + turn_rad,
-            way_m / step_s,
-            turn_rad / step_s,
-        )
+        turn_rad = (right_m - left_m) / self._track_m
+        middle_rad = self._yaw_rad + turn_rad / 2
+        self._x_m += way_m * cos(middle_rad)
+        self._y_m += way_m * sin(middle_rad)
+        self._yaw_rad += turn_rad
+        self._speed_mps = way_m / step_s
+        self._yaw_rate_radps = turn_rad / step_s
