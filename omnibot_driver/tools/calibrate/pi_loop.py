@@ -109,19 +109,23 @@ def answer(
     shape = every[0].shape
     kp, tn_s, td_s, late_s, ticks, sends_s = (one.ravel() for one in every)
     count, period = round(seconds / STEP_S), round(loop.period_s / STEP_S)
-    dead, lanes = np.rint(late_s / STEP_S).astype(int), np.arange(len(kp))
-    duties = np.zeros((count + int(dead.max()) + 1, len(kp)))
+    dead = np.rint(late_s / STEP_S).astype(int)
+    groups = [(int(one), np.flatnonzero(dead == one)) for one in np.unique(dead)]
+    finals: list[Array] = []
+    final = np.zeros(len(kp))
     told = np.zeros((count, len(kp)))
     first = 1 - np.exp(-STEP_S / max(plant.slow_s, STEP_S))
     second = 1 - np.exp(-STEP_S / plant.fast_s) if plant.fast_s > STEP_S else 1.0
     lagged, rpm, ticked_s = (np.zeros(len(kp)) for _ in range(3))
-    seen, duty, wished = (np.zeros(len(kp)) for _ in range(3))
+    seen, wished = np.zeros(len(kp)), np.zeros(len(kp))
+    whole = np.floor(ticks)
     errors, outputs = [np.zeros(len(kp))] * 2, [np.zeros(len(kp))] * 2
     per_rpm, half_s = loop.ticks_per_revolution / 60, loop.nominal_s / 2
     tn_s = np.maximum(tn_s, 1e-3)
     # The controller is G(s) = Kp (1 + s Tn) / (s Tn (1 + s Td)), from the error in RPM to the duty
     # in percent, discretised by the trapezoidal rule. The board takes ``nominal_s`` as its control
     # period, even if the real one differs. ``seen``: RPM by the time between the last two ticks.
+    # ``finals``: the RPM to which the duty of each control period would bring the wheel.
     for step in range(count):
         now_s = step * STEP_S
         if step % period == 0:
@@ -139,21 +143,27 @@ def answer(
             errors = [error, errors[0]]
             power = np.where(output * wished < 0, 0.0, output) + loop.feed_forward * wished
             duty = np.floor(np.clip(power, 0.0, MOST_PERCENT))
-        duties[step + dead, lanes] = duty
-        final = plant.rpm_per_percent * np.maximum(duties[step] - plant.dead_zone_percent, 0.0)
+            finals.append(plant.rpm_per_percent * np.maximum(duty - plant.dead_zone_percent, 0.0))
+        for delay, lanes in groups:
+            if step >= delay and (step - delay) % period == 0:
+                final[lanes] = finals[(step - delay) // period][lanes]
         lagged = lagged + (final - lagged) * second
         rpm = rpm + (lagged - rpm) * first
         told[step] = rpm
-        before, ticks = ticks, ticks + rpm * per_rpm * STEP_S
-        passed = np.floor(ticks) > np.floor(before)
-        rate = np.maximum(rpm * per_rpm, 1e-9)
-        at_s = now_s + STEP_S - (ticks - np.floor(ticks)) / rate
+        ticks = ticks + rpm * per_rpm * STEP_S
+        before, whole = whole, np.floor(ticks)
+        passed = np.flatnonzero(whole > before)
+        if not len(passed):
+            continue
+        rate = np.maximum(rpm[passed] * per_rpm, 1e-9)
+        at_s = now_s + STEP_S - (ticks[passed] - whole[passed]) / rate
         # The board notices a tick only after it has sent. The measured speed is too low at this
         # tick, and too high at the next tick.
         if not calm:
-            at_s = at_s + np.maximum(SENDS_S - (at_s - sends_s) % loop.sends_each_s, 0.0)
-        seen = np.where(passed, 1.0 / (per_rpm * np.maximum(at_s - ticked_s, 1e-6)), seen)
-        ticked_s = np.where(passed, at_s, ticked_s)
+            since_s = (at_s - sends_s[passed]) % loop.sends_each_s
+            at_s = at_s + np.maximum(SENDS_S - since_s, 0.0)
+        seen[passed] = 1.0 / (per_rpm * np.maximum(at_s - ticked_s[passed], 1e-6))
+        ticked_s[passed] = at_s
     return told.reshape((count, *shape))
 
 
@@ -180,15 +190,24 @@ def traits(rpm: Array, target_rpm: float, band: float) -> Traits:
 
     ``band``: allowed deviation, as a fraction of the final speed (mean of the last quarter).
     """
-    comes_to = rpm[-len(rpm) // 4 :].mean(axis=0)
-    overshoot = np.maximum(rpm.max(axis=0) / np.maximum(comes_to, target_rpm) - 1.0, 0.0)
+    comes_to = _final_rpm(rpm)
     outside = np.abs(rpm - comes_to) > band * np.maximum(comes_to, 1e-9)
     last = len(rpm) - 1 - np.argmax(outside[::-1], axis=0)
     settled = np.where(outside.any(axis=0), (last + 1) * STEP_S, 0.0)
     wrong = np.abs(comes_to - target_rpm) > max(1.5, 0.05 * target_rpm)
     settled = np.where(outside[-1] | wrong, np.inf, settled)
     error = np.abs(rpm - target_rpm).sum(axis=0) * STEP_S / target_rpm
-    return Traits(np.asarray(overshoot), np.asarray(settled), np.asarray(error))
+    return Traits(overshoot(rpm, target_rpm), np.asarray(settled), np.asarray(error))
+
+
+def overshoot(rpm: Array, target_rpm: float) -> Array:
+    """Return the overshoot of a step response, as in ``Traits``."""
+    reference = np.maximum(_final_rpm(rpm), target_rpm)
+    return np.asarray(np.maximum(rpm.max(axis=0) / reference - 1.0, 0.0))
+
+
+def _final_rpm(rpm: Array) -> Array:
+    return np.asarray(rpm[-len(rpm) // 4 :].mean(axis=0))
 
 
 def phase_margin_deg(plant: Plant, gains: PiGains, loop: Loop, rpm: float) -> Array:

@@ -18,6 +18,7 @@ from omnibot_driver.tools.calibrate.pi_loop import (
     PiGains,
     Traits,
     answer,
+    overshoot,
     phase_margin_deg,
     traits,
 )
@@ -158,7 +159,7 @@ def _disturbed(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Array:
     target = target_of(plant, goals)
     begun, sent_s = (one.ravel() for one in np.meshgrid(BEGUN, loop.sends_each_s * SENT))
     rpm = answer(plant, _apart(gains), loop, target, SECONDS, begun=begun, sent_s=sent_s)
-    return np.asarray(traits(rpm, target, goals.band).overshoot.max(-1))
+    return np.asarray(overshoot(rpm, target).max(-1))
 
 
 def _apart(gains: PiGains) -> PiGains:
