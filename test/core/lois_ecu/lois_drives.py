@@ -211,7 +211,8 @@ class Rig:
     def _arrived(self, data: bytes) -> bytes:
         if not self._loss:
             return data
-        return bytes(byte for byte in data if self._random.random() >= self._loss)
+        draw = self._random.random
+        return bytes([byte for byte in data if draw() >= self._loss])
 
     def say(self, data: bytes) -> None:
         """Send these bytes to the board, and record them in the driver as its own."""
@@ -226,20 +227,21 @@ class Rig:
             before = self.place
             self._unread += self._arrived(self.board.step())
             found = self._read()
-            way = before.way_to(self.place)
+            way = before.way_to(place := self.place)
             self.way_m += way.way_m
             self.turned_rad += abs(way.yaw_rad)
             self.readings += found
             for reading in found:
                 if isinstance(reading, FusedOdometry):
-                    self.estimates.append((reading, self.place))
+                    self.estimates.append((reading, place))
 
     def _read(self) -> list[LoisReading]:
         if self.now < self._read_at_s:
             return self.driver.receive(b"", self.now) if self.now >= self.driver.held_until else []
         self._read_at_s = self.now + self._random.uniform(*self._reads_s)
         data, self._unread = self._unread, b""
-        return self.driver.receive(data, self.now) + self.driver.receive(b"", self.now)
+        found = self.driver.receive(data, self.now) if data else []
+        return found + self.driver.receive(b"", self.now)
 
     def order(self, left_rpm: float, right_rpm: float, seconds: float) -> None:
         """Send the set-points every ``REPEAT_S`` for ``seconds``. Two zeros are sent as Stop."""

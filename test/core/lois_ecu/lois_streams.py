@@ -69,4 +69,5 @@ def decoded(given: list[Piece], *, sum_required: bool = True) -> tuple[list[Repo
 
 def lossy(given: list[Piece], chance: float, random: Random) -> list[Piece]:
     """Return the pieces without the lost bytes. Each byte is lost with probability ``chance``."""
-    return [(at, bytes(byte for byte in data if random.random() >= chance)) for at, data in given]
+    draw = random.random
+    return [(at, bytes([byte for byte in data if draw() >= chance])) for at, data in given]

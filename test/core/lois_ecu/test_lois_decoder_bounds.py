@@ -23,7 +23,7 @@ from omnibot_driver.core.lois_ecu import (
 )
 from omnibot_driver.core.lois_ecu.messages import Report
 
-SEEDS = int(os.environ.get("LOIS_SEEDS", "2"))
+SEEDS = int(os.environ.get("LOIS_SEEDS", "1"))
 payloads = st.one_of(st.sampled_from([0, 0xFFFFFFFF, 0x016A016A]), st.integers(0, 2**32 - 1))
 codes = st.sampled_from([0x04, 0x05, 0x0C, 0x0D, 0x10, 0x12, 0x17, 0x20])
 
@@ -122,12 +122,12 @@ def test_no_value_is_wrong_at_byte_loss(chance: float, sum_required: bool, firmw
     for seed in range(SEEDS):
         said = reports(600.0, firmware=firmware)
         stream = pieces(said)
+        true = {data for _, data in stream}
         if not sum_required:
             stream = [
                 (at, b"".join(line[:11] + b"\n" for line in data.splitlines()))
                 for at, data in stream
             ]
-        true = Counter(encode_report(report) for _, report in said)
         found, _ = decoded(lossy(stream, chance, Random(seed)), sum_required=sum_required)
         for _, report in said:
             sent[_kind(report)] += 1

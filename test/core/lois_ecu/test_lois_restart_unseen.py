@@ -31,7 +31,7 @@ def restarts(bench: Bench) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [2.9, 3.0, 3.1, 3.4, 3.7, 4.0])
+@pytest.mark.parametrize("seconds", [2.9, 3.1, 3.7])
 def test_a_restart_is_not_taken_for_wheels_that_roll_back(seconds: float) -> None:
     """The board restarts during a drive. Its tick counts and its clock begin at zero again.
 
@@ -54,8 +54,10 @@ def begin_drive(bench: Bench, speed_mps: float, seconds: float, wrapped_for_s: f
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wrapped_for_s", [-0.25, -0.15, -0.06, 0.06, 0.15, 0.25])
-@pytest.mark.parametrize("speed_mps", [0.3, -0.3])
+@pytest.mark.parametrize(
+    ("wrapped_for_s", "speed_mps"),
+    [(-0.25, 0.3), (-0.06, -0.3), (0.06, 0.3), (0.15, -0.3), (0.25, 0.3)],
+)
 def test_a_restart_shows_although_the_clock_wraps_at_that_time(
     wrapped_for_s: float, speed_mps: float
 ) -> None:

@@ -43,7 +43,7 @@ def off_by(bench: AnyBench) -> tuple[float, float]:
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", FIRMWARES)
 @pytest.mark.parametrize("vx", [0.3, -0.3])
-@pytest.mark.parametrize(("seconds", "reopened"), [(3.0, False), (8.0, False), (4.0, True)])
+@pytest.mark.parametrize(("seconds", "reopened"), [(6.0, False), (4.0, True)])
 def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
     firmware: str, vx: float, seconds: float, reopened: bool
 ) -> None:
