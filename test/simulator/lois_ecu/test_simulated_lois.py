@@ -92,7 +92,7 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
     for drive in (SetRpm(30, 30), SetRpm(-30, 30), SetDuty(45, 45), SetDuty(-45, 45)):
         for stop in (SetRpm(0, 0), SetDuty(0, 0)):
             rig.say(drive)
-            rig.run(5.0)
+            rig.run(3.0)
             assert not rig.board.standing
             rig.say(stop)
             rig.run(0.5)

@@ -8,6 +8,7 @@ encoder's disc at which the board counts a tick.
 
 import math
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ from omnibot_driver.tools.calibrate import pi_step, step
 from omnibot_driver.tools.calibrate.arguments import command_line, require_able
 from omnibot_driver.tools.calibrate.console import Console
 from omnibot_driver.tools.calibrate.pi_loop import Loop, PiGains, answer, phase_margin_deg, traits
-from omnibot_driver.tools.calibrate.pi_tuning import Goals, dead_time_s, told, tune
+from omnibot_driver.tools.calibrate.pi_tuning import Goals, Tuned, dead_time_s, told, tune
 from omnibot_driver.tools.calibrate.tick_fit import Column, Plant, fit, speed
 from omnibot_driver.tools.calibrate.tick_marks import marks_in
 from omnibot_driver.tools.calibrate.tick_records import levels, read
@@ -46,6 +47,12 @@ from omnibot_driver.tools.needs import ToolError
 TICKS = 60
 LOOP = Loop(0.091, TICKS)
 PLANT = Plant(0.66, 0.3, 0.1, 6.0)
+
+
+@cache
+def tuned() -> Tuned:
+    """Return the gains that the tool finds for ``PLANT`` with its usual goals."""
+    return tune(PLANT, LOOP, Goals())
 
 
 def starts(plant: Plant, count: int, ticks: int = 150, seed: int = 1) -> list[Column]:
@@ -153,8 +160,7 @@ def test_the_levels_of_an_encoder_are_found_whichever_comes_first(begins: int) -
     assert found.rpm == pytest.approx(60 / (0.03 * TICKS), rel=0.02)
 
 
-@pytest.mark.parametrize("margin", [None, 60.0])
-@pytest.mark.parametrize("overshoot", [0.02, 0.1])
+@pytest.mark.parametrize(("margin", "overshoot"), [(None, 0.02), (None, 0.1), (60.0, 0.02)])
 def test_gains_keep_to_their_goals(margin: float | None, overshoot: float) -> None:
     """The tuned gains meet the goals for overshoot and phase margin.
 
@@ -226,7 +232,7 @@ def test_a_phase_margin_is_that_of_the_open_loop() -> None:
 
 def test_a_dead_time_is_found_in_the_answer_to_a_step() -> None:
     """The fit finds a dead time of 40 ms in the response to a step, within 11 ms."""
-    gains = tune(PLANT, LOOP, Goals()).gains
+    gains = tuned().gains
     dead_s = 0.04
     rpm = answer(PLANT, gains, Loop(0.091, TICKS, dead_s), 31.0, 4.0, begun=0.6)
     ticks = 0.6 + np.cumsum(rpm) * 1e-3 * TICKS / 60
@@ -351,7 +357,7 @@ def test_values_that_an_ended_measurement_leaves_are_told(
     def fail(*_arguments: object) -> None:
         raise ToolError("the robot does not move")
 
-    monkeypatch.setattr(pi_step, "tune", fail)
+    monkeypatch.setattr(pi_step, "fit", fail)
     robot = SimulatedRobot(tmp_path, random_motors(5))
     words = ["step", "--yes", "--records", "1", "--responses", "1", "--samples", "100"]
     with pytest.raises(ToolError, match=r"not move; .* left_short_correction, .*; restart both"):
@@ -361,6 +367,6 @@ def test_values_that_an_ended_measurement_leaves_are_told(
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
     """The predicted control error of a step is larger with slow gains than with tuned gains."""
-    good = tune(PLANT, LOOP, Goals()).gains
+    good = tuned().gains
     slow = PiGains(0.05, 2.0, 1.0)
     assert told(PLANT, slow, LOOP, Goals()).error_s > told(PLANT, good, LOOP, Goals()).error_s
