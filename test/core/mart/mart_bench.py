@@ -39,25 +39,35 @@ class NetworkRobot(MartRobot):
 
     def advance(self) -> list[Packet]:
         out: list[Packet] = []
-        if not self._heard and self._network_rests() and sleeps(self.board):
+        board = self.board
+        if not self._heard and self._due_s() > (board.ticks + 5) * TICK_S:
+            board.ticks += 5
             return out
         self._heard = False
-        for _ in range(5):
-            now_s = self.board.now_s
+        last = board.ticks + 5
+        while board.ticks < last:
+            while board.ticks < last - 1 and self._due_s() > (board.ticks + 1) * TICK_S:
+                board.ticks += 1
+            now_s = board.now_s
             for channel, way in enumerate(self.network):
                 for data in way.to_board.arrived(now_s):
-                    self.board.receive(data, now_s, channel)
-            for channel, data in self.board.advance():
-                self.network[channel].from_board.send(data, self.board.now_s)
+                    board.receive(data, now_s, channel)
+            for channel, data in board.advance():
+                self.network[channel].from_board.send(data, board.now_s)
+            now_s = board.now_s
             for channel, way in enumerate(self.network):
-                out += [(channel, data) for data in way.from_board.arrived(self.board.now_s)]
+                out += [(channel, data) for data in way.from_board.arrived(now_s)]
         return out
 
-    def _network_rests(self) -> bool:
-        """Return whether nothing can arrive in the next five ticks."""
-        until_s = (self.board.ticks + 5) * TICK_S
-        return all(
-            path.next_s > until_s for way in self.network for path in (way.to_board, way.from_board)
+    def _due_s(self) -> float:
+        """Return the board time, in s, before which nothing happens in the board or network."""
+        command, stop = self.network
+        return min(
+            self.board.server.wake_at,
+            command.to_board.next_s,
+            command.from_board.next_s,
+            stop.to_board.next_s,
+            stop.from_board.next_s,
         )
 
 
