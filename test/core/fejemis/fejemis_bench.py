@@ -125,12 +125,15 @@ class Bench:
 
     def ask(self, request: Request, limit_s: float = 6.0) -> RequestDone:
         token = object()
+        seen = len(self.events)
         self.session.request(request, token, self.now)
         self.settle()
         found: list[RequestDone] = []
 
         def answered() -> bool:
-            found[:] = [e for e in self.events if isinstance(e, RequestDone) and e.token is token]
+            nonlocal seen
+            new, seen = self.events[seen:], len(self.events)
+            found.extend(e for e in new if isinstance(e, RequestDone) and e.token is token)
             return bool(found)
 
         self.run_until(answered, limit_s)
@@ -162,10 +165,20 @@ class Bench:
 def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
     """Ask the boards for a job, and return its answer."""
     token = object()
+    seen = len(bench.events)
     bench.board.services.ask(job, token, bench.now)
     bench.settle()
-    bench.run_until(lambda: any(d.token is token for d in bench.extras(JobDone)), limit_s)
-    return next(done for done in bench.extras(JobDone) if done.token is token)
+    found: list[JobDone] = []
+
+    def answered() -> bool:
+        nonlocal seen
+        new, seen = bench.events[seen:], len(bench.events)
+        values = (event.value for event in new if isinstance(event, Extra))
+        found.extend(d for d in values if isinstance(d, JobDone) and d.token is token)
+        return bool(found)
+
+    bench.run_until(answered, limit_s)
+    return found[0]
 
 
 def nominal(
