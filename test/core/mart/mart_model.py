@@ -84,9 +84,9 @@ def allowed(world: World, word: str, rules: Rules) -> bool:
     must have waited for late copies and checked the IMU, as the real driver does.
     """
     driver = world.driver
-    row = BY_TEXT[word]
     if not rules(driver.state, word, driver.motion):
         return False
+    row = BY_TEXT[word]
     # The real driver waits for the longest network delay. The model has no clock, so it waits until
     # no copy is left.
     if (row in STARTS or row.kind is Kind.CHECK) and any(
@@ -247,19 +247,20 @@ def _said(word: str, world: World) -> Iterator[Step]:
             pass
         else:
             driver = driver._replace(unanswered=driver.unanswered + 1)
-    said = world._replace(driver=driver)
+    server, _, copies, replies = world
+    said = World(server, driver, copies, replies)
     yield f"{word} is lost", said
-    room = word in COPIED and len(world.copies) < MOST_COPIES
-    copied = said._replace(copies=tuple(sorted((*world.copies, word)))) if room else None
-    if copied is not None:
+    copied = None
+    if word in COPIED and len(copies) < MOST_COPIES:
+        copied = World(server, driver, tuple(sorted((*copies, word))), replies)
         yield f"{word} is late", copied
-    if world.server.port != "free" and word not in ("SL", "SS"):
+    if server.port != "free" and word not in ("SL", "SS"):
         return
+    after, reply = execute(server, word)
     for what, before in ((word, said), (f"{word}, and a copy later", copied)):
         if before is None:
             continue
-        after, reply = execute(before.server, word)
-        yield from _replied(what, before._replace(server=after), reply)
+        yield from _replied(what, World(after, driver, before.copies, replies), reply)
 
 
 def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
@@ -272,7 +273,7 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
         return
     yield f"{what} (reply lost)", world
     if not world.replies:
-        yield f"{what} (reply late)", world._replace(replies=(reply,))
+        yield f"{what} (reply late)", World(world.server, world.driver, world.copies, (reply,))
     yield from _heard(what, world, reply, False)
 
 

@@ -11,6 +11,7 @@ Results: docs/boards/mart.md.
 
 import sys
 import time
+from functools import cache
 from typing import Final, NamedTuple
 
 import mart_model as model
@@ -90,6 +91,7 @@ FOUND_MOVING: Final = (
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
     """Search the reachable worlds, breadth first; stop at the first one that must not occur."""
+    rules = cache(rules)
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0

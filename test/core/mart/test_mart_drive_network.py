@@ -31,11 +31,11 @@ def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_secon
 ) -> None:
     """Each datagram is late by up to 0.3 s. The delays begin just before the drive.
 
-    The driver stops none of the eight drives. In at most one of them, the speed is still wrong
+    The driver stops none of the four drives. In at most one of them, the speed is still wrong
     after 5 s.
     """
     slow = 0
-    for seed in range(8):
+    for seed in range(4):
         bench = on(NetworkFaults(delay_s=0.3), firmware, seed)
         bench.command(vx, 0.0, 5.0)
         began_m = bench.truth.x_m
@@ -46,7 +46,7 @@ def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_secon
 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
     seed: int, firmware: Firmware
 ) -> None:

@@ -91,7 +91,7 @@ def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) ->
     The odometry adds every move.
     """
     bench, goal = MartBench(firmware).ready(), Pose()
-    for _ in range(10):
+    for _ in range(6):
         goal = goal.moved(step)
         bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
         end(bench)
