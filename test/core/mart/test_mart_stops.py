@@ -32,8 +32,14 @@ def test_a_stop_leaves_the_robot_standing_within_half_a_second(
     assert bench.session.shutdown.stands
 
 
-@pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.parametrize("after_s", [0.02, 0.12, 0.17, 0.22, 0.35, 0.56])
+@pytest.mark.parametrize(
+    ("after_s", "firmware"),
+    [
+        (after_s, FIRMWARES[(n + m) % 3])
+        for n, after_s in enumerate((0.02, 0.12, 0.17, 0.22, 0.35, 0.56))
+        for m in range(2)
+    ],
+)
 def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
     after_s: float, firmware: Firmware
 ) -> None:
@@ -296,7 +302,7 @@ def test_a_driver_that_is_killed_at_any_moment_is_followed_by_a_guard_that_stops
     """
     twists = {"forward": (0.3, 0.2), "backward": (-0.2, 0.0), "left": (0.0, 0.5)}
     seen = set()
-    for tenths in [*range(2, 16), 25, 40]:
+    for tenths in [*range(2, 8), 9, 11, 13, 15, 25, 40]:
         network = NetworkFaults(delay_s=0.03)
         bench = MartBench(FIRMWARES[tenths % 3], network, seed=tenths).ready()
         if wish in twists:

@@ -34,11 +34,11 @@ def test_it_drives_and_odometry_tells_how_far(robot: TwoPorts, probe: Probe) -> 
     odometry = probe.listen(Odometry, "odom")
     joints = probe.listen(JointState, "joint_states")
     with driven(probe, robot):
-        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.7)
+        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
     with driven(probe, robot, 0.0, 0.5):
-        robot.wait_until(lambda board: board.truth.yaw_rad > 1.0)
+        robot.wait_until(lambda board: board.truth.yaw_rad > 0.6)
     with driven(probe, robot, 0.3, -0.3):
-        robot.wait_until(lambda board: board.truth.yaw_rad < 0.5)
+        robot.wait_until(lambda board: board.truth.yaw_rad < 0.3)
     robot.stands_for_good()
     truth = robot.do(lambda board: board.truth)
     probe.wait_for_later_stamp(odometry)
