@@ -132,6 +132,9 @@ class MartRobot:
         self.board.receive(data, now, channel)
 
     def advance(self) -> list[Packet]:
+        if self.board.server.wake_at > (self.board.ticks + 5) * self.board.tick_s:
+            self.board.ticks += 5
+            return []
         return [packet for _ in range(5) for packet in self.board.advance()]
 
 
@@ -228,14 +231,21 @@ class AnyBench:
         self.events += self.session.take_events()
 
     def run(self, seconds: float) -> None:
+        """Advance the simulated time by ``seconds``.
+
+        The session is called only when it has something to do, as by the driver's threads.
+        """
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
-            for channel, data in self.robot.advance():
+            packets = self.robot.advance()
+            for channel, data in packets:
                 if self.speaks:
                     self.session.inbound.receive(data, self.now, channel)
-            if self.now >= self.session.wake_at:
+            wakes = self.now >= self.session.wake_at
+            if wakes:
                 self.session.tick(self.now)
-            self.settle()
+            if packets or wakes:
+                self.settle()
 
     def stall(self, seconds: float) -> None:
         """Simulate a stall of the process: data waits for ``seconds`` and is then read together."""

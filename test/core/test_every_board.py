@@ -32,8 +32,16 @@ def assert_stands_for_good(bench: AnyBench) -> None:
     bench.run(ENDS_S)
     assert bench.robot.stands
     before = bench.robot.way_m
-    bench.run(5.0)
+    bench.run(3.0)
     assert bench.robot.way_m == before
+
+
+def assert_obeys(bench: AnyBench, within_s: float = 3.0) -> None:
+    """Command motion until the robot moves. A MART may have been restarted, and gets some time."""
+    end = bench.now + within_s
+    while bench.robot.stands:
+        assert bench.now < end
+        bench.drive_on(seconds=0.1)
 
 
 @pytest.mark.slow
@@ -52,11 +60,11 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
 
 @pytest.mark.slow
 def test_every_command_is_obeyed_however_seldom_odometry_comes(bench: AnyBench) -> None:
-    """The user sends a hundred commands at 20 Hz.
+    """The user sends fifty commands at 20 Hz.
 
     All are accepted, even if odometry arrives rarely.
     """
-    for _ in range(100):
+    for _ in range(50):
         bench.drive(0.2)
         bench.run(0.05)
     assert not bench.robot.stands
@@ -89,20 +97,19 @@ def test_a_zero_command_stops_at_once(bench: AnyBench) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seconds", [0.5, 2.0, 4.0, 9.0])
+@pytest.mark.parametrize("stalls_s", [(0.5, 0.5), (9.0, 2.0)], ids=["short", "long"])
 def test_after_a_stall_of_the_process_the_robot_stands_and_obeys_a_new_command(
-    bench: AnyBench, seconds: float
+    bench: AnyBench, stalls_s: tuple[float, float]
 ) -> None:
     """This process stalls for up to 9 s while the robot drives, and the board's data waits unread.
 
-    After the stall the robot stands, until a new command moves it.
+    After each stall the robot stands, until a new command moves it.
     """
-    for _ in range(2):
+    for seconds in stalls_s:
         bench.drive_on()
         bench.stall(seconds)
         assert_stands_for_good(bench)
-        bench.drive_on(seconds=3.0)
-        assert not bench.robot.stands
+        assert_obeys(bench)
 
 
 @pytest.mark.slow
@@ -168,8 +175,7 @@ def test_a_robot_that_is_not_heard_is_driven_no_further(bench: AnyBench) -> None
     assert bench.session.state == "connecting"
     bench.speaks = True
     bench.run_until(lambda: bench.session.state == "nominal")
-    bench.drive_on(seconds=3.0)  # a MART may have been restarted, and gets some time
-    assert not bench.robot.stands
+    assert_obeys(bench)
 
 
 @pytest.mark.slow
@@ -229,14 +235,14 @@ def test_an_end_leaves_the_robot_standing(bench: AnyBench) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_odometry_stays_a_number_over_lines_that_come_and_go(bench: AnyBench, seed: int) -> None:
     """The line is cut at random moments while the robot drives, reverses and stands.
 
     The odometry stays finite and plausible.
     """
     random = Random(seed)
-    for _ in range(6):
+    for _ in range(4):
         bench.drive_on(random.choice([0.3, -0.2, 0.0]), random.uniform(0.1, 2.0))
         bench.close()
         for _ in range(random.randrange(150)):
