@@ -36,12 +36,12 @@ class Watched(Mapping[str, Any]):
 
 
 @cache
-def strings(file: Path) -> list[str]:
-    """Return the strings of a module as patterns, but not the names that define parameters.
+def strings(file: Path) -> tuple[set[str], set[str]]:
+    """Return the strings of a module, but not the names that define parameters, and patterns.
 
     An f-string such as ``f"{kind}_minimum"`` is a pattern that matches every ``kind``.
     """
-    found, rows = [], set[int]()
+    found, patterns, rows = set[str](), set[str](), set[int]()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "Parameter":
             rows.update(id(argument) for argument in node.args[:1])
@@ -51,12 +51,12 @@ def strings(file: Path) -> list[str]:
                 for part in node.values
             ]
             if max(map(len, parts)) > len(r"\w+"):
-                found.append("".join(parts))
+                patterns.add("".join(parts))
         elif (
             isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in rows
         ):
-            found.append(re.escape(node.value))
-    return found
+            found.add(node.value)
+    return found, patterns
 
 
 def own_files(board: str) -> Iterator[Path]:
@@ -80,12 +80,13 @@ def test_every_parameter_is_read(board: str) -> None:
     profile = boards.load(board)
     watched = Watched(boards.check_all({"board": board}))
     profile.settings(watched)
-    patterns = {pattern for file in own_files(board) for pattern in strings(file)}
-    named = re.compile("|".join(patterns))
+    files = [strings(file) for file in own_files(board)]
+    names = set[str]().union(*(each for each, _ in files))
+    patterns = re.compile("|".join(set[str]().union(*(each for _, each in files))))
     without = [
         row.name
         for row in profile.PARAMETERS.rows
-        if row.name not in watched.read and not named.fullmatch(row.name)
+        if row.name not in watched.read | names and not patterns.fullmatch(row.name)
     ]
     assert not without, (
         f"no code reads these parameters, so they have no effect: {', '.join(without)}. Did you"

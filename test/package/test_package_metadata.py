@@ -8,7 +8,8 @@ import runpy
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -87,16 +88,19 @@ def python_files(*paths: str) -> list[Path]:
     return files
 
 
-def imports(file: Path) -> Iterator[str]:
-    """Yield the full dotted name of everything that a file imports, in any place of the file."""
+@cache
+def imports(file: Path) -> list[str]:
+    """Return the full dotted name of everything that a file imports, in any place of the file."""
     package = file.relative_to(ROOT).parent.parts
+    found: list[str] = []
     for node in ast.walk(ast.parse(file.read_text(), file)):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             parents = package[: len(package) - node.level + 1] if node.level else ()
             parts = (*parents, *filter(None, [node.module]))
-            yield from (".".join((*parts, alias.name)) for alias in node.names)
+            found += (".".join((*parts, alias.name)) for alias in node.names)
+    return found
 
 
 def third_party(files: Iterable[Path]) -> set[str]:

@@ -4,7 +4,7 @@
 
 import ast
 import re
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -19,20 +19,25 @@ def quick_folders() -> list[str]:
     return found[1].split()
 
 
-def modules() -> Iterator[tuple[str, ast.Module]]:
-    for folder in quick_folders():
-        for path in sorted((ROOT / folder).rglob("*.py")):
-            yield str(path.relative_to(ROOT)), ast.parse(path.read_text())
+@cache
+def functions_and_imports() -> list[tuple[str, ast.stmt]]:
+    """Return each function and each import in the quick tests, with the name of its file."""
+    return [
+        (str(path.relative_to(ROOT)), node)
+        for folder in quick_folders()
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef | ast.Import | ast.ImportFrom)
+    ]
 
 
 def test_none_of_them_imports_ros() -> None:
     """No file in the folders of the quick tests imports rclpy."""
-    for name, module in modules():
-        for node in ast.walk(module):
-            if isinstance(node, ast.Import | ast.ImportFrom):
-                names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-                names += [alias.name for alias in node.names]
-                assert not any(one.split(".")[0] == "rclpy" for one in names), name
+    for name, node in functions_and_imports():
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            names += [alias.name for alias in node.names]
+            assert not any(one.split(".")[0] == "rclpy" for one in names), name
 
 
 def test_a_property_of_many_examples_is_marked_slow() -> None:
@@ -40,11 +45,10 @@ def test_a_property_of_many_examples_is_marked_slow() -> None:
 
     ``make check`` leaves out tests with this mark, so that it stays quick.
     """
-    for name, module in modules():
-        for node in ast.walk(module):
-            if not isinstance(node, ast.FunctionDef):
-                continue
-            marks = [ast.unparse(decorator) for decorator in node.decorator_list]
-            examples = [int(n) for mark in marks for n in re.findall(r"max_examples=(\d+)", mark)]
-            if "pytest.mark.slow" not in marks:
-                assert max(examples, default=0) <= MOST_EXAMPLES, f"{name}: {node.name}"
+    for name, node in functions_and_imports():
+        if not isinstance(node, ast.FunctionDef):
+            continue
+        marks = [ast.unparse(decorator) for decorator in node.decorator_list]
+        examples = [int(n) for mark in marks for n in re.findall(r"max_examples=(\d+)", mark)]
+        if "pytest.mark.slow" not in marks:
+            assert max(examples, default=0) <= MOST_EXAMPLES, f"{name}: {node.name}"
