@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -21,12 +22,19 @@ from std_msgs.msg import String
 from omnibot_driver.node import WARN_EVERY_S
 from omnibot_driver.stall_detector import SETTLE_S
 
+NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
+NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
+"""The probe waits for no events of the middleware.
+
+The executor would add each event to every wait, which takes more time than the messages.
+"""
+
 
 class Probe:
     """A ROS node in the namespace of a driver. It subscribes, publishes and calls services."""
 
     def __init__(self, namespace: str) -> None:
-        self.node = Node("probe", namespace=namespace)
+        self.node = Node("probe", namespace=namespace, start_parameter_services=False)
         self._received: dict[str, list[Any]] = {}
         self._clients: dict[str, Any] = {}
         self._changed = threading.Condition()
@@ -61,7 +69,7 @@ class Probe:
                 messages.append(message)
                 self._changed.notify_all()
 
-        self.node.create_subscription(kind, topic, append, qos)
+        self.node.create_subscription(kind, topic, append, qos, event_callbacks=NO_EVENTS)
         self._executor.wake()
         return messages
 
@@ -75,7 +83,7 @@ class Probe:
                 append(data, info)
                 self._changed.notify_all()
 
-        self.node.create_subscription(kind, topic, take, qos, raw=True)
+        self.node.create_subscription(kind, topic, take, qos, raw=True, event_callbacks=NO_EVENTS)
         self._executor.wake()
 
     def wait_for(self, predicate: Callable[[], object]) -> None:
@@ -105,7 +113,9 @@ class Probe:
 
     def publisher(self, kind: type, topic: str, qos: QoSProfile | int = 1) -> Any:
         """Create a publisher, and wait until it has a subscriber."""
-        publisher = self.node.create_publisher(kind, topic, qos)
+        publisher = self.node.create_publisher(
+            kind, topic, qos, event_callbacks=NO_PUBLISHER_EVENTS
+        )
         self.wait_for_graph(publisher.get_subscription_count)
         publish = publisher.publish
 

@@ -185,12 +185,12 @@ def read_until_it_drives(process: subprocess.Popen[str]) -> None:
     raise AssertionError("the demo ended before it drove")
 
 
-def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
-    """After 20 s the demo ends with code 0. The odometry error is below 10 mm and 2°.
+def test_some_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
+    """After 8 s the demo ends with code 0. The odometry error is below 10 mm and 2°.
 
     No process is left.
     """
-    with running_demo(DEMO_SECONDS="20") as (process, mark):
+    with running_demo(DEMO_SECONDS="8") as (process, mark):
         output, _ = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == 0, output
         wait_until_all_have_ended(mark)
@@ -203,7 +203,8 @@ def test_twenty_seconds_end_with_a_small_pose_error_and_nothing_left() -> None:
     assert float(error[1]) < 10.0
     assert float(error[2]) < 2.0
     assert float(rates[1]) / float(rates[2]) == pytest.approx(4.0, rel=0.1)
-    assert float(driven[2]) == pytest.approx(float(driven[1]) / 4, abs=0.5)
+    assert float(driven[2]) > 0.0
+    assert float(driven[2]) == pytest.approx(float(driven[1]) / 4, abs=0.3)
     assert "no driver" not in output
     closing = output[output.index("pose error") :]
     assert closing.index("first lift its wheels off the ground") < closing.index("/dev/ttyUSB0")
@@ -284,16 +285,16 @@ def test_an_unknown_board_gives_one_sentence_and_exit_code_2(
     assert told.count("\n") == 1
 
 
-def test_on_a_terminal_the_monitor_shows_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The demo runs on a terminal.
+def test_on_a_terminal_the_monitor_shows_it() -> None:
+    """The demo runs on a terminal. The monitor shows the driver.
 
-    The monitor shows the driver, and the result follows at the end.
+    When the user quits the monitor, the result follows.
     """
-    monkeypatch.setenv("DEMO_SECONDS", "20")  # the monitor may find the driver or draw late
     with PseudoTerminal([sys.executable, "-m", "omnibot_driver.demo"]) as terminal:
         terminal.wait_for("ros2 topic hz /demo_")
         terminal.wait_for("/omnibot_driver  nominal")
-        terminal.wait_for("commanded m/s rad/s")
+        terminal.wait_for("commanded m/s rad/s   0.2")
+        terminal.type("q")
         terminal.wait_for("pose error")
         assert terminal.end() == 0
 
