@@ -140,7 +140,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
     stopped: set[int] = set()
     with monkeypatch.context() as undying:
         undying.setattr("subprocess.Popen.kill", lambda _process: None)
-        for second in range(10 * HANGS_AFTER):
+        for second in range(2 * MOST_DYING * HANGS_AFTER):
             for pid in set(line.children()) - stopped:
                 os.kill(pid, signal.SIGSTOP)
                 os.waitid(os.P_PID, pid, os.WSTOPPED)

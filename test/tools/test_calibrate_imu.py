@@ -49,11 +49,11 @@ def log_of(imu: Imu, moved_m: float = 0.0) -> Log:
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """The bias is measured in 200 rests. The claimed uncertainties agree with the true errors.
+    """The bias is measured in 100 rests. The claimed uncertainties agree with the true errors.
 
     An error divided by its claimed uncertainty has a standard deviation near 1.
     """
-    rests = [rest(sensor(20.0, seed)) for seed in range(200)]
+    rests = [rest(sensor(20.0, seed)) for seed in range(100)]
     biases = np.array([(one.bias_radps - BIAS) / one.bias_sigma for one in rests])
     assert 0.7 < biases.std() < 1.1
     densities = np.array([[n.density for n in one.noises] for one in rests])

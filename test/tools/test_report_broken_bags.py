@@ -18,7 +18,7 @@ from omnibot_driver.tools.report.__main__ import main
 from omnibot_driver.tools.report.bag import read
 from omnibot_driver.tools.report.log import Log
 
-SECONDS = 10.0
+SECONDS = 4.0
 CHUNK = 0x06
 STATUS = "diagnostic_msgs/msg/DiagnosticStatus"
 

@@ -69,12 +69,12 @@ def test_a_motor_is_found_in_the_manuals_loop(
 
 
 def test_claimed_uncertainties_are_the_true_ones() -> None:
-    """40 recordings are fitted. The claimed uncertainties agree with the true errors.
+    """30 recordings are fitted. The claimed uncertainties agree with the true errors.
 
     An error divided by its claimed uncertainty has a standard deviation near 1.
     """
     planted = (1.0, 46.0, 0.06, 0.013)
-    fits = [fit(motor_model(MANUAL), made_up(motor_model(MANUAL), planted, n)) for n in range(40)]
+    fits = [fit(motor_model(MANUAL), made_up(motor_model(MANUAL), planted, n)) for n in range(30)]
     errors = np.array([(one.values - planted) / one.sigmas for one in fits])
     assert 0.7 < errors.std() < 1.3
 
