@@ -41,7 +41,7 @@ def test_a_running_robot_is_listened_to(
 
 def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
     """Without a driver ``report --live`` prints one sentence and writes no files."""
-    done = report(tmp_path / "out", "--live", "3", "--namespace", "absent")
+    done = report(tmp_path / "out", "--live", "1", "--namespace", "absent")
     assert done.returncode == 1
     assert done.stderr.startswith("report: no driver was heard")
     assert done.stderr.count("\n") == 1
@@ -50,7 +50,7 @@ def test_without_a_driver_it_says_so(tmp_path: Path) -> None:
 
 def test_if_ros_does_not_start_it_says_so(tmp_path: Path) -> None:
     """ROS refuses the domain. ``report --live`` prints one sentence instead of a traceback."""
-    done = report(tmp_path / "out", "--live", "3", ROS_DOMAIN_ID="robots")
+    done = report(tmp_path / "out", "--live", "1", ROS_DOMAIN_ID="robots")
     assert done.returncode == 1
     assert done.stderr.startswith("report: ROS does not start: ")
     assert done.stderr.count("\n") == 1

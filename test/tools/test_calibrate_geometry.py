@@ -5,6 +5,7 @@
 import argparse
 import io
 import math
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ def arguments(*words: str) -> argparse.Namespace:
     return command_line().parse_args(["geometry", *words])
 
 
+@cache
 def paths() -> list[tuple[str, Column, bool]]:
     """Return all drives: name, exact path, and whether the user measures the final heading."""
     found = []
@@ -139,7 +141,7 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}
     console = Console(read=Surveyor(lambda: robot.bench.board), file=io.StringIO())
-    found = geometry.run(robot, console, arguments("--turns", "1", "--side", "0.5"))
+    found = geometry.run(robot, console, arguments("--turns", "1", "--side", "0.4"))
     mean = sum(factors) / 3 * (1 - slip)
     planted = {
         "wheel_radius": 0.029 * mean,

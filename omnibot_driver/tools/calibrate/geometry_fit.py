@@ -91,13 +91,14 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
+    rims = [rims_of(reading.path, base_radius_m) for reading in readings]
 
     def misfit(sizes: Column) -> Column:
         wheels, base, a, b = sizes
         factors = wheels * (1 + np.array([a, b, -a - b]))
         parts = [np.array([a, b, a + b]) / WHEELS_ALIKE]
-        for reading, weight in zip(readings, weights, strict=True):
-            off = rolled(reading.path, factors, base, base_radius_m)[-1] - reading.end
+        for reading, rim, weight in zip(readings, rims, weights, strict=True):
+            off = _rolled(rim, factors, base * base_radius_m)[-1] - reading.end
             parts.append(weight @ off[~np.isnan(reading.end)])
         return np.concatenate(parts)
 
@@ -126,8 +127,12 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
     ``base``: new base radius / assumed base radius.
     """
-    rims = rims_of(path, base_radius_m) * factors
-    body = rims @ np.linalg.inv(_rims(base * base_radius_m)).T
+    return _rolled(rims_of(path, base_radius_m), factors, base * base_radius_m)
+
+
+def _rolled(rims: Column, factors: Column, base_radius_m: float) -> Column:
+    """Return the poses after each step of the wheels, (n, 3). ``rims``: their distances in m."""
+    body = rims * factors @ np.linalg.inv(_rims(base_radius_m)).T
     yaw = np.concatenate(([0.0], np.cumsum(body[:, 2])))
     middle = yaw[:-1] + body[:, 2] / 2
     cos, sin = np.cos(middle), np.sin(middle)
