@@ -159,9 +159,9 @@ def test_standstill_is_proved_where_ticks_count(firmware: Firmware) -> None:
 def test_a_robot_that_was_stopped_starts_again_at_any_speed(firmware: Firmware) -> None:
     """The firmware keeps the last measured speed of a wheel at rest, which may prevent a start.
 
-    The driver clears this speed, so the robot starts again.
+    The driver clears this speed, so the robot starts again, also without feed-forward.
     """
-    rig = Rig(nominal(firmware))
+    rig = Rig(nominal(firmware), LoisEcuSettings())
     rig.run(5.0)
     for speed in (-30, -8, 30, 8, -30):
         before_m = rig.way_m
