@@ -43,7 +43,7 @@ def strings(file: Path) -> tuple[set[str], set[str]]:
     """
     found, patterns, rows = set[str](), set[str](), set[int]()
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Parameter":
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Parameter":
             rows.update(id(argument) for argument in node.args[:1])
         elif isinstance(node, ast.JoinedStr):
             parts = [

@@ -8,7 +8,7 @@ import runpy
 import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -88,12 +88,23 @@ def python_files(*paths: str) -> list[Path]:
     return files
 
 
+def statements(tree: ast.Module) -> Iterator[ast.stmt]:
+    """Yield every statement of a module, but not the expressions in it."""
+    waiting: list[Any] = [*tree.body]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.stmt):
+            yield node
+        for name in ("body", "handlers", "cases", "orelse", "finalbody"):
+            waiting += getattr(node, name, ())
+
+
 @cache
 def imports(file: Path) -> list[str]:
     """Return the full dotted name of everything that a file imports, in any place of the file."""
     package = file.relative_to(ROOT).parent.parts
     found: list[str] = []
-    for node in ast.walk(ast.parse(file.read_text(), file)):
+    for node in statements(ast.parse(file.read_text(), file)):
         if isinstance(node, ast.Import):
             found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -7,6 +7,7 @@ not found. A phrase may span a line break.
 """
 
 import ast
+import os
 import re
 from functools import cache
 from pathlib import Path
@@ -50,6 +51,8 @@ ALLOWED = {
 }
 """Files that are not searched, each with the reason."""
 
+WITHIN_A_WORD = re.compile(r"(?<=\w)")
+
 CONJUNCTIONS = {"And", "But", "Nor", "Or"}
 """Words that must not begin a docstring.
 
@@ -60,32 +63,36 @@ Such a docstring could not be understood without the function's name.
 @cache
 def texts() -> dict[str, str]:
     """Return the text of every text file of the repository, by file name."""
+    names = []
+    for folder, below, files in os.walk(ROOT):
+        below[:] = [name for name in below if name not in SKIPPED and not name.startswith(".")]
+        names += [
+            Path(folder, name).relative_to(ROOT) for name in files if not name.startswith(".")
+        ]
     return {
         str(name): (ROOT / name).read_text(encoding="utf-8")
-        for name in sorted(file.relative_to(ROOT) for file in ROOT.rglob("*"))
-        if (name.suffix in SUFFIXES or name.name == "Makefile")
-        and not any(part in SKIPPED or part.startswith(".") for part in name.parts)
+        for name in sorted(names)
+        if name.suffix in SUFFIXES or name.name == "Makefile"
     }
 
 
 @cache
 def found() -> dict[str, list[str]]:
     """Return all places of each phrase that is used: the file, the line and the words."""
-    anyone = "|".join(f"(?P<phrase{n}>{one})" for n, one in enumerate(PATTERNS.values()))
-    pattern = re.compile(
-        rf"\b(?:{anyone})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"),
-        re.IGNORECASE | re.MULTILINE,
-    )
-    names = dict(zip((f"phrase{n}" for n in range(len(PATTERNS))), PATTERNS, strict=True))
     places: dict[str, list[str]] = {}
-    for name, text in texts().items():
-        if name in ALLOWED:
-            continue
-        for match in pattern.finditer(text):
-            if match[0].lower().startswith("there"):  # "there is no parameter" is usual
-                continue
-            place = f"{name}:{text.count(chr(10), 0, match.start()) + 1}: {match[0]}"
-            places.setdefault(names[match.lastgroup or ""], []).append(place)
+    lowered = {name: text.lower() for name, text in texts().items() if name not in ALLOWED}
+    for phrase, one in PATTERNS.items():
+        # Most patterns begin with a letter, which Python finds quickly. So the character before a
+        # match is looked at afterwards.
+        pattern = re.compile(rf"(?:{one})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"), re.MULTILINE)
+        for name, text in lowered.items():
+            for match in pattern.finditer(text):
+                if WITHIN_A_WORD.match(text, match.start()):
+                    continue  # it begins within a word
+                if match[0].startswith("there"):  # "there is no parameter" is usual
+                    continue
+                place = f"{name}:{text.count(chr(10), 0, match.start()) + 1}: {match[0]}"
+                places.setdefault(phrase, []).append(place)
     return places
 
 

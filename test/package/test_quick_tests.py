@@ -4,7 +4,7 @@
 
 import ast
 import re
-from functools import cache
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -19,21 +19,18 @@ def quick_folders() -> list[str]:
     return found[1].split()
 
 
-@cache
-def functions_and_imports() -> list[tuple[str, ast.stmt]]:
-    """Return each function and each import in the quick tests, with the name of its file."""
-    return [
-        (str(path.relative_to(ROOT)), node)
-        for folder in quick_folders()
-        for path in sorted((ROOT / folder).rglob("*.py"))
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.FunctionDef | ast.Import | ast.ImportFrom)
-    ]
+def nodes_of_files_with(text: str) -> Iterator[tuple[str, ast.AST]]:
+    """Yield every node of the quick tests' files that contain ``text``, with the file's name."""
+    for folder in quick_folders():
+        for path in sorted((ROOT / folder).rglob("*.py")):
+            if text in (source := path.read_text()):
+                name = str(path.relative_to(ROOT))
+                yield from ((name, node) for node in ast.walk(ast.parse(source)))
 
 
 def test_none_of_them_imports_ros() -> None:
     """No file in the folders of the quick tests imports rclpy."""
-    for name, node in functions_and_imports():
+    for name, node in nodes_of_files_with("rclpy"):
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names]
@@ -45,7 +42,7 @@ def test_a_property_of_many_examples_is_marked_slow() -> None:
 
     ``make check`` leaves out tests with this mark, so that it stays quick.
     """
-    for name, node in functions_and_imports():
+    for name, node in nodes_of_files_with("max_examples="):
         if not isinstance(node, ast.FunctionDef):
             continue
         marks = [ast.unparse(decorator) for decorator in node.decorator_list]
