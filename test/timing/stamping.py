@@ -9,6 +9,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from random import Random
@@ -33,6 +34,8 @@ SETTLED_S = 2.0
 EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stall of 2 s": 2.0}
 """For each event in the middle of a stream, the time in s for which the host then reads nothing."""
 RESTART = "the board restarts"
+stream_of = lru_cache(maxsize=4)(generate)
+"""What the board sends. All lines carry the same streams, and change nothing in them."""
 BOOT_S = 0.7123
 
 
@@ -130,13 +133,13 @@ def stamp(
     the first second of the stream.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
-    truth = generate(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)
+    truth = stream_of(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)
     ticks = sum(key[0] == "imu" for key, _, _ in truth.frames)
     sampled_s = [tick * TICK_S for tick in range(ticks)]
     restarted_s = math.inf
     if event == RESTART:
         restarted_s = seconds / 2 + BOOT_S + random.random()
-        again = generate(SCENARIOS[scenario], seed + 1000, seconds / 2)
+        again = stream_of(SCENARIOS[scenario], seed + 1000, seconds / 2)
         sampled_s += [math.nan, *(restarted_s + time for time in sampled_s)]
         truth = _one_after_the_other(truth, again, restarted_s)
     start = random.randrange(1000)

@@ -19,7 +19,7 @@ def test_lost_bytes_shift_no_stamps(line: str, scenario: str, skew: float) -> No
 
     99 % are right within 0.5 ms. The first 2 s and a constant offset do not count.
     """
-    stamped = stamp(line, scenario, 1e-3, skew, 0, 15.0)
+    stamped = stamp(line, scenario, 1e-3, skew, 0, 10.0)
     assert stamped.unevenness() < 0.2e-3
     assert spread(stamped.errors()) < 0.5e-3
 
@@ -83,7 +83,7 @@ def test_a_reader_that_is_late_shifts_no_stamps(reader: str, scenario: str, skew
     Readers that read in parts are not tested here, because some of their stamps are wrong by a
     tick.
     """
-    stamped = stamp(reader, scenario, 0.0, skew, 0, 15.0)
+    stamped = stamp(reader, scenario, 0.0, skew, 0, 10.0)
     assert spread(stamped.errors()) < 0.5e-3
     if reader in ("single bytes, late", "1-8 bytes, late"):
         assert stamped.unevenness() < 0.2e-3
