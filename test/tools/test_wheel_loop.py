@@ -57,7 +57,7 @@ def simulated_answer(motor: Motor, gains: Gains, ticks: int) -> list[float]:
 def test_the_loop_is_the_simulated_boards(delay: int) -> None:
     """The calculated loop has the same step response as the simulated board."""
     motor = Motor(46.0, 6.0, float(delay))
-    assert answer(motor, MANUAL, 100).speed == pytest.approx(
+    assert answer(motor, MANUAL, 100) == pytest.approx(
         simulated_answer(motor, MANUAL, 100), abs=1e-6
     )
 
@@ -65,7 +65,7 @@ def test_the_loop_is_the_simulated_boards(delay: int) -> None:
 def test_a_part_of_a_tick_lies_between_two_whole_delays() -> None:
     """With a delay of 1.4 ticks, the response lies between those with delays of 1 and 2 ticks."""
     sooner, between, later = (
-        answer(Motor(46.0, 6.0, delay), MANUAL, 8).speed for delay in (1.0, 1.4, 2.0)
+        answer(Motor(46.0, 6.0, delay), MANUAL, 8) for delay in (1.0, 1.4, 2.0)
     )
     assert (sooner[1:] > between[1:]).all()
     assert (between[1:] > later[1:]).all()
@@ -79,7 +79,7 @@ def test_the_loops_robustness_is_what_a_wave_shows(motor: Motor, frequency: floa
     The sensitivity is computed from the motor's impulse response.
     """
     ticks = 4000
-    pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks).speed, prepend=0.0)
+    pulse = np.diff(answer(motor, Gains(1.0, 0.0, 0.0), ticks), prepend=0.0)
     z = np.exp(1j * frequency)
     plant = np.sum(pulse * z ** -np.arange(1.0, ticks + 1))
     loop = plant * (MANUAL.proportional + MANUAL.integral / (1 - 1 / z))
@@ -146,7 +146,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
     """
     model = motor_model(MANUAL)
     turned = model.turned(np.array([46.0, 0.06, 0.01]), np.array([-0.1, 0.0, 0.01, 0.05]))
-    speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5).speed
+    speeds = answer(Motor(46.0, 6.0, 1.0), MANUAL, 5)
     assert turned == pytest.approx([0.0, 0.0, speeds[0] * 0.01, speeds.sum() * 0.01])
 
 

@@ -87,7 +87,7 @@ def _draw_predictions(
         )
         for motor in motors:
             effort = load * motor.pwm_per_count
-            speed = answer(motor, gains, PREDICTED_TICKS, command=command, load=effort).speed
+            speed = answer(motor, gains, PREDICTED_TICKS, command=command, load=effort)
             axes.plot(times_ms, speed, color=colour, linewidth=1, label=label)
             label = None
     axes.axhline(command, color="0.5", linewidth=0.5)

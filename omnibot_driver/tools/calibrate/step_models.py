@@ -95,7 +95,7 @@ def motor_in_loop(gains: Gains) -> Turned:
         pwm_per_count, time_constant_s, delay_s = parameters
         motor = Motor(pwm_per_count, time_constant_s / TICK_S, delay_s / TICK_S)
         ticks = max(1, int(np.ceil(time_s.max() / TICK_S)))
-        angle = np.concatenate(([0.0], np.cumsum(answer(motor, gains, ticks).speed))) * TICK_S
+        angle = np.concatenate(([0.0], np.cumsum(answer(motor, gains, ticks)))) * TICK_S
         return np.asarray(np.interp(time_s, np.arange(ticks + 1) * TICK_S, angle))
 
     return turned

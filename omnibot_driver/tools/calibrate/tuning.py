@@ -62,9 +62,9 @@ class Behaviour:
 def behaviour(motor: Motor, gains: Gains) -> Behaviour:
     """Simulate a motor with these gains in the manual's control loop; return its behaviour."""
     with np.errstate(over="ignore", invalid="ignore"):
-        speed = answer(motor, gains, HORIZON_TICKS).speed
+        speed = answer(motor, gains, HORIZON_TICKS)
         feedback = Gains(0.0, gains.proportional, gains.integral)
-        loaded = answer(motor, feedback, HORIZON_TICKS, command=0.0, load=motor.pwm_per_count).speed
+        loaded = answer(motor, feedback, HORIZON_TICKS, command=0.0, load=motor.pwm_per_count)
         wrong = np.maximum(abs(speed[-1] - 1.0), abs(loaded[-1]))
         rise_ticks = np.argmax(speed >= 0.9, axis=0) - np.argmax(speed >= 0.1, axis=0)
         return Behaviour(

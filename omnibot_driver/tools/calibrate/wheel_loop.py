@@ -46,21 +46,10 @@ MANUAL: Final = Gains(40.0, 10.0, 1.5)
 """The gains of the manual, "Controller parameters"."""
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """The response of a wheel, with one value for each tick since the new command.
-
-    ``speed``: speed during the tick. ``effort``: effort that was computed in the tick.
-    """
-
-    speed: Array
-    effort: Array
-
-
 def answer(
     motor: Motor, gains: Gains, ticks: int, *, command: float = 1.0, load: float = 0.0
-) -> Answer:
-    """Simulate a wheel with the manual's control law; return its response in each tick.
+) -> Array:
+    """Simulate a wheel with the manual's control law; return its speed during each tick.
 
     The commanded speed and the load change from 0 to ``command`` and ``load`` at the same time.
 
@@ -68,29 +57,34 @@ def answer(
 
     ``load``: effort that the load needs, in PWM steps.
     """
-    shape = np.broadcast(gains.feed_forward, gains.proportional, gains.integral).shape
-    whole, part = divmod(motor.delay_ticks, 1.0)
-    efforts = np.zeros((ticks + int(whole) + 1, *shape))
+    forward, proportional, integral = gains.feed_forward, gains.proportional, gains.integral
+    shape = np.broadcast(forward, proportional, integral).shape
+    zero: Any = np.zeros(shape)
+    if not shape:  # numpy is slow with single numbers
+        zero, forward, proportional, integral = map(float, (zero, forward, proportional, integral))
+    effort_per_speed, lag = float(motor.pwm_per_count), float(motor.time_constant_ticks)
+    load, (whole, part) = float(load), divmod(float(motor.delay_ticks), 1.0)
+    # ``settled``: the speeds to which the efforts would bring the wheel. An
+    # effort begins to act within a tick, so that two efforts act in each tick for these shares.
+    settled = [(zero - load) / effort_per_speed] * (int(whole) + 1)
+    shares = [(share, float(np.exp(-share / lag))) for share in (part, 1.0 - part)]
     speeds = np.zeros((ticks, *shape))
-    momentary, turned = np.zeros(shape), np.zeros(shape)
-    feedback, before = np.zeros(shape), np.zeros(shape)
+    momentary = turned = feedback = before = zero
     for tick in range(ticks):
         error = command - turned
         # u(k) = K_ff v + w(k), w(k) = w(k-1) + K_VP (e(k) - e(k-1)) + K_VI e(k). An effort acts
         # from the next tick on, and later by ``delay_ticks``.
-        feedback = feedback + gains.proportional * (error - before) + gains.integral * error
+        feedback = feedback + proportional * (error - before) + integral * error
         before = error
-        late = tick + int(whole) + 1
-        efforts[late] = gains.feed_forward * command + feedback
-        turned = np.zeros(shape)
-        for effort, share in ((efforts[tick], part), (efforts[tick + 1], 1.0 - part)):
-            settled = (effort - load) / motor.pwm_per_count
-            decay = np.exp(-share / motor.time_constant_ticks)
-            after = settled + (momentary - settled) * decay
-            turned = turned + settled * share + motor.time_constant_ticks * (momentary - after)
+        settled.append((forward * command + feedback - load) / effort_per_speed)
+        turned = zero
+        for number, (share, decay) in enumerate(shares, tick):
+            comes_to = settled[number]
+            after = comes_to + (momentary - comes_to) * decay
+            turned = turned + comes_to * share + lag * (momentary - after)
             momentary = after
         speeds[tick] = turned
-    return Answer(speeds, efforts[int(whole) + 1 :])
+    return speeds
 
 
 def sensitivity_peak(motor: Motor, gains: Gains, points: int = 400) -> Array:
