@@ -100,14 +100,18 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
         kps, used = np.meshgrid(scale * np.geomspace(low, high, CANDIDATES), tds, indexing="ij")
         gains = PiGains(kps, tn_s, used)
         found = _foreseen(plant, gains, loop, goals)
-        tame = found.overshoot <= goals.overshoot
-        tame &= _disturbed(plant, gains, loop, goals) <= goals.overshoot + DISTURBED
         # Gains above the first gain that overshoots too much are not allowed, even if saturation
         # hides their overshoot.
-        allowed = np.isfinite(found.settled_s) & np.logical_and.accumulate(tame, axis=0)
+        allowed = np.logical_and.accumulate(found.overshoot <= goals.overshoot, axis=0)
+        allowed &= np.isfinite(found.settled_s)
         if goals.phase_margin_deg is not None:
             margin = phase_margin_deg(plant, gains, loop, target)
             allowed &= margin >= goals.phase_margin_deg
+        if allowed.any():
+            rows = 1 + int(np.flatnonzero(allowed.any(axis=1))[-1])
+            slower = PiGains(kps[:rows], tn_s, used[:rows])
+            tame = _disturbed(plant, slower, loop, goals) <= goals.overshoot + DISTURBED
+            allowed[:rows] &= np.logical_and.accumulate(tame, axis=0)
         if not allowed.any():
             break
         cost = np.where(allowed, found.settled_s + found.error_s, np.inf)
