@@ -9,6 +9,7 @@ from session_bench import TICK_S, Bench
 
 from omnibot_driver.boards.omnibot import PARAMETERS
 from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.odometry.estimator import OdometryEstimate
 from omnibot_driver.simulator.omnibot import BoardSettings
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.motion import HALT, Bounds, Law, Topic
@@ -44,7 +45,7 @@ class BenchRobot:
         assert topic == "cmd_vel"
         self.bench.events.clear()
         self.bench.run(0.04)
-        first, began_s, command = self.bench.odometry[-1].pose, self.bench.now, HALT
+        first, began_s, command = self._pose(), self.bench.now, HALT
         wanted = law(0.0, Pose())
         while wanted is not None or command != HALT:
             target = HALT if wanted is None else wanted
@@ -52,7 +53,7 @@ class BenchRobot:
             command = bounds.approach(topic, command, target, COMMANDED_EVERY * TICK_S)
             self.bench.drive(*command)
             self.bench.run(COMMANDED_EVERY * TICK_S)
-            now, seconds = self.bench.odometry[-1].pose, self.bench.now - began_s
+            now, seconds = self._pose(), self.bench.now - began_s
             way = first.way_to(now)
             pose = Pose(way.x_m, way.y_m, now.yaw_rad - first.yaw_rad)
             bounds.require_within(seconds, pose)
@@ -63,3 +64,8 @@ class BenchRobot:
             pose = one.pose
             log.odometry_rows.append((one.stamp_s, pose.x_m, pose.y_m, pose.yaw_rad, 0.0, 0.0, 0.0))
         return log
+
+    def _pose(self) -> Pose:
+        """Return the latest pose of the odometry."""
+        events = reversed(self.bench.events)
+        return next(event.pose for event in events if isinstance(event, OdometryEstimate))

@@ -25,10 +25,11 @@ from omnibot_driver.tools.needs import ToolError
 @pytest.fixture(autouse=True)
 def _quickly(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (
-        ("JOG_S", 1.5),
+        ("JOG_S", 1.0),
         ("HELD_S", 0.5),
+        ("TURN_RAD", 1.0),
         ("TURN_BY_HAND_S", 2.0),
-        ("SETTLING_S", 0.5),
+        ("SETTLING_S", 0.3),
     ):
         monkeypatch.setattr(commission, name, value)
 

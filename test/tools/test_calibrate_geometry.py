@@ -141,7 +141,8 @@ def test_planted_sizes_are_found_on_the_simulated_robot(
     robot = BenchRobot(wheel_radius_scale=factors, base_radius_scale=base, slip=slip)
     robot.parameters |= {"wheel_radius": 0.03, "base_radius": 0.15}
     console = Console(read=Surveyor(lambda: robot.bench.board), file=io.StringIO())
-    found = geometry.run(robot, console, arguments("--turns", "1", "--side", "0.4"))
+    quickly = ("--speed", "0.4", "--turning", "1.0")
+    found = geometry.run(robot, console, arguments(*quickly, "--turns", "1", "--side", "0.4"))
     mean = sum(factors) / 3 * (1 - slip)
     planted = {
         "wheel_radius": 0.029 * mean,

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from omnibot_driver.boards.omnibot import PARAMETERS
+from omnibot_driver.tools.calibrate import scale as scale_module
 from omnibot_driver.tools.calibrate.log import Log
 from omnibot_driver.tools.calibrate.scale import result
 from omnibot_driver.tools.calibrate.speeds import SETTLE_S, plan, scale, speeds
@@ -129,15 +130,17 @@ def test_what_cannot_be_measured_is_an_error() -> None:
 
 
 def test_planted_scales_are_found_and_applied(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """``calibrate scale`` finds the board's unusual scales, and ``--apply`` sets them.
 
     The driver of this test accepts only TwistStamped as velocity commands.
     """
+    monkeypatch.setattr(scale_module, "ACCELERATION", 2.0)
+    monkeypatch.setattr(scale_module, "REST_S", 1.3)
     stamped = {"enable_stamped_cmd_vel": True}
     with rig(tmp_path, stamped, linear_scale=80.0, angular_scale=430.0) as robot:
-        words = ("--levels", "1", "--seconds", "0.7", "--speed", "0.2", "--turning", "0.4")
+        words = ("--levels", "1", "--seconds", "0.5", "--speed", "0.3", "--turning", "0.6")
         assert robot.calibrate("scale", *words, "--apply") == 0
         applied = parameters_of(robot.driver)
         written, table = robot.written(), capsys.readouterr().out

@@ -27,7 +27,7 @@ def test_a_planted_motor_is_found(
 
     The tolerance allows for a busy test machine.
     """
-    monkeypatch.setattr(step, "RUN_UP_S", 1.3)
+    monkeypatch.setattr(step, "RUN_UP_S", 1.0)
     with rig(tmp_path, motors=(USUAL, SLUGGISH, USUAL)) as robot:
         code = robot.calibrate("step", "--wheels", "B", "--hold", "0.7", "--steps", "4")
     table = capsys.readouterr().out

@@ -116,10 +116,11 @@ class SimulatedRobot:
         else:
             rates = list(command)
         for _ in range(2400):
+            seen = len(bench.events)
             bench.session.command_wheels(rates, bench.now)
             bench.settle()
             bench.run(0.05)
-            if found := self._records():
+            if found := self._records(seen):
                 break
         bench.session.command_wheels([0.0, 0.0], bench.now)
         bench.run_until(lambda: self.board.standing)
@@ -130,9 +131,9 @@ class SimulatedRobot:
         assert save(reading, path)
         return path
 
-    def _records(self) -> list[RecordReading]:
+    def _records(self, since: int) -> list[RecordReading]:
         return [
             event.value
-            for event in self.bench.events
+            for event in self.bench.events[since:]
             if isinstance(event, Extra) and isinstance(event.value, RecordReading)
         ]
