@@ -150,7 +150,7 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
     assert turned == pytest.approx([0.0, 0.0, speeds[0] * 0.01, speeds.sum() * 0.01])
 
 
-@settings(max_examples=5)
+@settings(max_examples=3)
 @given(wheel_motors)
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """The proposed gains keep the limits of Ms and overshoot.
