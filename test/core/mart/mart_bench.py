@@ -40,13 +40,14 @@ class NetworkRobot(MartRobot):
     def advance(self) -> list[Packet]:
         out: list[Packet] = []
         board = self.board
-        if not self._heard and self._due_s() > (board.ticks + 5) * TICK_S:
-            board.ticks += 5
+        last = board.ticks + 5
+        due_s = self._due_s()
+        if not self._heard and due_s > last * TICK_S:
+            board.ticks = last
             return out
         self._heard = False
-        last = board.ticks + 5
         while board.ticks < last:
-            while board.ticks < last - 1 and self._due_s() > (board.ticks + 1) * TICK_S:
+            while board.ticks < last - 1 and due_s > (board.ticks + 1) * TICK_S:
                 board.ticks += 1
             now_s = board.now_s
             for channel, way in enumerate(self.network):
@@ -57,6 +58,7 @@ class NetworkRobot(MartRobot):
             now_s = board.now_s
             for channel, way in enumerate(self.network):
                 out += [(channel, data) for data in way.from_board.arrived(now_s)]
+            due_s = self._due_s()
         return out
 
     def _due_s(self) -> float:

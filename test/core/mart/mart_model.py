@@ -74,18 +74,18 @@ class World(NamedTuple):
 
 
 Rules = Callable[[State, str, Motion], bool]
+"""Table of the commands allowed in each state and motion."""
+Allowed = Callable[[State, Motion], tuple[str, ...]]
+"""The same, as all commands of a state and motion together."""
 Step = tuple[str, World]
 
 
-def allowed(world: World, word: str, rules: Rules) -> bool:
-    """Return whether the modelled driver may send ``word`` now.
+def ready(world: World, word: str) -> bool:
+    """Return whether the modelled driver is ready to send ``word``, which its table allows.
 
-    ``rules``: the table of the commands allowed in each state and motion. In addition, the driver
-    must have waited for late copies and checked the IMU, as the real driver does.
+    It must have waited for late copies and checked the IMU, as the real driver does.
     """
     driver = world.driver
-    if not rules(driver.state, word, driver.motion):
-        return False
     row = BY_TEXT[word]
     # The real driver waits for the longest network delay. The model has no clock, so it waits until
     # no copy is left.
@@ -119,7 +119,7 @@ def table(state: State, word: str, motion: Motion) -> bool:
     return may_say(state, BY_TEXT[word], motion)
 
 
-def steps(world: World, rules: Rules = table) -> Iterator[Step]:
+def steps(world: World, allowed: Allowed) -> Iterator[Step]:
     """Yield every step that can follow this world: its name, and the world after it."""
     server, driver = world.server, world.driver
     if server.imu:
@@ -143,8 +143,8 @@ def steps(world: World, rules: Rules = table) -> Iterator[Step]:
     if driver.proved:
         yield "the proof grows old", world._replace(driver=driver._replace(proved=False))
     yield from _waits(world)
-    for word in SAID:
-        if allowed(world, word, rules):
+    for word in allowed(driver.state, driver.motion):
+        if ready(world, word):
             yield from _said(word, world)
 
 

@@ -16,7 +16,7 @@ from typing import Final, NamedTuple
 
 import mart_model as model
 from mart_model import UNANSWERED, Rules, World, sweeps_first, table
-from mart_model_server import Server, execute
+from mart_model_server import SAID, Server, execute
 
 from omnibot_driver.core.mart.states import HALTS, LAST_HALTS, Motion, State
 
@@ -91,14 +91,18 @@ FOUND_MOVING: Final = (
 
 def search(rules: Rules = table, most: int = 3_000_000) -> Found:
     """Search the reachable worlds, breadth first; stop at the first one that must not occur."""
-    rules = cache(rules)
+
+    @cache
+    def allowed(state: State, motion: Motion) -> tuple[str, ...]:
+        return tuple(word for word in SAID if rules(state, word, motion))
+
     row = [World(server) for server in FOUND_MOVING]
     came: dict[World, tuple[World, str] | None] = dict.fromkeys(row)
     count = 0
     while row:
         following = []
         for world in row:
-            for what, after in model.steps(world, rules):
+            for what, after in model.steps(world, allowed):
                 count += 1
                 if after in came:
                     continue

@@ -39,14 +39,14 @@ def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_secon
         bench = on(NetworkFaults(delay_s=0.3), firmware, seed)
         bench.command(vx, 0.0, 5.0)
         began_m = bench.truth.x_m
-        bench.command(vx, 0.0, 5.0)
+        bench.command(vx, 0.0, 3.0)
         assert texts(bench) == []
-        slow += abs(bench.truth.x_m - began_m - 5.0 * vx) > 0.12 * abs(5.0 * vx)
+        slow += abs(bench.truth.x_m - began_m - 3.0 * vx) > 0.12 * abs(3.0 * vx)
     assert slow <= 1
 
 
 @pytest.mark.parametrize("firmware", EVERY_FIRMWARE)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
     seed: int, firmware: Firmware
 ) -> None:
@@ -171,7 +171,7 @@ def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
     The measured speeds show which of both was lost. So the turn rate is soon as commanded.
     """
     bench = on(NetworkFaults(), firmware)
-    bench.command(0.2, 0.4, 4.0)
+    bench.command(0.2, 0.4, 3.0)
     way = bench.robot.network[0]
     lost: list[bytes] = []
 

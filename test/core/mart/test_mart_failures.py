@@ -218,16 +218,16 @@ def test_a_stuck_motor_is_not_a_motion_that_goes_on(
     if driving:
         bench.command(0.3, 0.1, 3.0)
     bench.server.chassis.change(stuck=stuck)
-    bench.command(0.3, 0.1, 6.0)
+    bench.command(0.3, 0.1, 5.0)
     assert bench.server.chassis.right == bench.server.chassis.left == 128
     assert any("check" in notice or "stuck" in notice for notice in bench.notices)
     stood = bench.truth
-    bench.command(0.3, 0.1, 4.0)
+    bench.command(0.3, 0.1, 2.0)
     assert bench.truth == stood
     assert nees(bench) < 16.0
     bench.server.chassis.change(stuck="none")
     bench.command(0.0, 0.0, 1.0)
-    bench.command(0.3, 0.1, 3.0)
+    bench.command(0.3, 0.1, 2.0)
     assert not bench.robot.stands
 
 

@@ -46,7 +46,7 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
 
     The driver does not report that the robot stands still, or that the IMU is dead.
     """
-    for seed in range(4):
+    for seed in range(3):
         bench = MartBench(firmware, NetworkFaults(lose=0.03), seed=seed, motor_lag_s=0.1).ready()
         for _ in range(6):
             bench.command(0.3, 0.1, 1.2)
@@ -85,9 +85,11 @@ def test_a_goal_that_is_replaced_while_a_heavy_robot_moves_is_reached(firmware: 
     The robot reaches the last goal.
     """
     bench = MartBench(firmware, motor_lag_s=HEAVY_S).ready()
-    for goal, seconds in (((2.0, 0.0, 0.0), 3.0), ((0.5, -1.0, 0.0), 2.0), ((0.0, 0.0, 0.0), 60.0)):
+    for goal, seconds in (((2.0, 0.0, 0.0), 3.0), ((0.5, -1.0, 0.0), 2.0), ((0.0, 0.0, 0.0), 0.5)):
         bench.go_to(*goal)
         bench.run(seconds)
+    bench.run_until(lambda: bench.board._pilot.goal_progress.startswith("over"), 60.0)
+    bench.run(2.0)
     assert math.hypot(bench.truth.x_m, bench.truth.y_m) < 0.1
     assert len(bench.notices) == 1
 
@@ -162,10 +164,10 @@ def test_a_heavy_robot_that_coasts_after_a_stop_does_not_look_like_a_stray_one(
     bench = MartBench(firmware, motor_lag_s=0.25).ready()
     for twist in ((0.5, 0.0), (-0.3, 0.0), (0.3, 0.4), (0.0, 0.9)):
         for latched in (False, True):
-            bench.command(*twist, 2.5)
+            bench.command(*twist, 2.0)
             if latched:
                 bench.estop(True)
-            bench.run(3.0)
+            bench.run(2.5)
             bench.estop(False)
             bench.run(0.5)
     assert not any("robot moves" in notice for notice in bench.notices), bench.notices

@@ -43,18 +43,18 @@ def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
     covariance covers the error of the odometry.
     """
     discarded = 0
-    for seed in range(6):
+    for seed in range(4):
         bench, random = (
             on(NetworkFaults(lose=0.1, delay_s=0.05), EVERY_FIRMWARE[seed % 3], seed),
             Random(seed),
         )
-        for _ in range(4):
+        for _ in range(3):
             goal = random_goal(random)
             discarded += "discarded" in reach(bench, goal)
             covariance = bench.odometry[-1].covariance
             assert bench.error.way_m < 0.1 + 2 * (covariance.xx + covariance.yy) ** 0.5
             assert yaw_error(bench) < 0.2 + 2 * covariance.yaw_yaw**0.5
-    assert discarded <= 2
+    assert discarded <= 1
 
 
 def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:

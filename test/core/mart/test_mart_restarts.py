@@ -72,29 +72,34 @@ def test_a_server_that_has_stood_still_for_five_seconds_is_driven_again(offset_s
     assert not bench.robot.stands
 
 
-@pytest.mark.parametrize("wanted", [(0.0, 0.0), (0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)])
 @pytest.mark.parametrize(
-    ("boot_s", "offsets_s"), [(0.3, (0.0, 0.46)), (1.0, (0.23, 0.71)), (4.0, (0.0, 0.46))]
+    ("wanted", "boot_s", "offset_s"),
+    [
+        (wanted, boot_s, offsets_s[(n + m) % 2])
+        for n, wanted in enumerate(((0.0, 0.0), (0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)))
+        for m, (boot_s, offsets_s) in enumerate(
+            ((0.3, (0.0, 0.46)), (1.0, (0.23, 0.71)), (4.0, (0.0, 0.46)))
+        )
+    ],
 )
 def test_a_server_that_starts_up_gets_neither_voltage_queries_nor_motions(
-    wanted: tuple[float, float], boot_s: float, offsets_s: tuple[float, ...]
+    wanted: tuple[float, float], boot_s: float, offset_s: float
 ) -> None:
     """The server restarts during a motion, and the motors still run.
 
     Until the server has started up, the driver sends no voltage queries and no motions. They would
     crash the server.
     """
-    for offset_s in offsets_s:
-        bench = MartBench().ready()
-        bench.command(*wanted, 2.0 + offset_s)
-        bench.server.restart(boot_s)
-        bench.command(*wanted, 1.5)
-        bench.command(0.0, 0.0, boot_s + 5.0)
-        assert not bench.server.crashed, (offset_s, bench.server.crashed)
-        assert bench.robot.stands
-        assert bench.session.state == "nominal"
-        bench.command(*(wanted if any(wanted) else (0.3, 0.0)), 3.0)
-        assert not bench.robot.stands
+    bench = MartBench().ready()
+    bench.command(*wanted, 2.0 + offset_s)
+    bench.server.restart(boot_s)
+    bench.command(*wanted, 1.5)
+    bench.command(0.0, 0.0, boot_s + 5.0)
+    assert not bench.server.crashed
+    assert bench.robot.stands
+    assert bench.session.state == "nominal"
+    bench.command(*(wanted if any(wanted) else (0.3, 0.0)), 3.0)
+    assert not bench.robot.stands
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -128,9 +133,14 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
     assert not bench.robot.stands
 
 
-@pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.parametrize(("x_m", "y_m"), [(3.0, 0.0), (0.0, 3.0)])
-@pytest.mark.parametrize("boot_s", [0.3, 3.0])
+@pytest.mark.parametrize(
+    ("boot_s", "x_m", "y_m", "firmware"),
+    [
+        (boot_s, *(((3.0, 0.0), (0.0, 3.0))[(n + m) % 2]), firmware)
+        for n, boot_s in enumerate((0.3, 3.0))
+        for m, firmware in enumerate(FIRMWARES)
+    ],
+)
 def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
     boot_s: float, x_m: float, y_m: float, firmware: Firmware
 ) -> None:
@@ -146,7 +156,7 @@ def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_m
     assert not bench.robot.stands
     bench.run(boot_s)
     assert bench.until_it_stands() < 5.0
-    bench.run(8.0)
+    bench.run(5.0)
     assert bench.robot.stands
     assert not bench.server.crashed
     assert any("knows of no motion" in notice for notice in bench.notices)
@@ -228,17 +238,23 @@ def test_odometry_goes_on_if_the_server_is_restarted_while_the_robot_drives(
     only once.
     """
     bench = MartBench(firmware).ready()
-    bench.command(*motion, 5.0)
+    bench.command(*motion, 3.0)
     bench.server.restart(boot_s)
     bench.command(*motion, 1.0)
-    bench.run(8.0)
+    bench.run(5.0)
     assert bench.robot.stands
     assert bench.error.way_m < 0.1
     assert abs(bench.error.yaw_rad) < 0.25
 
 
-@pytest.mark.parametrize("firmware", FIRMWARES)
-@pytest.mark.parametrize("motion", [(0.2, 0.0), (0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)])
+@pytest.mark.parametrize(
+    ("motion", "firmware"),
+    [
+        (motion, FIRMWARES[(n + m) % 3])
+        for n, motion in enumerate(((0.2, 0.0), (0.3, 0.2), (-0.2, 0.0), (0.0, 0.5)))
+        for m in range(2)
+    ],
+)
 def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
     motion: tuple[float, float], firmware: Firmware
 ) -> None:
@@ -247,11 +263,11 @@ def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
     The driver does not take this for a drive back to the start, so the pose does not jump.
     """
     bench = MartBench(firmware).ready()
-    bench.command(*motion, 5.0)
+    bench.command(*motion, 4.0)
     known = len(bench.odometry) - 1
     bench.robot.board.reboot()
     bench.command(*motion, 1.0)
-    bench.run(8.0)
+    bench.run(5.0)
     assert bench.robot.stands
     poses = [estimate.pose for estimate in bench.odometry[known:]]
     assert max(one.way_to(other).way_m for one, other in pairwise(poses)) < 0.25
@@ -264,7 +280,7 @@ def test_odometry_goes_on_if_the_controller_is_switched_off_and_on_in_a_drive(
     ("boot_s", "motion", "firmware"),
     [
         (boot_s, motion, FIRMWARES[(n + m) % 3])
-        for n, boot_s in enumerate((0.05, 1.0, 2.0, 4.0))
+        for n, boot_s in enumerate((0.05, 1.0, 4.0))
         for m, motion in enumerate(((0.3, 0.2), (-0.2, 0.2)))
     ],
 )
@@ -280,7 +296,7 @@ def test_the_covariance_includes_the_unknown_turn_after_a_restart_in_a_curve(
     bench.command(*motion, 5.0)
     bench.server.restart(boot_s)
     bench.command(*motion, 1.0)
-    bench.run(8.0)
+    bench.run(boot_s + 4.0)
     error, noise = bench.error, bench.odometry[-1].covariance
     assert abs(error.yaw_rad) < math.sqrt(noise.yaw_yaw)
     assert error.way_m < 2.0 * math.sqrt(max(noise.xx, noise.yy))

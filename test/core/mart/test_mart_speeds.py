@@ -61,7 +61,7 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
         "source", volts=22.0, motor_inequality=0.05, dead_zone_units=dead_units
     ).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.12, 0.5), (0.11, -0.5), (0.1, 0.45), (-0.2, 0.2)):
-        speed, rate = driven(bench, vx, yaw_rate, samples=40)
+        speed, rate = driven(bench, vx, yaw_rate, samples=20)
         assert speed == pytest.approx(vx, rel=0.05), (vx, yaw_rate)
         assert rate == pytest.approx(yaw_rate, rel=0.05, abs=0.015), (vx, yaw_rate)
     assert bench.notices == []

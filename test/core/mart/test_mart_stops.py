@@ -52,10 +52,10 @@ def test_a_stop_in_the_middle_of_a_start_leaves_the_robot_standing(
         bench.try_command(vx, yaw_rate)
         bench.run(after_s)
         bench.estop(True)
-        bench.run(2.5)
+        bench.run(1.5)
         assert bench.robot.stands
         way_m = bench.server.chassis.way_m
-        bench.run(2.0)
+        bench.run(1.0)
         assert bench.server.chassis.way_m == way_m
         bench.estop(False)
         bench.run(0.5)
@@ -235,7 +235,7 @@ def test_on_a_good_network_the_next_motion_begins_within_one_and_a_half_seconds(
         facts = bench.robot.board.facts
         assert facts["yaw_rate_radps"] == pytest.approx(yaw_rate, abs=0.1), (vx, yaw_rate)
         assert facts["speed_mps"] == pytest.approx(vx, abs=0.05), (vx, yaw_rate)
-        bench.command(vx, yaw_rate, 2.0)
+        bench.command(vx, yaw_rate, 1.0)
     assert bench.notices == []
 
 

@@ -162,7 +162,7 @@ def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -
             go(bench, Pose(*goal))
     before = downloads(bench)
     assert 4 < before <= MOST
-    for goal in GOALS:
+    for goal in GOALS[:2]:
         go(bench, Pose(*goal))
         assert bench.truth.way_to(Pose(*goal)).way_m < 0.15
     assert downloads(bench) == before
