@@ -235,17 +235,20 @@ class AnyBench:
 
         The session is called only when it has something to do, as by the driver's threads.
         """
+        wake_s = self.session.wake_at
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S
             packets = self.robot.advance()
-            for channel, data in packets:
-                if self.speaks:
+            if packets and self.speaks:
+                for channel, data in packets:
                     self.session.inbound.receive(data, self.now, channel)
-            wakes = self.now >= self.session.wake_at
+                wake_s = self.session.wake_at
+            wakes = self.now >= wake_s
             if wakes:
                 self.session.tick(self.now)
             if packets or wakes:
                 self.settle()
+                wake_s = self.session.wake_at
 
     def stall(self, seconds: float) -> None:
         """Simulate a stall of the process: data waits for ``seconds`` and is then read together."""

@@ -32,7 +32,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
     bench.run(ENDS_S)
     assert bench.robot.stands
     before = bench.robot.way_m
-    bench.run(3.0)
+    bench.run(2.0)
     assert bench.robot.way_m == before
 
 
@@ -51,7 +51,7 @@ def test_a_command_moves_the_robot_and_odometry_tells_how_far(bench: AnyBench) -
     Odometry has the true distance within 2 cm.
     """
     bench.drive_on(0.3, 4.0)
-    bench.run(3.0)
+    bench.run(1.5)
     assert bench.robot.stands
     late_s = getattr(bench.robot, "late_s", 0.0)
     assert bench.robot.way_m == pytest.approx(0.3 * (4.0 - late_s), rel=0.2)
