@@ -221,15 +221,16 @@ class Rig:
 
     def run(self, seconds: float) -> None:
         """Run the board for ``seconds``. The driver writes what is due and reads what arrives."""
+        place = self.place
         for _ in range(round(seconds / self.board.tick_s)):
             if self.now >= self.driver.wake_at:
                 self.say(self.driver.due(self.now))
-            before = self.place
             self._unread += self._arrived(self.board.step())
             found = self._read()
-            way = before.way_to(place := self.place)
-            self.way_m += way.way_m
-            self.turned_rad += abs(way.yaw_rad)
+            if (before := place) != (place := self.place):
+                way = before.way_to(place)
+                self.way_m += way.way_m
+                self.turned_rad += abs(way.yaw_rad)
             self.readings += found
             for reading in found:
                 if isinstance(reading, FusedOdometry):

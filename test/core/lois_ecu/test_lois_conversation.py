@@ -105,10 +105,11 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
         rig.board.receive(encode_command(SetTerminalMode(before)))
         rig.board.step()
     rig.driver = LoisConversation(LoisEcuSettings())
-    for _ in range(120):
+    while not rig.driver.confirmed:
         rig.run(0.1)
+        assert rig.now < 14.5
+    rig.run(0.5)
     assert rig.driver.mode is Mode.NOMINAL
-    assert rig.driver.confirmed
     assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
 
 
@@ -119,13 +120,14 @@ def test_a_board_without_checksum_is_driven_without() -> None:
     This command also overwrites the left wheel's "short correction". The driver restores the value.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
-    for _ in range(140):
+    while not rig.driver.confirmed:
         rig.run(0.1)
-    assert rig.driver.confirmed
+        assert rig.now < 14.5
+    rig.run(0.5)
     assert rig.board.terminal_mode == 4
     assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
     rig.order(20, 20, 4.0)
-    assert rig.board.truth.speed_mps > 0.2
+    assert rig.board.truth.speed_mps > 0.15
 
 
 @pytest.mark.slow
@@ -213,8 +215,8 @@ def test_a_record_is_made_whole(firmware: Firmware, kind: RecordKind) -> None:
     The unit of the times in the record depends on the kind of firmware.
     """
     rig = Rig(nominal(firmware))
-    rig.run(5.0)
-    rig.order(20, 20, 3.0)
+    rig.run(4.0)
+    rig.order(20, 20, 1.5)
     rig.driver.record(kind, 21)
     found: list[RecordReading] = []
     while not found:

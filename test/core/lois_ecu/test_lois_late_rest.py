@@ -39,7 +39,7 @@ def test_a_group_whose_rest_is_read_late_is_not_lost(firmware: bool, pause_s: fl
 
     No report is lost.
     """
-    said = reports(4.0, firmware=firmware)
+    said = reports(1.6, firmware=firmware)
     bursts = [
         (at, b"".join(encode_report(report) for _, report in group))
         for at, group in itertools.groupby(said, key=lambda one: one[0])

@@ -64,7 +64,7 @@ def test_the_motion_monitor_names_this_boards_parameters() -> None:
 
 @pytest.mark.slow
 @FIRMWARE
-@pytest.mark.parametrize("seconds", [6.0, 1.2])
+@pytest.mark.parametrize("seconds", [3.0, 1.2])
 def test_a_reset_is_proved_by_counters_that_leap_to_zero(firmware: str, seconds: float) -> None:
     """The user resets the board after a drive. The tick counters jump to zero.
 
@@ -125,8 +125,8 @@ def test_a_reset_is_not_proved_by_the_counters_of_the_reset_before(firmware: str
     Zero counters do not prove the second reset.
     """
     bench = Bench(firmware)
-    bench.drive_on(0.2, 6.0)
-    bench.run(3.0)
+    bench.drive_on(0.2, 3.0)
+    bench.run(2.0)
     assert bench.reset().message == "the board was reset"
     bench.run(3.0)
     bench.hears = False
@@ -188,7 +188,7 @@ def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", range(1, 13))
+@pytest.mark.parametrize("count", [1, 2, 5, 8, 11, 12])
 def test_every_setting_arrives_however_many_there_are(count: int) -> None:
     """Whenever the board sends a report, it receives nothing for a moment.
 

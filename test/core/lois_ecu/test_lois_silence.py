@@ -27,9 +27,9 @@ def lost_line(firmware: str, vx: float, seconds: float, *, reopened: bool) -> An
     bench.speaks = bench.hears = True
     if reopened:
         bench.open()
-    bench.run(4.0)
-    bench.drive_on(vx, 3.0)
     bench.run(3.0)
+    bench.drive_on(vx, 2.0)
+    bench.run(1.5)
     return bench
 
 
