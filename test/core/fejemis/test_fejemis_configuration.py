@@ -55,7 +55,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         if restarts:
             bench.robot.drive.reboot()
             bench.robot.front.reboot()
-            bench.run(5.0)
+            bench.run(3.5)
         drive, front = bench.robot.drive.config, bench.robot.front.config
         assert drive.radii_m == (0.08, 0.081)
         assert (drive.gear, drive.ticks, drive.wheel_base_m) == (20.0, 48.0, 0.41)
@@ -65,7 +65,7 @@ def test_what_the_user_set_is_written_read_back_and_written_again_after_a_restar
         assert front.steering[:2] == (1.0, 40.0)
         assert bench.board.geometry.track_m == 0.41
         mark = bench.now
-        bench.run(3.0)
+        bench.run(2.0)
         written = {setting.command for setting in Written}
         assert not written & {text.split()[0] for text in bench.lines(FRONT, mark)}
         assert bench.board.advice is None

@@ -283,7 +283,7 @@ def test_no_pair_has_lines_of_two_samples(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("silence_s", [0.3, 3.0])
+@pytest.mark.parametrize("silence_s", [0.3, 2.0])
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """The drive board is silent. It speaks again before or after a pose.
 
@@ -291,7 +291,7 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
     """
     for phase_s in (0.0, 0.005, 0.01, 0.015):
         bench = nominal()
-        bench.run(1.0)
+        bench.run(0.5)
         bench.speaks.discard(DRIVE)
         bench.run(silence_s + phase_s)
         bench.speaks.add(DRIVE)

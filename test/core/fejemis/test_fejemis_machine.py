@@ -122,7 +122,7 @@ def test_brush_and_lift_end_and_do_not_come_back(ends: Callable[[Bench], object]
     bench.close()
     bench.open()
     bench.estop(False)
-    bench.run(2.0)
+    bench.run(1.5)
     assert not bench.robot.vehicle.brush
     assert not bench.board._upkeep.machine.active
 

@@ -202,7 +202,7 @@ def normalised(pose: Pose, truth: Pose, c: Covariance) -> float:
     return sum(a * b for a, b in zip(e, solved, strict=True))
 
 
-def figure_eight(bench: Bench, speed: float = 0.4, radius_m: float = 0.8) -> None:
+def figure_eight(bench: Bench, speed: float = 0.8, radius_m: float = 0.8) -> None:
     """Drive a figure eight of ten metres. A refused command does not end the drive."""
     rate = speed / radius_m
     lap_s = math.tau / rate

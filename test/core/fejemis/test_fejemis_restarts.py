@@ -142,7 +142,7 @@ def test_a_front_board_that_restarts_is_not_driven_before_it_is_configured(
         Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
         FejemisSettings(written=FRONT_OFFSET),
     )
-    bench.run(3.0)
+    bench.run(2.0)
     bench.read_s = 0.05 if read_s == 0.1 else read_s  # an angle of 60 ms is too old to drive
     refusals = drive_through_a_restart(bench, "front")
     if not says_start:

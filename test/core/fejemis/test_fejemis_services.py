@@ -93,7 +93,7 @@ def test_a_calibration_that_changes_nothing_fails(job: Job, word: str) -> None:
 def test_a_board_that_does_not_hear_gets_no_loaded_configuration(channel: int) -> None:
     """One board receives nothing, but sends its data. Loading fails, and is answered in time."""
     bench = nominal()
-    bench.run(3.0)
+    bench.run(1.5)
     bench.hears.discard(channel)
     done = ask(bench, Job.LOAD, 5.0)
     assert not done.success
@@ -118,7 +118,7 @@ def test_a_front_board_that_does_not_know_the_request_has_heard_the_loading() ->
 def test_boards_that_fall_silent_do_not_delay_an_answer(job: Job) -> None:
     """Both boards fall silent after the request. It fails within 5 s."""
     bench = nominal()
-    bench.run(3.0)
+    bench.run(1.5)
     bench.speaks.clear()
     assert not ask(bench, job, 5.0).success
 
@@ -279,7 +279,7 @@ def test_settings_are_written_again_to_both_boards_if_one_restarts_during_a_load
     bench.run(0.2)
     assert bench.robot.drive.config.radii_m != wheels[:2]
     bench.robot.front.reboot()
-    bench.run(6.0)
+    bench.run(4.0)
     assert bench.robot.drive.config.radii_m == wheels[:2]
 
 

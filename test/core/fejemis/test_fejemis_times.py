@@ -143,7 +143,7 @@ def test_damaged_times_ahead_of_the_clock_do_not_move_it() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_rare_reads_lose_no_odometry(seed: int) -> None:
     """The driver reads each port only every 50 ms, so each read brings two or three poses.
 
@@ -330,10 +330,10 @@ def test_late_reads_do_not_mix_the_lines_of_two_samples(kept: str) -> None:
         return b"".join(line * (times if chance.random() < 0.01 else 1) for line in lines)
 
     bench.read_s, bench.carry = 0.1, carry
-    bench.run(6.0)
+    bench.run(4.0)
     cycles = cycles_of(bench)
     assert all(gyro == force for gyro, force in cycles)
-    assert len(cycles) > (565 if kept == "lost" else 580)
+    assert len(cycles) > (370 if kept == "lost" else 380)
 
 
 @pytest.mark.slow
@@ -365,7 +365,7 @@ def test_a_sample_whose_lines_come_in_pieces_is_published(pause_s: float) -> Non
     bench.carry = carry
     bench.run(1.0)
     bench.events.clear()
-    bench.run(5.0)
+    bench.run(3.0)
     cycles = cycles_of(bench)
     assert all(gyro == force for gyro, force in cycles)
     numbers = [round(gyro * 1000) for gyro, _ in cycles]
