@@ -126,8 +126,9 @@ def test_a_board_without_checksum_is_driven_without() -> None:
     rig.run(0.5)
     assert rig.board.terminal_mode == 4
     assert rig.board.wheels[0].short_correction == pytest.approx(1.0761719)
+    before_m = rig.way_m
     rig.order(20, 20, 4.0)
-    assert rig.board.truth.speed_mps > 0.15
+    assert rig.way_m - before_m > 0.7
 
 
 @pytest.mark.slow
