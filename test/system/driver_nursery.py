@@ -24,7 +24,7 @@ from typing import NoReturn
 LARGEST_REQUEST = 1 << 17
 """Largest size of a request, in bytes.
 
-A request has the arguments and the environment of a driver.
+A request has the arguments and the environment of a driver, and code that runs before it.
 """
 
 
@@ -74,9 +74,14 @@ class Nursery:
         self._control: socket.socket | None = None
         self._lock = threading.Lock()
 
-    def start(self, arguments: Sequence[str], environment: Mapping[str, str]) -> Forked:
-        """Fork a driver with these arguments and this environment."""
-        request = json.dumps([list(arguments), dict(environment)]).encode()
+    def start(
+        self, arguments: Sequence[str], environment: Mapping[str, str], before: str = ""
+    ) -> Forked:
+        """Fork a driver with these arguments and this environment.
+
+        ``before``: Python code that runs in the forked process before the driver.
+        """
+        request = json.dumps([list(arguments), dict(environment), before]).encode()
         output, driver_output = os.pipe()
         status, driver_status = os.pipe()
         with self._lock:
@@ -162,7 +167,7 @@ def reap(statuses: dict[int, int]) -> None:
         os.close(descriptor)
 
 
-def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoReturn:
+def drive(arguments: list[str], environment: dict[str, str], before: str, output: int) -> NoReturn:
     """Run the driver in this forked process. End without the exit handlers of libraries.
 
     The handler of LTTng would try to stop a thread that does not exist in a forked process.
@@ -180,6 +185,7 @@ def drive(arguments: list[str], environment: dict[str, str], output: int) -> NoR
     sys.argv = [driver.__file__, *arguments]
     code = 1
     try:
+        exec(before, {"__name__": "before"})
         code = driver.main()
         for thread in threading.enumerate():
             if not thread.daemon and thread is not threading.main_thread():

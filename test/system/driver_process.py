@@ -31,8 +31,9 @@ _nursery = Nursery()
 class Driver:
     """The driver as a separate process in a namespace, by default an unused one.
 
-    ``before``: Python code that runs before the driver, in a new interpreter. Without such code,
-    the driver is forked from a process that has already imported it.
+    It is forked from a process that has already imported the driver.
+    ``before``: Python code that runs before the driver, in its process.
+    ``interpreter``: whether the driver runs in a new interpreter, which also runs exit handlers.
     ``more``: further ROS arguments.
     """
 
@@ -41,6 +42,7 @@ class Driver:
         *,
         port: str | None,
         before: str = "",
+        interpreter: bool = False,
         namespace: str = "",
         more: Sequence[str] = (),
         **parameters: object,
@@ -52,7 +54,7 @@ class Driver:
             arguments += ["-p", f"{name}:={value}"]
         environment = {**os.environ, "PYTHONUNBUFFERED": "1", "RCUTILS_LOGGING_USE_STDOUT": "1"}
         self.process: Any
-        if before:
+        if interpreter:
             main = "import sys, omnibot_driver.driver as driver; sys.exit(driver.main())"
             self.process = subprocess.Popen(
                 [sys.executable, "-c", f"{before}\n{main}", *arguments],
@@ -62,7 +64,7 @@ class Driver:
                 env=environment,
             )
         else:
-            self.process = _nursery.start(arguments, environment)
+            self.process = _nursery.start(arguments, environment, before)
         self.lines: list[str] = []
         self.answers: dict[str, Callable[[], None]] = {}
         """For each text, a function that is called for every line of output with this text."""

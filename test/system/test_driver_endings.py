@@ -104,7 +104,8 @@ def test_the_executor_is_shut_down_before_python_ends(start_driver: Start) -> No
 
     If this were left to the exit of Python, rclpy might print an error.
     """
-    driver: Driver = start_driver("sim://", before=PATIENT + REPORTS_EXECUTORS)
+    before = PATIENT + REPORTS_EXECUTORS
+    driver: Driver = start_driver("sim://", before=before, interpreter=True)
     driver.wait_for_line("state: nominal")
     assert driver.end(signal.SIGTERM) == 0
     assert "left running: 0\n" in driver.output

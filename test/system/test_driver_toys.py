@@ -54,11 +54,11 @@ class Toy:
         assert self.served.wait_for(predicate, PATIENCE_S), self.served.board.heard[-20:]
 
     def comes_to_a_stand(self) -> None:
-        """Wait until the robot has been at rest for 1.5 s.
+        """Wait until the robot has been at rest for 0.8 s.
 
         The rests between two moves of a drive are shorter.
         """
-        ways: deque[float] = deque(maxlen=150)
+        ways: deque[float] = deque(maxlen=80)
 
         def stood(robot: Any) -> bool:
             ways.append(robot.way_m)
