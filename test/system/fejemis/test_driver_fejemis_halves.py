@@ -30,11 +30,12 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 
     The driver stops the unplugged Teensy when it is plugged in again.
     """
+    said = len(driver.lines)
     assert probe.call(SetBool, "brush", data=True).success
     with driven(probe, robot):
         robot.unplug(channel)
         probe.wait_for_state("connecting")
-        driver.wait_for_line(rf"lost.*{name}|{name}.*(lost|missing|no data)")
+        driver.wait_for_line(rf"lost.*{name}|{name}.*(lost|missing|no data)", said)
         if channel == FRONT:
             robot.stands_for_good()
         else:
@@ -57,11 +58,12 @@ def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
 
     When both work again, the robot obeys new commands.
     """
+    said = len(driver.lines)
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))
         if what != "restart":
             probe.wait_for_state("connecting")
-            driver.wait_for_line(name)
+            driver.wait_for_line(name, said)
             robot.stands_for_good()
     robot.do(lambda board: board.befall(name, "well"))
     robot.stands_for_good()
@@ -77,10 +79,11 @@ def test_a_broken_angle_sensor_stops_the_robot(
 
     The log says that the angle sensor is faulty.
     """
+    said = len(driver.lines)
     with driven(probe, robot):
         robot.do(lambda board: board.befall("front", what))
         robot.stands_for_good()
-    driver.wait_for_line("angle sensor")
+    driver.wait_for_line("angle sensor", said)
     robot.do(lambda board: board.befall("front", "sensor-well"))
     moves_again(probe, robot)
 

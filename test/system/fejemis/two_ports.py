@@ -12,18 +12,19 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Final, Self
 
+from batches import InBatches
+
 from omnibot_driver.simulator.common.board import Packet
-from omnibot_driver.simulator.common.running import RunningBoard
 from omnibot_driver.simulator.common.terminal import Terminal
 from omnibot_driver.simulator.fejemis import CHANNELS, SimulatedFejemis
 
 PATIENCE_S: Final = 30.0
-STANDS_TICKS: Final = 750
-"""1.5 s as a number of the simulated boards' ticks."""
+STANDS_TICKS: Final = 400
+"""0.8 s as a number of the simulated boards' ticks."""
 DRIVE, FRONT = 0, 1
 
 
-class TwoPorts(RunningBoard[SimulatedFejemis]):
+class TwoPorts(InBatches[SimulatedFejemis]):
     """A simulated Fejemis on two pseudo-terminals.
 
     ``ports``: paths of symbolic links to the terminals, as udev makes them.
@@ -86,7 +87,10 @@ class TwoPorts(RunningBoard[SimulatedFejemis]):
         return [[obeyed.text for obeyed in list(half.commands)[-12:]] for half in halves]
 
     def stands_for_good(self) -> None:
-        """Wait until both driving wheels have been at rest for 1.5 s."""
+        """Wait until both driving wheels have been at rest for 0.8 s.
+
+        This is longer than a command lasts.
+        """
         since: list[int] = []
 
         def stood(board: SimulatedFejemis) -> bool:

@@ -37,7 +37,10 @@ class Ecu:
             return action(self.served.board)
 
     def stands_for_good(self) -> None:
-        """Wait until the robot has been at rest for 1.5 s."""
+        """Wait until the robot has been at rest for 0.8 s.
+
+        This is longer than a command lasts.
+        """
         since: list[int] = []
 
         def stood(board: SimulatedLois) -> bool:
@@ -45,7 +48,7 @@ class Ecu:
                 since.clear()
                 return False
             since.append(board.tick)
-            return since[-1] - since[0] >= 150
+            return since[-1] - since[0] >= 80
 
         self.wait_for(stood)
 

@@ -44,13 +44,18 @@ With these gains, the wheel speeds do not oscillate.
 """
 
 
+New = tuple[Ecu, Driver, Probe]
+
+
+@pytest.mark.parametrize("firmware", QUIRKS)
 def test_it_drives_and_odometry_tells_how_far(
-    ecu: Ecu, start_driver: Start, probe_of: Start
+    firmware: str, stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> None:
     """The robot drives 1 m and stops when the commands end. Odometry is within 4 cm of the truth.
 
     The driver sets other controller gains, because the robot would swerve with the board's own.
     """
+    ecu = ecu_of(firmware, stack)
     probe: Probe = probe_of(start_driver(ecu.path, board="lois_ecu", **GAINS))
     probe.wait_for_state("nominal")
     ecu.wait_for(lambda board: board.wheels[1].controller.gains.kp == pytest.approx(0.470583))
@@ -84,14 +89,21 @@ def test_the_estop_stops_it_until_it_is_released(ecu: Ecu, probe: Probe) -> None
         ecu.wait_for(lambda board: not board.standing)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGSTOP])
-def test_whatever_ends_the_driver_stops_it(
-    ecu: Ecu, driver: Driver, probe: Probe, number: signal.Signals
-) -> None:
+@pytest.mark.parametrize(
+    ("firmware", "number"),
+    [
+        ("documented", signal.SIGINT),
+        ("documented", signal.SIGSTOP),
+        ("firmware", signal.SIGINT),
+        ("firmware", signal.SIGKILL),
+    ],
+)
+def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> None:
     """A signal ends or suspends the driver during a drive.
 
     The driver or its guard process stops the robot.
     """
+    ecu, driver, probe = new
     with driven(probe, ecu):
         driver.process.send_signal(number)
         ecu.stands_for_good()
@@ -122,13 +134,15 @@ def test_the_button_latches_the_drivers_estop_and_its_release_moves_nothing(
         ecu.wait_for(lambda board: not board.standing)
 
 
+@pytest.mark.parametrize("firmware", QUIRKS)
 def test_a_restart_of_the_board_discards_the_command_and_the_settings_come_back(
-    ecu: Ecu, probe: Probe
+    new: New,
 ) -> None:
     """The board restarts after a drive. The driver writes the low-pass setting again.
 
     The pose in odom continues from its value before the restart.
     """
+    ecu, _driver, probe = new
     odometry = probe.listen(Odometry, "odom")
     with driven(probe, ecu):
         probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.4)
@@ -150,14 +164,25 @@ def test_reset_is_confirmed_by_the_ticks(ecu: Ecu, probe: Probe) -> None:
     The board's tick counts become 0, but the pose in odom continues.
     """
     odometry = probe.listen(Odometry, "odom")
+    probe.wait_for(lambda: odometry)
+
+    def way_m() -> float:
+        first, last = (message.pose.pose.position for message in (odometry[0], odometry[-1]))
+        return math.hypot(last.x - first.x, last.y - first.y)
+
     with driven(probe, ecu):
-        probe.wait_for(lambda: odometry and odometry[-1].pose.pose.position.x > 0.6)
+        probe.wait_for(lambda: way_m() > 0.3)
     ecu.stands_for_good()
+    before_m = way_m()
     answer = probe.call(Trigger, "reset")
     assert answer.success, answer.message
     assert ecu.do(lambda board: [wheel.ticks for wheel in board.wheels]) == [0, 0]
     with driven(probe, ecu):
-        probe.wait_for(lambda: odometry[-1].pose.pose.position.x > 0.8)
+        probe.wait_for(lambda: way_m() > before_m + 0.1)
+    assert all(
+        math.hypot(b.x - a.x, b.y - a.y) < 0.1
+        for a, b in pairwise(message.pose.pose.position for message in odometry)
+    )
 
 
 def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, probe: Probe) -> None:
@@ -165,6 +190,7 @@ def test_a_gain_is_written_when_it_is_set_and_again_after_a_restart(ecu: Ecu, pr
 
     Unset gains are not written.
     """
+    ecu.do(lambda board: board.commands.clear())
     client = probe.node.create_client(SetParameters, f"{NODE}/set_parameters")
     assert client.wait_for_service(PATIENCE_S)
     value = ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=0.5)

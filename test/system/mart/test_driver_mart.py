@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import pytest
+from batches import InBatches
 from driver_process import Driver
 from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import Odometry
@@ -26,13 +27,17 @@ from omnibot_driver.simulator.mart import MartSettings, SimulatedMart
 Start = Callable[..., Any]
 PATIENCE_S: Final = 30.0
 SECOND_TICKS: Final = 500
-STANDS_TICKS: Final = 750
-"""1.5 s as a number of the simulated controller's ticks. ``SECOND_TICKS`` are its ticks in 1 s."""
+STANDS_TICKS: Final = 400
+"""0.8 s as a number of the simulated controller's ticks. ``SECOND_TICKS`` are its ticks in 1 s."""
 MOTIONS: Final = {
     "RM": (0.3, 0.2),
     "B": (-0.2, 0.0),
     "L": (0.0, 0.5),
 }
+
+
+class Served(InBatches[SimulatedMart], ServedBoard[SimulatedMart]):
+    """A simulated MART controller on its UDP ports."""
 
 
 class Mart:
@@ -80,15 +85,34 @@ class Mart:
         return done
 
 
-@pytest.fixture
-def mart(stack: ExitStack) -> Mart:
-    return Mart(stack.enter_context(ServedBoard(SimulatedMart(MartSettings(dock_m=5.0)))))
+def mart_of(stack: ExitStack) -> Mart:
+    return Mart(stack.enter_context(Served(SimulatedMart(MartSettings(dock_m=5.0)))))
+
+
+@pytest.fixture(scope="module")
+def mart(_ros: None) -> Iterator[Mart]:
+    """The controller that all tests use, except those that use ``new``."""
+    with ExitStack() as stack:
+        yield mart_of(stack)
+
+
+@pytest.fixture(scope="module")
+def driver(mart: Mart) -> Iterator[Driver]:
+    with Driver(port=mart.url, board="mart") as driver:
+        yield driver
+
+
+New = tuple[Mart, Driver, Probe]
 
 
 @pytest.fixture
-def driver(mart: Mart, start_driver: Start, tmp_path: Path) -> Driver:
-    started: Driver = start_driver(mart.url, board="mart", record_directory=str(tmp_path))
-    return started
+def new(stack: ExitStack, start_driver: Start, probe_of: Start, tmp_path: Path) -> New:
+    """A controller, its driver and a probe that no other test uses."""
+    mart = mart_of(stack)
+    driver: Driver = start_driver(mart.url, board="mart", record_directory=str(tmp_path))
+    probe: Probe = probe_of(driver)
+    probe.wait_for_state("nominal")
+    return mart, driver, probe
 
 
 @contextmanager
@@ -102,11 +126,12 @@ def driven(probe: Probe, mart: Mart, vx: float, yaw_rate: float) -> Iterator[Non
         yield
 
 
-def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
+def test_it_drives_and_odometry_tells_how_far(new: New) -> None:
     """The robot drives 1 m and stops when the commands end.
 
     The pose in odom is right within 1 cm.
     """
+    mart, _driver, probe = new
     odometry = probe.listen(Odometry, "odom")
     batteries = probe.listen(BatteryState, "battery_state")
     ranges = probe.listen(Range, "range/front")
@@ -124,13 +149,13 @@ def test_it_drives_and_odometry_tells_how_far(mart: Mart, probe: Probe) -> None:
 
 
 def test_a_download_that_cannot_be_saved_ends_with_the_reason(
-    mart: Mart, start_driver: Start, probe_of: Start
+    stack: ExitStack, start_driver: Start, probe_of: Start
 ) -> None:
     """The folder for downloads is in the home directory of an unknown user.
 
     A download fails with a reason, and the driver continues.
     """
-    folder = "~nobody_of_this_name/records"
+    mart, folder = mart_of(stack), "~nobody_of_this_name/records"
     probe: Probe = probe_of(start_driver(mart.url, board="mart", record_directory=folder))
     probe.wait_for_state("nominal")
     for _ in range(2):
@@ -154,16 +179,15 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
         assert probe.call(SetBool, "estop", data=False).success
 
 
-@pytest.mark.parametrize(
-    ("motion", "number"), [("RM", signal.SIGINT), ("RM", signal.SIGKILL), ("L", signal.SIGKILL)]
-)
+@pytest.mark.parametrize(("motion", "number"), [("RM", signal.SIGINT), ("L", signal.SIGKILL)])
 def test_whatever_ends_the_driver_stops_each_motion(
-    mart: Mart, driver: Driver, probe: Probe, motion: str, number: signal.Signals
+    new: New, motion: str, number: signal.Signals
 ) -> None:
     """A signal ends the driver during a motion.
 
     The driver or its guard process sends the stop command for this motion.
     """
+    mart, driver, probe = new
     with driven(probe, mart, *MOTIONS[motion]):
         driver.process.send_signal(number)
         mart.stands_for_good()
@@ -171,12 +195,13 @@ def test_whatever_ends_the_driver_stops_each_motion(
 
 @pytest.mark.parametrize("word", ["RM ", "TF"])
 def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
-    mart: Mart, driver: Driver, probe: Probe, word: str
+    new: New, word: str
 ) -> None:
     """The driver sends a velocity or a controlled move, and is killed before the server replies.
 
     The driver's guard process stops the robot.
     """
+    mart, driver, probe = new
     if word == "TF":
         goal = PoseStamped()
         goal.header.frame_id = "odom"
@@ -194,8 +219,9 @@ def test_a_driver_that_is_killed_before_the_reply_leaves_the_robot_standing(
     mart.stands_for_good()
 
 
-def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe) -> None:
+def test_a_driver_that_hangs_is_guarded(new: New) -> None:
     """The driver is suspended during a drive. Its guard process stops the robot after 0.5 s."""
+    mart, driver, probe = new
     with driven(probe, mart, 0.3, 0.0):
         driver.process.send_signal(signal.SIGSTOP)
         mart.stands_for_good()
@@ -203,12 +229,13 @@ def test_a_driver_that_hangs_is_guarded(mart: Mart, driver: Driver, probe: Probe
     mart.stands_for_good()
 
 
-def test_its_services_answer(mart: Mart, probe: Probe, tmp_path: Path) -> None:
+def test_its_services_answer(new: New, tmp_path: Path) -> None:
     """The services calibrate the gyro, start the log, and download the last move and the log.
 
     A second file of the same name does not replace the first one. The download of the log ends the
     MART server.
     """
+    mart, _driver, probe = new
     with driven(probe, mart, 0.3, 0.0):
         pass
     mart.stands_for_good()

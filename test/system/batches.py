@@ -1,0 +1,22 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""A simulated board whose short ticks pass in batches, so that the computer wakes up less often."""
+
+from typing import Final
+
+from omnibot_driver.simulator.common.running import RunningBoard
+from omnibot_driver.simulator.common.wired import B
+
+BATCH: Final = 5
+
+
+class InBatches(RunningBoard[B]):
+    """Runs ``BATCH`` ticks at once, or the ticks that are due when a packet arrives.
+
+    What the board sends in these ticks arrives together, as through a USB adapter.
+    """
+
+    def _due(self, due_s: float) -> tuple[int, float]:
+        wait_s = (BATCH - 1) * self.board.tick_s
+        ticks, next_s = super()._due(due_s - wait_s)
+        return ticks, next_s + wait_s
