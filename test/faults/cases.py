@@ -248,22 +248,28 @@ def service_discards_the_command(service: str, rig: Rig) -> None:
     rig.probe.wait_for_state("nominal")
 
 
-def random_lines(seed: int) -> dict[str, Case[Rig]]:
+def random_lines(seed: int, at_most_s: float) -> dict[str, Case[Rig]]:
     """Return the cases that damage bytes at random. The keys are the names of the cases.
 
     ``seed``: selects the damage.
+
+    ``at_most_s``: longest time for which the robot drives on a damaged line.
     """
     random = Random(f"lines {seed}")
     return {
         "1 byte in 100 lost, both ways": partial(
-            damaged, losing(1e-2, random), losing(1e-2, random), 5.0
+            damaged, losing(1e-2, random), losing(1e-2, random), min(5.0, at_most_s)
         ),
-        "1 byte in 1,000 added, from the board": partial(damaged, None, gaining(1e-3, random), 5.0),
+        "1 byte in 1,000 added, from the board": partial(
+            damaged, None, gaining(1e-3, random), min(5.0, at_most_s)
+        ),
         "bursts of 1 to 200 bytes lost, from the board": partial(
-            damaged, None, losing_bursts(5e-4, random), 5.0
+            damaged, None, losing_bursts(5e-4, random), min(5.0, at_most_s)
         ),
-        "noise instead of the board": partial(damaged, None, noise(random), 2.0),
-        "an adapter that keeps bytes back for 0.3 s": partial(damaged, None, late(30), 3.0),
+        "noise instead of the board": partial(damaged, None, noise(random), min(2.0, at_most_s)),
+        "an adapter that keeps bytes back for 0.3 s": partial(
+            damaged, None, late(30), min(3.0, at_most_s)
+        ),
     }
 
 
@@ -330,6 +336,10 @@ HOST: Final[dict[str, Case[Rig]]] = {
 }
 
 
-def survivable(seed: int) -> dict[str, Case[Rig]]:
-    """Return all cases that a driver must survive. The keys are their names."""
-    return {**COMMANDS, **LINE, **TERMINAL, **random_lines(seed), **SERVICES, **HOST, **UNKIND}
+def survivable(seed: int, damaged_s: float = 5.0) -> dict[str, Case[Rig]]:
+    """Return all cases that a driver must survive. The keys are their names.
+
+    ``damaged_s``: longest time for which the robot drives on a line with random damage.
+    """
+    lines = random_lines(seed, damaged_s)
+    return {**COMMANDS, **LINE, **TERMINAL, **lines, **SERVICES, **HOST, **UNKIND}

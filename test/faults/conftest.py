@@ -20,9 +20,10 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return time limits of the rig, in s, that the tests keep even on a busy machine.
+    """Return times of the rig, in s, for tests that also pass on a busy machine.
 
-    The limits are the grace time for a stop and the time for the driver's end. ``make faults`` uses
-    0.1 s and 2 s.
+    These are the grace time for a stop, the time for the driver's end, and the time of rest after
+    a stop, in which ten commands come from a commander that goes on. ``make faults`` uses 0.1 s,
+    2 s and 1 s.
     """
-    return {"grace_s": 30.0, "ends_within_s": 60.0}
+    return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.5}

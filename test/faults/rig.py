@@ -28,8 +28,7 @@ from std_msgs.msg import Bool, String
 TIMEOUT_S: Final = 0.5
 """The driver's ``cmd_vel_timeout``, in s."""
 GRACE_S: Final = 0.1
-REST_TICKS: Final = round(1.0 / TICK_S)
-"""Number of ticks for which the motors must be off until a robot is regarded as at rest."""
+REST_S: Final = 1.0
 FASTEST_MPS, FASTEST_RADPS = 2.0, 8.0
 DRIVEN_MPS: Final = 0.6
 NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
@@ -76,6 +75,8 @@ class Rig:
 
     ``ends_within_s``: time within which the driver must end.
 
+    ``rest_s``: time for which the motors must be off until the robot is regarded as at rest.
+
     ``parameters``: further parameters of the driver.
     """
 
@@ -86,6 +87,7 @@ class Rig:
         *,
         grace_s: float = GRACE_S,
         ends_within_s: float = ENDS_WITHIN_S,
+        rest_s: float = REST_S,
         before: str = "",
         settings: Any = None,
         **parameters: object,
@@ -93,6 +95,7 @@ class Rig:
         self.kind = kind
         self._grace_s = grace_s + kind.off_within_s
         self._ends_within_s = ends_within_s + kind.ends_later_s
+        self._rest_ticks = round(rest_s / TICK_S)
         self._before, self._parameters = before, {**kind.parameters, **parameters}
         self.line: Any = (kind.line or BreakableLine)(kind, settings)
         self.findings = Findings()
@@ -200,7 +203,7 @@ class Rig:
         assert self.wait_for_board(lambda line: line.board.driven), self.driver.output
 
     def expect_still(self, since_tick: int, what: str, allowed_s: float = TIMEOUT_S) -> None:
-        """Expect the motors to be off soon after ``since_tick``, and to stay off for 1 s.
+        """Expect the motors to be off soon after ``since_tick``, and to stay off for ``rest_s``.
 
         ``allowed_s``: longest time from ``since_tick`` to rest, without the grace time.
         """
@@ -209,7 +212,7 @@ class Rig:
 
         def is_decided(line: Any) -> bool:
             off_from = min(max(allowed, line.driven_at), latest)
-            return bool(line.tick >= off_from + REST_TICKS)
+            return bool(line.tick >= off_from + self._rest_ticks)
 
         assert self.wait_for_board(is_decided), self.driver.output
         stood_s = max(0, self.line.driven_at - since_tick) * TICK_S
@@ -252,14 +255,18 @@ class Rig:
             took_s < self._ends_within_s + late_s, f"it took {took_s:.1f} s to end"
         )
 
+    def expect_moves_again(self) -> None:
+        """Expect a fresh command to move the robot. Then the commands end."""
+        self.probe.wait_for_state("nominal")
+        self.drive()
+        self.hand.leave()
+
     def expect_obeys_again(self) -> None:
         """Expect a fresh command to move the robot.
 
         When the commands end, expect the robot to stop.
         """
-        self.probe.wait_for_state("nominal")
-        self.drive()
-        self.hand.leave()
+        self.expect_moves_again()
         self.expect_still(self.line.tick, "afterwards")
 
     def judge_stream(self, damaged_bytes: bool = False) -> None:
