@@ -6,15 +6,15 @@ from drive import drive
 
 
 def test_over_a_bad_line_every_message_is_what_the_board_sent_and_odom_is_its_pose() -> None:
-    """The robot drives for 20 s, and its line loses single bytes and bursts.
+    """The robot drives for 12 s, and its line loses single bytes and bursts.
 
     At most 3 in 1,000 messages are wrong. Fewer are, but their number varies with the reads.
     """
-    outcome = drive(20.0, lose=0.001, burst=0.0005)
-    assert outcome.bytes_lost > 100, outcome
+    outcome = drive(12.0, lose=0.001, burst=0.0005)
+    assert outcome.bytes_lost > 60, outcome
     assert outcome.imu_received > 0.85 * outcome.imu_sent, outcome
     assert outcome.odom_received > 0.85 * outcome.odom_sent, outcome
     messages = outcome.imu_received + outcome.odom_received
     assert outcome.imu_wrong + outcome.odom_wrong <= 0.003 * messages, outcome
     assert outcome.worst_m < 0.15, outcome
-    assert outcome.way_m > 4.0, outcome
+    assert outcome.way_m > 2.0, outcome

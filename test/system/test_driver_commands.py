@@ -146,7 +146,6 @@ def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
         ([1.0, 2.0], "2 values"),
         ([1.0, 2.0, 3.0, 4.0], "4 values"),
         ([1.0, math.nan, 3.0], "NaN or infinity"),
-        ([1.0, math.inf, 3.0], "NaN or infinity"),
     ],
 )
 def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
@@ -163,10 +162,9 @@ def test_a_wrong_wheel_cmd_is_refused_with_a_reason(
     assert board.wait_for(lambda b: obeyed(b, "wheels", 20, 0, 0), PATIENCE_S)
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-@pytest.mark.parametrize("axis", ["x", "z"])
+@pytest.mark.parametrize(("axis", "bad"), [("x", math.nan), ("z", math.inf)])
 def test_a_twist_that_is_not_finite_anywhere_is_refused(
-    probe: Probe, driver: Driver, board: PtyBoard, bad: float, axis: str
+    probe: Probe, driver: Driver, board: PtyBoard, axis: str, bad: float
 ) -> None:
     """A Twist is rejected if any axis has NaN or infinity, even an axis that the driver ignores."""
     commands = probe.publisher(Twist, "cmd_vel")

@@ -237,16 +237,8 @@ def test_tuning_changes_while_running_and_identity_does_not(
     assert "linear_scale" in result.reason
 
 
-@pytest.mark.parametrize(
-    ("name", "kind", "message"),
-    [
-        ("lineer_scale", ParameterType.PARAMETER_DOUBLE, "the nearest is 'linear_scale'"),
-        ("dock_distance", ParameterType.PARAMETER_DOUBLE, "belongs to board mart, not to omnibot"),
-        ("linear_scale", 99, "no type that ROS knows"),
-    ],
-)
 def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
-    start_driver: Start, probe_of: Start, name: str, kind: int, message: str
+    start_driver: Start, probe_of: Start
 ) -> None:
     """A client sets an unknown parameter, one of another board, or a value of an unknown type.
 
@@ -256,15 +248,23 @@ def test_what_is_no_parameter_is_refused_while_running_and_the_driver_goes_on(
     driver: Driver = start_driver("sim://")
     probe: Probe = probe_of(driver)
     probe.wait_for_state("nominal")
-    value = ParameterValue(type=kind, double_value=1.0)
-    assert message in set_parameter(probe, name, value).reason
-    wrong = [Parameter(name="linear_scale", value=real(80.0)), Parameter(name=name, value=value)]
-    result = probe.call(
-        SetParametersAtomically, "set_parameters_atomically", parameters=wrong
-    ).result
-    assert not result.successful
-    assert message in result.reason
-    assert set_parameter(probe, "linear_scale", real(100.0)).successful
+    for name, kind, message in (
+        ("lineer_scale", ParameterType.PARAMETER_DOUBLE, "the nearest is 'linear_scale'"),
+        ("dock_distance", ParameterType.PARAMETER_DOUBLE, "belongs to board mart, not to omnibot"),
+        ("linear_scale", 99, "no type that ROS knows"),
+    ):
+        value = ParameterValue(type=kind, double_value=1.0)
+        assert message in set_parameter(probe, name, value).reason
+        wrong = [
+            Parameter(name="linear_scale", value=real(80.0)),
+            Parameter(name=name, value=value),
+        ]
+        result = probe.call(
+            SetParametersAtomically, "set_parameters_atomically", parameters=wrong
+        ).result
+        assert not result.successful
+        assert message in result.reason
+        assert set_parameter(probe, "linear_scale", real(100.0)).successful
 
 
 def test_the_command_that_is_repeated_is_said_in_a_new_scale(

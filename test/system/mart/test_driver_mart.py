@@ -179,7 +179,9 @@ def test_the_estop_stops_each_motion(mart: Mart, probe: Probe) -> None:
         assert probe.call(SetBool, "estop", data=False).success
 
 
-@pytest.mark.parametrize(("motion", "number"), [("RM", signal.SIGINT), ("L", signal.SIGKILL)])
+@pytest.mark.parametrize(
+    ("motion", "number"), [("RM", signal.SIGINT), ("RM", signal.SIGKILL), ("L", signal.SIGKILL)]
+)
 def test_whatever_ends_the_driver_stops_each_motion(
     new: New, motion: str, number: signal.Signals
 ) -> None:
