@@ -36,4 +36,4 @@ def test_the_network_publishes_only_what_was_sent(network: NetworkRig) -> None:
     """In the other tests, the driver has published no message that the board has not sent."""
     network.judge_stream()
     assert not network.findings.take(), network.driver.output
-    assert network.findings.published > 500
+    assert network.findings.published > 50
