@@ -7,10 +7,12 @@ from collections.abc import Callable
 from random import Random
 from typing import Any, Final
 
+from driver_process import PATIENCE_S
 from geometry_msgs.msg import PoseStamped, Twist
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy._rclpy_pybind11 import RCLError
+from rclpy.duration import Duration
 from rig import Rig
 from std_msgs.msg import Bool, Float32MultiArray
 from std_srvs.srv import SetBool, Trigger
@@ -77,11 +79,12 @@ def parameters(random: Random) -> SetParameters.Request:
 def fuzz(rig: Rig, count: int, random: Random) -> None:
     """Send random messages and calls. Calls must be answered, and the node must still publish."""
     probe = rig.probe
+    estop = probe.publisher(Bool, "estop")
     publishers = [
         (probe.publisher(Twist, "cmd_vel"), twist),
         (probe.publisher(Float32MultiArray, "wheel_cmd"), wheels),
         (probe.publisher(PoseStamped, "cmd_pose"), pose),
-        (probe.publisher(Bool, "estop"), lambda random: Bool(data=random.random() < 0.1)),
+        (estop, lambda random: Bool(data=random.random() < 0.1)),
     ]
     calls: list[tuple[Any, Callable[[Random], Any]]] = [
         (probe.client(Trigger, "start"), lambda _: Trigger.Request()),
@@ -98,6 +101,7 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
         (probe.client(SetParameters, "set_parameters"), parameters),
     ]
     futures = []
+    stops = 0
     heard, sent = len(rig.imu), len(rig.line.sent)
     for number in range(count):
         if number % BURST == 0:
@@ -107,12 +111,18 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
             futures.append(client.call_async(request(random)))
             continue
         publisher, message = random.choice(publishers)
+        stops += publisher is estop
         odd = random.random() < 0.1
         try:
             publisher.publish(no_message(random) if odd else message(random))
         except RCLError:
             assert odd  # our own middleware refuses to send such bytes
     for future in futures:
+        probe.wait_for_future(future)
+    # Messages on the topic estop may still wait in the driver. It takes one with each call.
+    assert estop.wait_for_all_acked(Duration(seconds=PATIENCE_S))
+    release = probe.client(SetBool, "estop")
+    for future in [release.call_async(SetBool.Request(data=False)) for _ in range(stops)]:
         probe.wait_for_future(future)
     probe.call(SetBool, "estop", data=False)
     probe.call(Trigger, "start")
