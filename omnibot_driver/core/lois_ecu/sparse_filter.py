@@ -79,14 +79,8 @@ def _applied(rows: Mapping[int, Terms], matrix: list[list[float]]) -> list[list[
     result = list(matrix)
     for state, terms in rows.items():
         (first, factor), *rest = terms
-        new = matrix[first]
-        if factor != 1.0:
-            new = [factor * number for number in new]
-        if len(rest) % 2:
-            other, factor = rest.pop(0)
+        new = [factor * number for number in matrix[first]]
+        for other, factor in rest:
             new = [old + factor * number for old, number in zip(new, matrix[other], strict=True)]
-        for (one, a), (other, b) in zip(rest[::2], rest[1::2], strict=True):
-            pair = zip(new, matrix[one], matrix[other], strict=True)
-            new = [old + a * x + b * y for old, x, y in pair]
         result[state] = new
     return result
