@@ -42,7 +42,7 @@ PARAMETERS: Final = table(
     changed={
         "port": {
             "default": "/dev/ttyACM0",
-            "description": "Serial device of the drive Teensy. sim:// is a simulated pair of boards"
+            "description": "Serial device of the drive board. sim:// is a simulated pair of boards"
             " inside the driver, and replay://bag plays a recorded bag.",
         },
     },

@@ -20,7 +20,7 @@ FRONT_PORT: Final = (
         "front_port",
         "/dev/ttyACM1",
         "",
-        "Serial device of the front Teensy; port is the device of the drive Teensy. If the two"
+        "Serial device of the front board; port is the device of the drive board. If the two"
         " devices are swapped, the driver detects this from the heartbeats. Not used if port is"
         " sim:// or replay://.",
         fixed=True,
@@ -128,8 +128,8 @@ DRIVING: Final = (
         "line_sums",
         "auto",
         "",
-        "Whether each line to and from the Teensys begins with a checksum (;NN). auto: if the"
-        " Teensy's heartbeats begin with one; on: always; off: never.",
+        "Whether each line to and from the boards begins with a checksum (;NN). auto: if the"
+        " board's heartbeats begin with one; on: always; off: never.",
         choices=("auto", "on", "off"),
         fixed=True,
     ),

@@ -49,7 +49,7 @@ def require_two_ports(values: Mapping[str, Any]) -> None:
     if port == front or (port.startswith("/") and _same(port, front)):
         raise ParameterError(
             f"parameter 'front_port' must differ from 'port', but both lead to '{front}': the"
-            " drive Teensy and the front Teensy each have their own port;"
+            " drive board and the front board each have their own port;"
             " `ls /dev/serial/by-id/` shows the ports"
         )
 

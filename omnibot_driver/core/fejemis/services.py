@@ -58,7 +58,7 @@ class Services:
         self._upkeep.machine.set_brush(on)
 
     def lift(self, volts: float, now: float) -> None:
-        """Move the lift for at most ``command_timeout_s``; a positive voltage raises the wheel.
+        """Move the lift for at most ``command_timeout_s``; positive volts raise the front wheel.
 
         Raises CommandRefused if the lift must not run now.
         """

@@ -68,9 +68,9 @@ def test_the_line_that_cancels_a_power_off_is_sent_three_times(bench: Bench) -> 
 
 
 def test_a_power_off_after_a_start_is_not_cancelled_by_it(bench: Bench) -> None:
-    """The user calls ~/start, and then requests a power off again.
+    """The user calls ~/start, and then ~/power_off.
 
-    The driver stops repeating ``on``, which would cancel the power off.
+    The driver stops repeating the ``on`` of ~/start, because ``on`` would cancel the power off.
     """
     assert bench.ask(Request.START).success
     bench.board.services.ask(Job.POWER_OFF, None, bench.now)
