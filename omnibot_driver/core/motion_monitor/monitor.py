@@ -22,7 +22,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""A robot counts as driven until this time, in s, after its last set-point other than rest."""
+"""For this time in s after its last set-point that was not rest, a robot counts as driven."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15

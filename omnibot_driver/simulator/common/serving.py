@@ -21,7 +21,7 @@ from omnibot_driver.simulator.common.wired import B, Line
 
 
 class Carrier(Protocol):
-    """An open port that carries one channel."""
+    """An open port for one line (channel) of the simulated board."""
 
     address: str
     """Value for the driver's port parameter."""

@@ -254,8 +254,8 @@ def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
     counted_lost = grown(log, stream.lost)
     if counted_lost is None:
         advice = (
-            "Record /diagnostics of this robot alone, without other robots. The counts in"
-            " /diagnostics show whether the line or the recorder lost the messages."
+            "Record /diagnostics too, while no other robot publishes on it. Its counts show"
+            " whether the line or the recorder lost the messages."
         )
     elif counted_lost == 0:
         advice = (

@@ -281,7 +281,7 @@ def test_a_hello_sent_before_a_move_does_not_hide_a_copy_of_the_move() -> None:
 def test_a_late_answer_to_hello_does_not_hide_a_copy_of_the_move() -> None:
     """During a move, a late answer to an earlier HELLO arrives. A copy of the move follows.
 
-    The driver does not conclude from this answer that no copy runs, and stops the copy.
+    The driver does not take this answer as proof that no copy runs. So it stops the copy.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0]

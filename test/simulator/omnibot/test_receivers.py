@@ -218,7 +218,7 @@ def test_a_doubled_header_byte_does_not_hide_the_frame() -> None:
 def test_a_naive_receiver_loses_the_frame_behind_a_doubled_header_byte() -> None:
     """The first byte of the header FF FE comes twice.
 
-    The naive receiver discards both FF, misses the frame and reads its letters.
+    The naive receiver discards both FF and misses the frame. It reads a letter in the payload.
     """
     assert understood("FF FF FE 02 00 20 00 00 00 00", kind=NAIVE) == []
     assert understood("FF FF FE 02 00 52 00 00 00 00", kind=NAIVE) == [RESET]
