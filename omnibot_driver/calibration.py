@@ -48,7 +48,7 @@ def load(path: Path, table: Table) -> dict[str, Value]:
 
 
 def names(path: Path) -> list[str]:
-    """Return all names in the file, even unread ones; empty if the file does not exist.
+    """Return all names in the file, also those that the driver ignores; empty without a file.
 
     Raises ParameterError if the file cannot be read.
     """

@@ -32,7 +32,7 @@ def obeying(
 
     * ``expires_s``: returns the age, in s, at which a command expires.
     * ``may_be_old``: returns True for a message whose time in transit does not matter.
-    * ``is_stop``: returns True for a message that stops the robot. It is obeyed even if it is old.
+    * ``is_stop``: returns True for a command to stop, which is obeyed even if it is old.
     * ``moves_base``: whether the topic commands the motion of the base.
     """
     transit = Transit()

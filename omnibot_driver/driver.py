@@ -92,9 +92,9 @@ def main(args: list[str] | None = None) -> int:
         with UnblockedOutput():
             print(HELP)
         return 0
-    # The import takes half a second. Ending is ready before it, so a signal during the import ends
-    # the driver. If RMW_IMPLEMENTATION is wrong, ROS says so and ends the process in the import.
-    # The pipe of UnblockedOutput would lose this text.
+    # The import takes half a second. ``ending`` exists before it, so a signal during the import
+    # ends the driver. If RMW_IMPLEMENTATION is wrong, ROS says so and ends the process in the
+    # import. The pipe of UnblockedOutput would lose this text.
     ending = Ending()
     with contextlib.suppress(ImportError):
         import rclpy._rclpy_pybind11  # noqa: F401

@@ -83,9 +83,10 @@ def parted(heard: bytes) -> tuple[bytes, bytes, bytes]:
 
 
 def speak(last_words: Words, until: list[int]) -> None:
-    """Write the stop command 20 times. End earlier if a descriptor in ``until`` has input.
+    """Write the stop command 20 times. End earlier if ``until`` has input or all lines are lost.
 
-    Input from the driver shows that the driver runs again, and can stop the robot itself.
+    ``until``: descriptors. Input from the driver shows that the driver runs again, and can stop the
+    robot itself.
     """
     lines = {line for line, _ in last_words}
     for line in lines:

@@ -36,8 +36,8 @@ RAW_DEPTH: Final = 1000
 byte."""
 UNHEARD: Final = ("disconnected", "connecting")
 LATEST_NS: Final = (2**31 - 60) * 10**9
-"""Time of a simulated clock, in ns, from which measurements are not published. It is a minute less
-than the latest time that a stamp can express, so that a stamp can be later than the clock."""
+"""Time of a simulated clock, in ns, from which on measurements are not published. It is a minute
+less than the latest time that a stamp can express, so that a stamp can be later than the clock."""
 
 
 class Publishing:

@@ -123,7 +123,7 @@ class Transit:
             return 0.0
         sender = min(possible, key=lambda sender: sender.improbability(differences_s, at_s))
         self._senders.remove(sender)
-        self._senders.append(sender)  # the sender that is silent for longest is forgotten first
+        self._senders.append(sender)  # the sender that was silent for longest is forgotten first
         sender.number = number
         return sender.hear(differences_s, at_s, longest_s)
 

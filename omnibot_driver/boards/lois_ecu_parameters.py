@@ -283,7 +283,7 @@ def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
 
 
 def require_possible_periods(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if the period of a message is too short or too long for the board.
+    """Raise ParameterError if the period of a message is too short for the board.
 
     With a period near 0, the public firmware sends all the time and misses all commands.
     """

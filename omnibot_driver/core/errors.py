@@ -16,11 +16,11 @@ class FrameError(OmniBotError):
 
 
 class RequestRefused(OmniBotError):
-    """A request that the board's present mode, or another request in progress, does not allow."""
+    """A request that is not possible now, e.g. because of the board's mode or another request."""
 
 
 class CommandRefused(OmniBotError):
-    """A motion command that is rejected and has no effect."""
+    """A motion command that the driver refuses or rejects, so it has no effect."""
 
 
 class LinkError(OmniBotError):

@@ -29,7 +29,7 @@ data.
 Of a longer interval, only this time is added. A running board sends every 10 ms.
 """
 IN_FLIGHT_S: Final = 0.1
-"""Longest time, in s, that a command or a notice of a paused board takes to arrive.
+"""Longest time, in s, that a command, or a notice of a paused board, takes to arrive.
 
 A notice that comes within this time after a command may be older than the command, so it proves
 nothing. A notice also proves nothing if data arrive within this time after the notice.

@@ -22,5 +22,5 @@ def packed(data: bytes, channel: int = 0) -> Packets:
 
 
 def joined(packets: Packets) -> bytes:
-    """Return the bytes of all packets of a board with one channel, concatenated."""
+    """Return the bytes of all packets, concatenated. The packets must have the same channel."""
     return b"".join([data for _, data in packets])

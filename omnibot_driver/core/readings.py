@@ -79,8 +79,9 @@ class PausedReading:
 
 @value(frozen=True, slots=True)
 class OdometryReading:
-    """The board's own odometry, in a frame that begins where ``Board.reset_odometry`` was called.
+    """The board's own odometry, in a frame whose origin ``Board.reset_odometry`` moves.
 
+    * ``stamp_s``: in s of the host's steady clock.
     * ``twist``: in the board's body axes.
     * ``twist_variances``: of linear and angular speed, in m²/s² and rad²/s².
     * ``rolled``: sum of all wheel motion, in body axes, since the board object was made.
@@ -156,8 +157,8 @@ class SampleBoundary:
     The times are in s after the read:
 
     * ``latest_s``: latest time at which the cut sample can be complete; 0 without a cut sample.
-    * ``earliest_s``: earliest time at which another sample can be complete. This is the cut sample,
-      or, without a cut sample, the next one.
+    * ``earliest_s``: earliest time at which the cut sample can be complete. Without a cut sample:
+      the same for the next sample.
     """
 
     ahead: int

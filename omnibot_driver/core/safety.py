@@ -130,7 +130,10 @@ class SafetyStops:
         return "e-stop released; robot stopped until the next command"
 
     def set_out(self, now: float) -> None:
-        """Stop the robot, because the board has begun to run and may carry out an old command."""
+        """Stop the robot, because the board may obey an old command.
+
+        Call this method when the board begins to run, and when it falls silent.
+        """
         self._policy.proof.begin()
         self._policy.halt(now)
 

@@ -98,7 +98,7 @@ class SerialPort:
         except OSError as error:
             if not data:
                 raise LinkError(f"lost {self._url} while reading: {error}") from error
-        return data  # from before a loss, which the next call detects again
+        return data  # if the port was lost after these bytes, the next call detects that
 
     def write(self, packets: Packets) -> None:
         """Write all bytes at once."""

@@ -296,6 +296,6 @@ class Line:
         return True
 
     def end(self) -> ByteLine | None:
-        """Mark the line as lost and return the port that is to be closed, if any."""
+        """Forget the port and the waiting bytes; return the port, which the caller must close."""
         port, self.port, self.descriptor, self.waits = self.port, None, None, b""
         return port

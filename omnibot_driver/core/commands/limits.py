@@ -102,7 +102,7 @@ def require_timely(what: str, age_s: float, longest_s: float) -> None:
 
 
 def shorten(vector: Sequence[float], limit: float) -> tuple[float, ...]:
-    """Return the vector, shortened to a length of at most ``limit``. This never overflows."""
+    """Return the vector, shortened to a length of at most ``limit``, without an overflow."""
     largest = max(map(abs, vector))
     if largest == 0.0:
         return tuple(vector)

@@ -175,7 +175,7 @@ class CommandPipeline:
         return self._react_to(fault, now) + self.check_goal(estimates, now)
 
     def count_refused(self, count: int, now: float) -> list[str]:
-        """Check the number of impossible displacements since the driver began; return notices.
+        """Check the number of rejected displacements since the driver began; return notices.
 
         Several new ones in a row show that the robot does not move as commanded.
         """

@@ -23,8 +23,8 @@ GAP_S: Final = 0.2
 ANSWER_WITHIN_S: Final = 4.0
 """Time in s within which a request is answered.
 
-The service call that requests it may take five seconds. In the remaining second, the result is
-written to a file."""
+A call of ``~/calibrate_gyro`` may take five seconds. In the remaining second, the driver writes the
+result to a file."""
 
 STILL_RADPS: Final = 0.01
 STILL_MPS2: Final = 0.3

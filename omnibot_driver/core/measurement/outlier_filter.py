@@ -38,8 +38,8 @@ STILL: Final = 0.08
 """An implausible change of the IMU's readings was a spike only if at most this fraction of the
 change remains in the next reading.
 
-It is regarded as the change of a single value only if every other value changes by at most this
-fraction of that change.
+If every other value changes by at most this fraction of the largest change, only one value is
+regarded as changed.
 """
 END_OF_SCALE: Final = 0.99996
 """Smallest fraction of the accelerometer's full scale that is regarded as the end of the scale. The
@@ -218,7 +218,10 @@ class OutlierFilter:
         return replace(reading, lost=reading.lost + lost)
 
     def _made_good(self, reading: DisplacementReading) -> DisplacementReading:
-        """Return the reading with the number of rejected displacements added to its ``lost``."""
+        """Return the reading with ``lost``, ``duration_s`` and ``restarted`` corrected.
+
+        The corrections account for the rejected displacements before this reading.
+        """
         unknown = self._time_unknown or reading.duration_s is None
         made_good = replace(
             reading,

@@ -73,7 +73,7 @@ class MeasurementPipeline:
 
     @property
     def refused_displacements(self) -> int:
-        """Number of displacements rejected as impossible."""
+        """Number of displacements rejected as implausible."""
         return self._outliers.refused_displacements
 
     @property

@@ -24,8 +24,8 @@ NOISE_MPS: Final = 0.015
 NOISE_RADPS: Final = 0.05
 """``NOISE_MPS``, ``NOISE_RADPS``: speeds outside the hull that are always allowed.
 
-They are in m/s and rad/s. Encoder resolution, rounding, and slopes with a slow controller cause
-them.
+They are in m/s and rad/s. Encoder resolution and rounding cause them, and so does a slope if the
+wheel controllers are slow.
 """
 SIDEWAYS: Final = 0.1
 """Deviation allowed in any direction, as a fraction of the commanded speed or yaw rate.

@@ -17,7 +17,7 @@ from omnibot_driver.core.motion_monitor.wind_up import LONG_S, WindUp
 
 RISING_S: Final = 0.16
 """Time in s that a robot may take to follow a set-point. So a displacement is compared with all
-set-points that held since this time before its beginning.
+set-points that held during it, or within this time before it.
 
 A robot that is clearly slower than all these set-points is assumed to be held.
 """

@@ -22,7 +22,7 @@ At this distance, the integrators of the wheel controllers reach their limits.
 LONG_S: Final = 0.06
 """Duration in s above which a displacement is regarded as long.
 
-A single long displacement does not prove that the robot is held: it may have turned round.
+A single long displacement does not prove that the robot is held: it may have changed direction.
 """
 FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0

@@ -31,9 +31,9 @@ class CorrectionSmoother:
         return self.target - self.pose
 
     def correct(self, chord: Pose, spread_s: float = SPREAD_S) -> None:
-        """Move ``target`` by the correction ``chord``. ``pose`` follows within ``spread_s``.
+        """Move ``target`` by the correction ``chord``, which is given in the axes of ``target``.
 
-        ``chord`` is given in the axes of ``target``.
+        ``pose`` follows within ``spread_s``, or later if the robot could not move as fast.
         """
         self.target = self.target.moved(chord)
         self._settling_s = spread_s

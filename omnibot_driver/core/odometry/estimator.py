@@ -82,7 +82,7 @@ class Odometry:
     """The odometry of one robot.
 
     * ``axis_signs``: factors that convert the board's body axes to REP-103. They do not apply to
-      its earth frame.
+      the board's earth frame.
     """
 
     def __init__(self, settings: OdometrySettings, axis_signs: Signs = (1, 1, 1)) -> None:
@@ -117,7 +117,8 @@ class Odometry:
     def reset(self) -> list[OdometryEstimate]:
         """Move the origin of the odometry frame to the robot's present pose.
 
-        Return the estimates of displacements that were still waiting for a pose.
+        Return the estimates of displacements that were still waiting for a pose. Those that waited
+        for the board's first pose are discarded.
         """
         self.alignments += 1
         due = []
@@ -176,8 +177,9 @@ class Odometry:
     def in_board_frame(self, place: Pose) -> Pose | None:
         """Convert ``place`` from the odometry frame into the board's frame.
 
-        The board counts full turns. The heading of the result is the one to which the robot has the
-        shorter turn. Return None before a pose of the board has shown how the frames are related.
+        The board's heading includes full turns. The result has the heading that the robot reaches
+        by the shorter turn. Return None before a pose of the board has shown how the frames are
+        related.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None

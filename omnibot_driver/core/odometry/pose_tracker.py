@@ -37,7 +37,8 @@ class PoseTracker:
     ) -> None:
         """Use new settings from the next motion on.
 
-        ``scale``: true distance and turn, divided by the reported. ``fastest``: in m/s and rad/s.
+        ``scale``: true distance and turn, divided by the reported ones. ``fastest``: in m/s and
+        rad/s.
         """
         x, y, yaw = self._axis_signs
         linear, angular = scale

@@ -2,7 +2,8 @@
 
 """Notices about lost data, unconfirmed stops and silence, each with a remedy.
 
-A notice is given only once, or at a limited rate. This module knows only counts, times and texts.
+Most notices are given only once, or at a limited rate. This module knows only counts, times and
+texts.
 """
 
 import math
