@@ -2,7 +2,7 @@
 
 """The MART controller as a ``Board`` of the driver. The pilot decides what is sent.
 
-The controller only answers queries. It is silent during a controlled move.
+The controller sends only replies to commands. It is silent during a controlled move.
 """
 
 import math
@@ -87,8 +87,8 @@ class MartBoard(Board):
     def mode(self) -> Mode:
         """The mode of the board.
 
-        The mode is nominal as soon as the server has given its name and has answered the first
-        stop.
+        The mode is nominal as soon as the server has answered the first stop, unless HELLO
+        has shown that it is another kind of server.
         """
         return self._mode
 

@@ -2,8 +2,8 @@
 
 """The exchange with the server: send one request, and find the reply to it.
 
-Replies carry no number, so their form and time are checked. This module knows requests and replies;
-it does not know what the requests are for. The caller passes the time.
+Replies carry no sequence number, so their form and time are checked. This module knows requests and
+replies; it does not know what the requests are for. The caller passes the time.
 """
 
 import math

@@ -166,7 +166,7 @@ class Doubt:
         self._walk = self._walk.with_errors(self.turn(spun_rad, told_rad))
 
     def turn_recorded(self, spun_rad: float, told_rad: float) -> None:
-        """Replace the heading error of the last turn by a smaller one.
+        """Replace the heading error of the last turn by the error of the recorded angle.
 
         Until now, the odometry has used the angle that the wheel measured. From now on, it uses the
         angle that the server has recorded, which comes from the gyro. Call this before the position

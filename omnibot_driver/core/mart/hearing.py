@@ -117,7 +117,7 @@ class Hearing(Measuring):
 
     @property
     def _trip_s(self) -> float:
-        """Present time in s from a request to its reply.
+        """Time in s that an exchange takes at present, from a request to its reply.
 
         It is estimated from the queries and the last check of the IMU.
         """
@@ -162,7 +162,8 @@ class Hearing(Measuring):
             self._moved(reply, now, sure=not answer.when.doubtful)
         elif word is words.SSP:
             if not self._turns.answered(reply):
-                self.imu.again_s = now + self._delay_s  # until then, a copy may look like its reply
+                # a copy of this reply may look like the reply to the check
+                self.imu.again_s = now + self._delay_s
                 self._once(SETTING_REFUSED)
         elif word in (words.MCS, words.MSM):
             self._switch_off.answered(word, reply)

@@ -76,7 +76,9 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return False if it failed for another reason than the IMU.
+        """Evaluate the reply to a check; return False if the caller must evaluate a failure.
+
+        Failures that are evaluated here: a dead IMU, and a server without RST IMU.
 
         ``took_s``: time from the check to the reply.
         """

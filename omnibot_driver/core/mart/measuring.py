@@ -125,7 +125,7 @@ class Measuring(Starts):
             return
         if now - self._stray_s < STRAY_AGAIN_S:
             return
-        if not self.conversation.disturbed(now):  # else it may be a copy, or a start unanswered
+        if not self.conversation.disturbed(now):  # else it may be a copy, or an unanswered start
             self.health.strays(now)
         # the robot has not been at rest since the last start, or since a restart of the server
         unknown = self._stood_s < max(self.appeared_s, self._started_s)

@@ -141,7 +141,7 @@ class Moves(Asking):
         self._surplus.learn(turn, 0.0, odometry.turn.spun_rad)
 
     def _end_move(self, now: float) -> None:
-        """Evaluate the count after a controlled move: odometry, goal, and lessons from the move."""
+        """End a motion after its last count, and evaluate it if it was a controlled move."""
         move, self._last_move = self._last_move, None
         completed, self._moved_by = self._moved_by is not None, None
         if move is None:
@@ -153,7 +153,7 @@ class Moves(Asking):
             return
         done = self._done(move, now, completed=completed)
         stopped = self._may_have_stopped_a_copy(done, now)
-        # of a move from before a reset of the odometry, an unknown part remains
+        # if the odometry was reset during the move, only a part of the move is measured
         whole = self._surplus.is_known(move) and not self.odometry.begins_in_move
         twice = stopped and whole and done.has_run_twice
         doubtful = (stopped or self.conversation.disturbed(now)) and done.may_have_run_twice

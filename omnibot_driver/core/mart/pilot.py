@@ -117,7 +117,7 @@ class Pilot(Hearing):
 
     @property
     def ready(self) -> bool:
-        """Whether the server has given its name, answered the first stop, and is not lost."""
+        """Whether the server has answered the first stop, and is neither a wrong one nor lost."""
         return self.greeted and not self.health.stranger and self.state is not State.LOST
 
     def fell_silent(self) -> None:

@@ -37,7 +37,7 @@ class DockedReading:
 class JobDone:
     """The result of a job, which is a request to the controller besides motion.
 
-    ``token``: the object by which the caller recognizes the job.
+    ``token``: the object by which the caller recognises the job.
 
     ``name``, ``content``: empty without a file.
     """

@@ -31,7 +31,7 @@ def is_standstill(wanted: Wanted) -> bool:
 
 
 def is_turn_ramped(wanted: Wanted, now: float) -> bool:
-    """Return whether an acceleration limit still changes the yaw rate by more than RAMP_LEFT."""
+    """Return whether the yaw rate in a ramp differs from the final one by more than RAMP_LEFT."""
     if wanted is None or isinstance(wanted, Stop | EmergencyStop):
         return False
     present, final = wanted.order(now), wanted.final

@@ -113,7 +113,7 @@ class SpotTurns:
         return word.request("SLOW" if self.is_fixed else "CUSTOM")
 
     def setting(self, rate_radps: float, now: float, delay_s: float) -> Request | None:
-        """Return the request (SSP) that sets the speed for a turn, or None if none is needed.
+        """Return the request (SSP) that sets the speed for a turn, or None if it is not due.
 
         The caller must send it before the check of the IMU.
 

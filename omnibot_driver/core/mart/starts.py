@@ -56,7 +56,7 @@ class Starts(FailedStarts):
         if setting := self._spin_setting(now):
             return self._ask(setting, now)
         if not self._rolled_out and not self._rescue:
-            return NO_PACKETS  # the roll-out is counted before the count begins anew
+            return NO_PACKETS  # a start would reset the count before the coasting was measured
         if isinstance(self._wanted, EmergencyStop) and now - self._estop_said_s >= ESTOP_REPEAT_S:
             self._estop_said_s = now
             self.proof.stopped(now)
@@ -94,7 +94,7 @@ class Starts(FailedStarts):
             return None
         network = self.conversation
         if network.disturbed(now) and now < network.certain_from_s(words.SSP):
-            return None  # a copy of another reply would be taken for that to SSP
+            return None  # a copy of another reply could look like the reply to SSP
         return self._turns.setting(twist.yaw_rate_radps, now, self._delay_s)
 
     def _switch_motors_off(self, now: float) -> Packets:
@@ -128,7 +128,8 @@ class Starts(FailedStarts):
         """Return whether ``start`` is a controlled move, and an earlier HELLO may arrive after it.
 
         The server might answer this HELLO just before it executes a copy of the move. The answer
-        would then wrongly suggest that there is no copy.
+        would then wrongly suggest that there is no copy. The result is False after a fresh check of
+        the IMU, because the driver waits before this check.
         """
         moves = start.word.kind is Kind.MOVE and not self.imu.fresh(now)
         return moves and now < self._greeted_s + self._delay_s

@@ -162,7 +162,10 @@ class WheelCount:
         return step
 
     def _falls_back(self, count: int, when: Moment) -> bool:
-        """Return whether the count goes back within this motion. Such a count is a wrong reply."""
+        """Return whether an uncertain count goes back within this motion.
+
+        Such a count is a wrong reply.
+        """
         before = self.last or 0
         if abs(before) <= STRAY_COUNTS or not when.is_uncertain:
             return False

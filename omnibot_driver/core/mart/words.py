@@ -142,7 +142,7 @@ Some servers start the motors on this command.
 """
 SSP = _word("SSP", Kind.SERVICE, _OK, 0.05, {"command missing parameter", UNSUPPORTED})
 
-# MCS writes both motors, MSM ends this
+# MCS writes the speeds of both motors; MSM ends the effect of MCS
 MCS = _word("MCS", Kind.SERVICE, _OK, 0.05, {CONFLICT, UNSUPPORTED})
 MSM = _word("MSM", Kind.SERVICE, _OK, 0.05, {UNSUPPORTED})
 
@@ -181,7 +181,7 @@ WORDS: Final = (
     *(RM, B, R, L, RMCS, CS),
     *(SRM, SM, SL, SS, TF, TB, MCR, MCL, SB, TIME, LOG, LAST_MOVE, LAST_TURN, EXIT),
 )
-"""All commands that this driver ever sends."""
+"""All commands of the table. The driver sends each of them, except TD."""
 KNOWN_FAILS: Final = frozenset(text for word in WORDS for text in word.fails if text)
 
 NEVER_SAID: Final = {

@@ -2,8 +2,8 @@
 
 """The OmniBot as a ``core.board.Board``: decodes its bytes, and encodes requests to it.
 
-Source: the board's manual ver. 0.3. See ``translation`` for its data, ``command_encoder`` for
-commands.
+Source: the board's manual ver. 0.3. See ``translation`` for the data that the board
+sends, and ``command_encoder`` for commands.
 """
 
 import math
@@ -75,7 +75,8 @@ LAST_WORDS: Final = (STOP_PACKETS, EMERGENCY_STOP_PACKETS + STOP_PACKETS)
 class OmniBot:
     """One OmniBot board on one line.
 
-    ``settings`` may change at any time, except the delta period.
+    ``settings`` may change at any time, except the delta period. A new baudrate, byte order or
+    accelerometer range affects the decoder only from the next connection on.
     """
 
     traits = TRAITS

@@ -273,7 +273,7 @@ class Expectation:
 
 
 def may_be_lent(frame: Frame, before: Context) -> bool:
-    """Return whether the frame's last byte may be the first byte of the next header instead.
+    """Return whether the frame's last byte may belong to the next header instead.
 
     The byte must occur in headers. If it is not FF and ends an IMU frame, the last word must also
     differ from that of the previous IMU frame.

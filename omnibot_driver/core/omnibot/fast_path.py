@@ -2,7 +2,7 @@
 
 """The fast path: decodes frames with expected content more quickly than the decoder's own loop.
 
-The decoder's loop would accept the same frames, which a test checks. For a read of one IMU frame,
+A test checks that the decoder's loop would accept the same frames. For a read of one IMU frame,
 the module ``single_imu`` is faster still.
 """
 
@@ -48,8 +48,8 @@ UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
 )
 
 LEARN_EVERY: Final = 8
-"""Only one frame in ``LEARN_EVERY`` is used to learn the usual scatter of the IMU. More frames
-would add little."""
+"""In a run of frames, at most one in ``LEARN_EVERY`` is used to learn the usual scatter of the IMU.
+More frames would add little."""
 
 
 class Walk:

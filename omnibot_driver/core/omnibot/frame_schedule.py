@@ -3,7 +3,7 @@
 """The order in which a running board sends frames, and what it reveals about lost frames.
 
 At 25 Hz, the board sends a delta after every fourth IMU frame, and a pose after every fifth delta.
-So the number of discarded bytes shows which frames were lost. The count is approximate; the
+So the number of discarded bytes shows which frames were lost. This is only an estimate; the
 counters in the frames and the arrival times correct it.
 """
 

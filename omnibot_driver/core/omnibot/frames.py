@@ -74,7 +74,7 @@ class ImuFrame:
 
 @dataclass(frozen=True, slots=True)
 class DeltaFrame:
-    """Motion since the last delta, in 0.1 mm and 0.1 mrad, sent at 25 Hz; ``seq`` is 0..255."""
+    """Motion since the last delta, in 0.1 mm and 0.1 mrad, usually at 25 Hz; ``seq`` is 0..255."""
 
     dx: int
     dy: int

@@ -49,8 +49,8 @@ class InterFrameGaps:
     * ``byte_s``: time in s that the line takes for a byte.
     * ``sharp``: whether the first byte after a pause normally begins a frame.
     * ``between``: whether a frame normally begins somewhere in the read after a pause.
-    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. Further pauses
-      are then not counted.
+    * ``certain``: whether enough pauses have confirmed ``sharp`` and ``between``. Further
+      confirmations are then not counted.
     * ``at_pace``: whether the line was not idle before the last read's bytes.
     * ``collected``: whether an adapter collected the last read's bytes for more than a tick.
     """
@@ -85,7 +85,8 @@ class InterFrameGaps:
         silent = pause_s >= IDLE_S
         sharp, between = self.sharp, self.between
         if pause_s > LATE_S:
-            sharp = sharp or between or silent  # bytes were lost rather than whole frames
+            # Such a long pause shows lost bytes. It is unlikely that only whole frames were lost.
+            sharp = sharp or between or silent
             self._trust(sharp=False, between=False)
         width = 1 if sharp else arrived
         price = cost_model.KNOWN_GAP if between or silent else cost_model.GAP

@@ -52,7 +52,7 @@ class ModeTracker:
         self._imus_alone = self.imus_to_come = schedule.imus_alone
         """``_imus_alone``: number of IMU frames in a row, without a delta, that show IMU-only mode.
 
-        ``imus_to_come``: how many of them are still missing for this.
+        ``imus_to_come``: how many of these frames have not arrived yet.
         """
 
     def apply(self, happening: Happening) -> None:

@@ -21,7 +21,7 @@ DELTAS_MISSING: Final = 6
 FEWEST_ALONE: Final = 25
 """Smallest number of IMU frames in a row, without a delta, that shows IMU-only mode.
 
-The number is large enough for any period of the deltas.
+Even with the longest period of the deltas, only 20 IMU frames come between two deltas.
 """
 
 _IMU_BYTES_PER_S: Final = 1400

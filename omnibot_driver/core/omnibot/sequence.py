@@ -3,7 +3,7 @@
 """The counters of the board's deltas and poses. They show lost deltas and a restart of the board.
 
 The counter SEQ of the deltas has one byte and wraps every 10.24 s at 25 Hz. The arrival times show
-how often. Poses have a counter of their own, which shows lost deltas sooner.
+how often it has wrapped. Poses have a counter of their own, which shows lost deltas sooner.
 
 Input: counters and arrival times; this module does not know what a frame contains.
 """
@@ -139,7 +139,8 @@ class Sequence:
         if not self._regular:
             return Step(0)
         from_zero = abs(count * self._per_pose - self._delta) <= self._per_pose
-        goes_on = passed == self._per_pose or self._ahead is not None  # until a delta confirms it
+        # While the counter of the last delta is doubtful, a pose does not show a restart.
+        goes_on = passed == self._per_pose or self._ahead is not None
         if from_zero and not goes_on and abs(passed - counted) > 2 * self._per_pose:
             return Step(0, None, restarted=True)
         missing = max(0, passed - counted)

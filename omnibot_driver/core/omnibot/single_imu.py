@@ -2,7 +2,7 @@
 
 """The fast path for the most frequent read: exactly one IMU frame, from bytes to reading.
 
-The results are the same as on the normal path, which a test checks. A frame may arrive in several
+A test checks that the results are the same as on the normal path. A frame may arrive in several
 reads (pieces). If the fast path rejects the frame, the decoder gets each piece with its arrival
 time.
 """

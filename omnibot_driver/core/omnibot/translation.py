@@ -37,14 +37,17 @@ DELTA_LSB: Final = 1e-4
 MOST_TEXTS_LOST: Final = 9
 """Largest number of lost "Paused" texts, one a second, that a counter may show.
 
-A reset is answered within this time. A counter that seems to show more has restarted.
+The board answers a reset within these 9 s. A counter that seems to show more has restarted.
 """
 FULL: Final = 4000
 """Smallest number of bytes in a read that may have filled the kernel's buffer of 4 KiB. Not all
 bytes of a read are decoded at once."""
 BEHIND_S: Final = 0.5
-"""Shortest delay in s of a read after which the next read may be late too. It is late if it brings
-twice the bytes of its time, and those of a further ``BURST_S``."""
+"""Shortest delay in s of a read after which the next read may be late too.
+
+The next read is late if the board needs more time to send its bytes than ``BURST_S`` plus twice the
+time since the previous read.
+"""
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
 """Shortest delay in s of a read that is corrected. Shorter ones may come from the board's clock."""
@@ -76,8 +79,7 @@ class Translation:
         self._paused_count: int | None = None
         self._imus = 0
         self.singles_to_come = self._most_singles = 0
-        """``singles_to_come``: number of IMU frames that the fast path ``single_imu`` may still
-        decode. ``_most_singles``: its initial value."""
+        """``_most_singles``: the initial value of ``singles_to_come``."""
         self.heard_s = -math.inf
         self._behind_s = 0.0
         """Time in s from the sending of the last byte to the read that returned it."""
@@ -105,10 +107,10 @@ class Translation:
         return readings
 
     def _sent_s(self, count: int, now: float) -> float:
-        """Return when the last of ``count`` bytes was sent that a late read at ``now`` returned.
+        """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
-        The kernel's buffer may have been full. It keeps the first bytes and loses the next ones.
-        Several reads may empty it. Return ``now`` after the last of them.
+        Before a late read, the kernel's buffer may have been full. It keeps the first bytes and
+        loses the next ones. Several reads may empty it. If the read was not late, return ``now``.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S
