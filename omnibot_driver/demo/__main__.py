@@ -139,7 +139,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"DEMO_SECONDS must be a number above 0, not {given!r}", file=sys.stderr)
         return 2
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # prints ? for Braille that the encoding lacks
+        sys.stdout.reconfigure(errors="replace")  # prints ? for characters that the encoding lacks
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: signals.append(received))

@@ -27,7 +27,7 @@ class Program:
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
         self._name = name
         self._heard = b""
-        self._log = tempfile.TemporaryFile("a+")  # noqa: SIM115, it lives as long as we do
+        self._log = tempfile.TemporaryFile("a+")  # noqa: SIM115, it lives as long as this object
         self._process = subprocess.Popen(
             [sys.executable, "-m", f"omnibot_driver.{name}", *arguments],
             stdin=subprocess.PIPE if console else subprocess.DEVNULL,

@@ -75,7 +75,7 @@ class Robot:
     def close(self) -> None:
         """End the connection to ROS.
 
-        The executor is ended too, because it would report errors at the program's exit.
+        The executor is ended too. Otherwise it would report errors at the program's exit.
         """
         self._executor.shutdown(timeout_sec=0.0)
         rclpy.try_shutdown()

@@ -45,7 +45,7 @@ class SimulatedBoard(Protocol):
         """Board time that passes with each ``advance``, in s."""
 
     def receive(self, data: bytes, now: float, channel: int, /) -> None:
-        """Receive data that was sent to the board; the next ``advance`` returns the reply.
+        """Receive data that was sent to the board; a later ``advance`` returns the reply.
 
         data: one datagram, or any chunk of serial bytes.
         now: arrival time in s, by any monotonic clock.
@@ -74,7 +74,7 @@ class SimulatorModule(Protocol):
     """Channels of each board of this kind."""
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
-        """Add the options of this board to the parser, but not those of all boards (``--seed``)."""
+        """Add the options of this board to the parser, except those that all boards share."""
 
     def from_arguments(self, arguments: argparse.Namespace) -> SimulatedBoard:
         """Return the board that the options describe.

@@ -92,7 +92,7 @@ class RunningBoard(ABC, Generic[B]):
     def wait_for(self, predicate: Callable[[B], bool], timeout_s: float) -> bool:
         """Wait until ``predicate`` is true; return whether this happened within ``timeout_s``.
 
-        The predicate is evaluated after each tick, while ``lock`` is held.
+        The predicate is evaluated at once and then after new ticks, while ``lock`` is held.
         """
         with self._ticked:
             held = self._ticked.wait_for(

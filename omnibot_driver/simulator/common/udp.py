@@ -10,7 +10,7 @@ import errno
 import socket
 
 HOST = "127.0.0.1"
-"""Loopback address, with which a simulated robot cannot be driven over the network."""
+"""Loopback address, so that other computers cannot drive a simulated robot."""
 
 LARGEST = 65_535
 _TRIES = 100

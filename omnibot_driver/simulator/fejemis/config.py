@@ -11,7 +11,7 @@ IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 STEERING = (1, 43.0, 0, 0, 0, 1, 1, 0.16, 0.048, 0, 0, 0, 0, 0, 0, 1, 1000.0)
 """Factory parameters of the steering controller: the manual's P-Lead controller.
 
-They are in the order of the help text: use, Kp; useI, taui, ilimit; a 1; useLeadf, tz,
+They are in the order of the help text: use, Kp; useI, taui, ilimit; constant 1; useLeadf, tz,
 tp = alpha * tau_d; useLeadb, tz, tp; usePre, tz, tp; useULim, Ulim.
 """
 

@@ -126,7 +126,7 @@ class DriveTeensy(Teensy[DriveConfig]):
         y += (left + right) / 2 * sin(h + turn / 2)
         self.pose = (x, y, (h + turn + pi) % (2 * pi) - pi)
 
-    # What it sends
+    # What the Teensy sends
 
     def items(self) -> dict[str, Callable[[], str]]:
         """Return the functions that write lines. The keys are the lines' names in the help text."""
@@ -209,7 +209,7 @@ class DriveTeensy(Teensy[DriveConfig]):
             f" {config.wheel_base_m:.4f} {STEP_S:.4f}"
         )
 
-    # What it obeys
+    # What the Teensy obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
         """Return the functions that execute the commands, by command name (see the help text)."""

@@ -114,7 +114,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         limit = gains[16] if gains[15] else SERVO_FULL
         servo.command = max(-limit, min(limit, gains[1] * self._lead_deg))
 
-    # What it sends
+    # What the Teensy sends
 
     def items(self) -> dict[str, Callable[[], str]]:
         """Return the functions that write lines. The keys are the lines' names in the help text."""
@@ -172,7 +172,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         cal = "{:.0f} {:.0f} {:.0f} {:.0f}".format(*self.config.ir)
         return "irc {:.3f} {:.3f} {} {} {}".format(distance_m, distance_m, *raw, cal)
 
-    # What it obeys
+    # What the Teensy obeys
 
     def commands_table(self) -> dict[str, Callable[[str], None]]:
         """Return the functions that execute the commands, by command name (see the help text)."""

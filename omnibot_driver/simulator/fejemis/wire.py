@@ -2,8 +2,9 @@
 
 """Reads and writes lines of text as a Teensy does, according to the manual and public programs.
 
-Checksum ``;NN``: 1 plus the sum, modulo 99, of all later characters from the space (0x20) upward.
-Numbers are parsed as by C's ``strtof``. This module must not know the meaning of a command.
+Checksum ``;NN``: 1 plus the sum, modulo 99, of the codes of all characters after it, except control
+characters (below 0x20). Numbers are parsed as by C's ``strtof``. This module must not know the
+meaning of a command.
 """
 
 import re
@@ -44,7 +45,10 @@ def line(text: str, *, sums: bool, carriage_return: bool) -> bytes:
 
 
 def checked(text: str) -> tuple[Check, str, int]:
-    """Return the result of the check, the line without ``;NN``, and its correct checksum."""
+    """Return the result of the check, the line without ``;NN``, and its correct checksum.
+
+    If the line has no ``;NN``, the last value is 0.
+    """
     found = _PREFIX.match(text)
     if found is None:
         return Check.ABSENT, text, 0
@@ -63,7 +67,7 @@ def numbers(text: str) -> list[float]:
 
 
 def padded(text: str, count: int) -> list[float]:
-    """Return ``count`` numbers; those that are missing are 0, as with ``strtof``."""
+    """Return the first ``count`` numbers of the text; a missing one is 0, as with ``strtof``."""
     return (numbers(text) + [0.0] * count)[:count]
 
 

@@ -136,7 +136,7 @@ class SimulatedLois:
 
     @property
     def driven(self) -> bool:
-        """Whether the motors have power."""
+        """Whether at least one motor has power."""
         return any(self._applied_duty)
 
     @property

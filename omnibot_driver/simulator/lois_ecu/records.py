@@ -37,7 +37,7 @@ class Recorder:
     def control(self) -> None:
         """Take a torque sample if a torque record is running.
 
-        Called at each step of the speed controllers.
+        The board calls this method at each step of the speed controllers.
         """
         if self.number == TORQUE:
             for channel in self._wheels:

@@ -2,8 +2,8 @@
 
 """The protocol as the board encodes and decodes it, from the manual and the public firmware.
 
-``:``, 2 hexadecimal digits of command, 8 of payload, 2 of checksum (XOR of all characters before
-it), line feed.
+A line is ``:``, 2 hexadecimal digits of command, 8 of payload, 2 of checksum, and a line feed. The
+checksum is the XOR of all characters before it.
 
 This module shares no code with the driver. It does not know what a command means.
 """

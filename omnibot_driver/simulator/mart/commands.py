@@ -235,7 +235,7 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """Set the front clearance in inches below which the next move forward (TF) stops (TFSFC)."""
+    """Set the front clearance in inches (TFSFC). The next move forward (TF) stops below it."""
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 

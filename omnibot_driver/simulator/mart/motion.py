@@ -64,7 +64,7 @@ class Motion:
 
     sampled_s: time of the last sample of the IMU, or -1.
 
-    moved_s, turned_s: first and last time at which the wheel turned.
+    moved_s, turned_s: first and last time at which the right wheel turned.
 
     released: whether the stop port ended the motion.
     """

@@ -221,7 +221,7 @@ def controlled_done(server: "MartServer", kind: Kind) -> None:
 
 
 def last_distance_in(server: "MartServer") -> int:
-    """Return the distance of the last TF or TB, in inches."""
+    """Return the distance of the last TF, TB or PTF, in inches."""
     return round(server.motions[Kind.CONTROLLED_LINEAR].reported_in)
 
 

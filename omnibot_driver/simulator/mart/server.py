@@ -119,8 +119,8 @@ class MartServer(ServerState):
     def restart(self, boot_s: float = BOOT_S) -> None:
         """Restart the server program. The motors keep the last command that they received.
 
-        Datagrams of the next ``boot_s`` seconds are lost. The server has started up completely
-        START_UP_S (s) after that.
+        Datagrams of the next ``boot_s`` seconds are lost. After another ``START_UP_S`` seconds, the
+        server has started up completely.
         """
         self.begin()
         self.imu.restart()

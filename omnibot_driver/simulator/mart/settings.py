@@ -21,7 +21,7 @@ class Quirks:
     spin_stop_ends_drives: SS stops F, B and RM, as SL does.
     early_stop_is_ignored: the stop port has no effect before the reply to F, B, R, L or RM.
     left_spin_in_reference_move: L is accepted during RM, and hangs the command port.
-    moves_wait_for_imu: F, B, TF, TB and SB wait for a working IMU.
+    moves_wait_for_imu: F, B, TF, TB, PTF, MCF, MCB and SB wait for a working IMU.
     drives_trust_imu: without an IMU, RM, R and L start, and uncontrolled motions continue. The
         server then detects no obstacle, start or stop.
     reference_speed_wraps: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
@@ -30,7 +30,8 @@ class Quirks:
     speed_word_first: a speed word after the number is ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB do not end at a distance if it is 0 or a word.
     echoes_distance: TF and TB report the distance computed from time, not the driven one.
-    crashes_on_missing_numbers: TIME, CS, MCS, SFR and SRR end the server if a number is missing.
+    crashes_on_missing_numbers: TIME, CS, MCS, SFR, SRR and SDR end the server if a number is
+        missing.
     crashes_early: VOLTS and all motions except F and B end a server that has just started.
     empty_datagram_ends: an empty datagram at the command port ends the server.
     exit_is_silent: EXIT is answered only if LOG was sent before.
@@ -41,8 +42,8 @@ class Quirks:
     heading_in_reference_moves_only: the heading of RMRA changes in RM only.
     probe_turns: MCR 0 runs the motors until the wheel moves, or 0.5 s with a dead IMU.
     heading_starts_off: RM's first sample adds half the turn rate * time since the previous RM.
-    corrects_after_stop: a heading correction in the sample in which TF, TB, MCF or MCB stops by
-        itself leaves one motor on, usually with one unit.
+    corrects_after_stop: TF, TB, PTF, MCF and MCB may correct the heading even in the sample in
+        which they stop by themselves. This leaves one motor on, usually with one unit.
     """
 
     stop_port_keeps_motion: bool = False

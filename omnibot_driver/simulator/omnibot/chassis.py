@@ -26,7 +26,8 @@ class PlanarPose(NamedTuple):
     def moved(self, dx_body_m: float, dy_body_m: float, dyaw_rad: float) -> "PlanarPose":
         """Return the pose after a displacement in the body frame, in m and rad.
 
-        Rotated by the heading in the middle of the step (manual, Odometry equation).
+        The displacement is rotated by the heading in the middle of the step (manual, Odometry
+        equation).
         """
         heading_rad = self.yaw_rad + dyaw_rad / 2
         c, s = cos(heading_rad), sin(heading_rad)

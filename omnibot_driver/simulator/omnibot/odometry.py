@@ -2,7 +2,8 @@
 
 """The firmware's odometry from its encoders (manual, Odometry equation).
 
-Each 25 Hz frame rounds its own difference, so a host that adds them also adds rounding errors.
+Each 25 Hz frame rounds its own difference. A host that adds these differences also adds rounding
+errors.
 
 This module knows encoder counts, the assumed dimensions and units. It must not know modes, time, or
 the true pose.

@@ -35,7 +35,7 @@ def commanded_pose(values: Triple, settings: BoardSettings) -> PlanarPose:
 def approach(pose: PlanarPose, goal: PlanarPose) -> tuple[float, float, float]:
     """Return the twist straight to the goal: body x and y in m/s, and the yaw rate in rad/s.
 
-    Headings are unwrapped, so the robot makes full turns.
+    Headings are unwrapped: if the goal's yaw is larger by 2π, the robot makes a full turn.
     """
     dx_m, dy_m = goal.x_m - pose.x_m, goal.y_m - pose.y_m
     way_m, turn_rad = hypot(dx_m, dy_m), goal.yaw_rad - pose.yaw_rad

@@ -108,7 +108,7 @@ class CommandReceiver:
     """The receiver from one power-up to the next.
 
     * ``held``: received bytes that may be the beginning of a frame.
-    * ``last_at_s``: arrival time of the last byte.
+    * ``last_at_s``: arrival time of the last byte that could belong to a control frame.
     * ``to_swallow``: number of wake-up bytes still expected.
     """
 

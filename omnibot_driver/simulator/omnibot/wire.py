@@ -2,8 +2,8 @@
 
 """The serial protocol from the board's side: layouts of the frames it sends and receives.
 
-Source: the manual's Serial Command and Serial Data Output alone; shares no code with the driver's
-codec. This module knows byte layouts. It must not know modes or motion.
+Its only source is the manual's Serial Command and Serial Data Output. It shares no code with the
+driver's codec. This module knows byte layouts. It must not know modes or motion.
 """
 
 import struct

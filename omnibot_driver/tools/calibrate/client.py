@@ -27,8 +27,8 @@ ANSWER_WITHIN_S: Final = 12.0
 SPIN_S: Final = 0.005
 """Time, in s, for which the executor waits for a message.
 
-It is constant, because rclpy's executor takes turns between the subscriptions only while its
-arguments stay equal. Otherwise, on a busy computer, the IMU would leave no turn for the e-stop.
+It is constant, because rclpy's executor takes turns between the subscriptions only if each call has
+the same timeout. Otherwise, on a busy computer, the IMU would leave no turn for the e-stop.
 """
 
 

@@ -113,7 +113,7 @@ class Obedience:
     """A check, at short intervals, that the robot roughly follows its commands."""
 
     def __init__(self, topic: Topic, parameters: Mapping[str, object]) -> None:
-        """Check the robot's response to commands on this topic.
+        """Prepare the check of the robot's response to commands on this topic.
 
         ``parameters``: the driver's parameters, by name.
         """

@@ -104,7 +104,8 @@ def mounting(level: Array, nose_up: Array, left_up: Array) -> Mounting:
     The arguments are unit vectors in the sensor's axes: robot level, front raised, left side
     raised.
 
-    Raises Contradiction if a tilt is too small or too large, or if the tilts are not at 90°.
+    Raises Contradiction if a tilt is too small or too large, or if the angle between the tilts is
+    not about 90°.
     """
     nose_rad, left_rad = _tilt(level, nose_up, "front"), _tilt(level, left_up, "left side")
     forward, left = _level_part(level, nose_up), _level_part(level, left_up)

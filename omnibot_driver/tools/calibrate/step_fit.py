@@ -234,7 +234,7 @@ class WheelFound:
 def fit_wheel(name: str, steps: Sequence[Step], now: Gains) -> WheelFound:
     """Fit three models to a wheel's steps: first order, second order, and a motor.
 
-    ``now``: the firmware's gains, which the motor's control loop has.
+    ``now``: the firmware's gains, with which the motor's control loop is simulated.
     """
     whole = alike(aligned(alike(aligned(steps))))
     first, second, motor = (

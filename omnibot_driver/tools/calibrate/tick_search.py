@@ -126,8 +126,8 @@ class Search:
         records = len(self._lengths)
         starts = []
         for total_s in STARTS_S:
-            # The first mark is given by its time. Its distance would be too small: just after the
-            # start, it grows with the cube of the time.
+            # The values have the time of the first mark, not its distance from the start. The
+            # distance would be too small: just after the start, it grows with the cube of the time.
             begins_s = [(0.5 * total_s**2 / self._rate) ** (1 / 3)] * records
             starts.append(np.array([math.log(self._rate), math.log(total_s), 0.3, *begins_s]))
         return self._best(starts)
@@ -145,9 +145,10 @@ class Search:
         return self._best([np.array([*values[:2], *values[3:]])])
 
     def off(self, values: Column) -> list[Column]:
-        """Return, for each record, the relative errors of its times if the marks were even.
+        """Return, for each record, the relative errors of its times, assuming evenly spaced marks.
 
-        A record has one error for each distance between marks. Beside a missed mark, it is NaN.
+        A record has one error for each distance between marks. The error beside a missed mark is
+        NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):

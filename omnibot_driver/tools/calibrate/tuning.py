@@ -73,12 +73,12 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
             command_error_s=abs(speed - 1.0).sum(axis=0) * TICK_S,
             load_error_s=abs(loaded).sum(axis=0) * TICK_S,
             ms=sensitivity_peak(motor, gains),
-            stable=wrong < SETTLED,  # false if it is NaN
+            stable=wrong < SETTLED,  # false if ``wrong`` is NaN
         )
 
 
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
-    """Return the gains within the limits that are best for all these motors together.
+    """Return the best gains for all these motors together, within the limits of this module.
 
     ``now``: the present gains. A motor's errors are divided by its errors with these gains.
     """

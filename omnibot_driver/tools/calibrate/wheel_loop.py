@@ -64,8 +64,8 @@ def answer(
         zero, forward, proportional, integral = map(float, (zero, forward, proportional, integral))
     effort_per_speed, lag = float(motor.pwm_per_count), float(motor.time_constant_ticks)
     load, (whole, part) = float(load), divmod(float(motor.delay_ticks), 1.0)
-    # ``settled``: the speeds to which the efforts would bring the wheel. An
-    # effort begins to act within a tick, so that two efforts act in each tick for these shares.
+    # ``settled``: the speeds to which the efforts would bring the wheel. ``shares``: an effort can
+    # begin to act within a tick, so two efforts act in each tick, each for one of these shares.
     settled = [(zero - load) / effort_per_speed] * (int(whole) + 1)
     shares = [(share, float(np.exp(-share / lag))) for share in (part, 1.0 - part)]
     speeds = np.zeros((ticks, *shape))

@@ -26,11 +26,11 @@ LOOK_EVERY_S: Final = 0.05
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the monitor; return 0, or 1 after an error printed on stderr, or 2 on wrong usage."""
+    """Run the monitor; return 0, or 1 after an error on stderr. Exit with code 2 on wrong usage."""
     arguments = sys.argv[1:] if arguments is None else arguments
     options, ros_arguments = _parse(arguments)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # prints ? for bars that the encoding lacks
+        sys.stdout.reconfigure(errors="replace")  # prints ? for characters that the encoding lacks
     try:
         return _run(options, ros_arguments)
     except ToolError as error:

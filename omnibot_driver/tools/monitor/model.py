@@ -51,7 +51,9 @@ class Flow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """The values to show at one moment. A value that is unknown or outdated is None or empty.
+    """The values to show at one moment. An unknown value is None or empty.
+
+    An outdated value is None or empty too, except ``state``, ``estop``, ``pose`` and ``path``.
 
     ``estop_asked``: the e-stop is requested, but the driver has not confirmed it.
 

@@ -22,8 +22,7 @@ ASLEEP_S: Final = 0.5
 Keys from before or during the suspension are discarded.
 """
 DEAF_S: Final = 0.3
-"""Time in s after a suspension during which keys do not steer, because earlier keys still arrive.
-"""
+"""For this time in s after a suspension, keys do not steer, because earlier keys still arrive."""
 ZEROS: Final = 5
 """Number of zero commands that follow a motion.
 
@@ -47,7 +46,7 @@ MOTIONS: Final = {
 class DeadMan:
     """A dead man's switch that converts pressed keys to commands.
 
-    The caller calls ``command`` regularly. Another thread may call ``press``. They need no lock,
+    The caller calls ``command`` regularly. Another thread may call ``press``. No lock is needed,
     because ``press`` stores key and time in one assignment.
     """
 

@@ -16,10 +16,10 @@ FIRST_SECONDS: Final = 3.0
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0
-"""Time in s from the beginning of the state "disconnected", if this is the last state in the log.
+"""Time in s after which /diagnostics must show the state "disconnected", if the driver still runs.
 
-If /diagnostics still shows this state after this time, the driver still runs. Otherwise the driver
-has ended.
+If "disconnected" is the last state in the log, and /diagnostics does not show it after this time,
+the driver has ended.
 """
 
 

@@ -267,7 +267,7 @@ def _name_states(axes: Axes, log: Log) -> None:
 
 
 def _stretches(series: Series) -> list[Span]:
-    """Return the spans of time in which a command was in effect."""
+    """Return the spans of time in which commands arrived without a pause of more than 0.5 s."""
     if not len(series):
         return []
     times_s = series.arrived_s

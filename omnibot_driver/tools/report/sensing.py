@@ -81,7 +81,7 @@ class Spectrum:
     """Amplitude spectral densities per √Hz: one row for each frequency, with six columns.
 
     Columns 0 to 2 are the angular velocity about x, y and z, and 3 to 5 the specific force along
-    them.
+    these axes.
     """
 
     frequency_hz: Array
