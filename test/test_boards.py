@@ -84,7 +84,7 @@ def test_every_profile_names_its_simulated_board(name: str) -> None:
 def test_an_unknown_board_is_refused_with_the_names_of_the_known_ones(wrong: object) -> None:
     """The parameter ``board`` has an unknown value, of any type.
 
-    The error lists the known boards.
+    The error says what the parameter must be.
     """
     with pytest.raises(ParameterError, match="'board' must be "):
         boards.check_all({"board": wrong})
@@ -106,7 +106,7 @@ def test_every_profile_has_a_table_of_its_own(name: str) -> None:
 def test_a_board_has_a_baudrate_exactly_if_its_messages_name_it(name: str) -> None:
     """A board has the parameter ``baudrate`` exactly if its messages mention a baud rate.
 
-    The board's ``traits.baudrate`` decides this.
+    The board's ``traits.baudrate`` is then true.
     """
     profile = boards.load(name)
     board = profile.make(boards.check_all({"board": name}))

@@ -63,7 +63,7 @@ def settings(draw: st.DrawFn) -> MessageSettings:
 def padded(data: bytes, like: bytes) -> bytes:
     """Return ``data`` with the padding bytes of ``like``, because rclpy may put any bytes there.
 
-    Padding: from a string's NUL to the next multiple of eight.
+    Padding bytes follow the NUL of a string, up to the next multiple of eight bytes.
     """
     same = bytearray(data)
     for at, (ours, theirs) in enumerate(zip(data, like, strict=False)):

@@ -203,7 +203,10 @@ def test_two_lines_are_both_stopped_and_one_that_is_gone_keeps_none_from_it(line
 
 
 def test_a_host_of_datagrams_is_stopped_also_if_it_begins_to_listen_late() -> None:
-    """The board's UDP port is closed at first. The guard repeats the stop bytes until it opens."""
+    """The board's UDP port is closed at first. The guard repeats the stop bytes.
+
+    So some of them arrive after the port has opened.
+    """
     host = socket.socket(type=socket.SOCK_DGRAM)
     host.bind(("127.0.0.1", 0))
     address = host.getsockname()

@@ -67,7 +67,7 @@ def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
     with pytest.raises(CommandRefused, match="waited"):
         drive([sent_ns])
     with pytest.raises(CommandRefused, match="waited while the driver was stalled"):
-        drive([time.time_ns(), sent_ns])  # little is known of its sender yet
+        drive([time.time_ns(), sent_ns])  # a new sender has two possible times of sending
     listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
     assert board.wait_for(lambda b: bytes(b.received).endswith(STOP), PATIENCE_S)
 

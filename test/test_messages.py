@@ -203,7 +203,7 @@ def test_every_frame_has_the_prefix_as_it_is() -> None:
 def test_joint_states_are_the_manuals_wheels() -> None:
     """The robot drives 1 m forward at 0.1 m/s. The wheels have a radius of 29 mm.
 
-    A turns backwards, B forwards, C not.
+    Wheel A turns backwards, B turns forwards, and C does not turn.
     """
     estimate = OdometryEstimate(
         0.0, Pose(), None, Covariance(), Pose(1.0, 0.0, 0.0), BodyTwist(0.1, 0.0, 0.0)

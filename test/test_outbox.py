@@ -149,7 +149,7 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
 
 
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
-    """The outbox is full, so a thread that puts an event into it waits.
+    """The outbox is full, so a thread that calls ``deliver`` waits for the thread that delivers.
 
     Otherwise the outbox would grow without limit.
     """

@@ -37,7 +37,7 @@ class Watched(Mapping[str, Any]):
 
 @cache
 def strings(file: Path) -> tuple[set[str], set[str]]:
-    """Return the strings of a module, but not the names that define parameters, and patterns.
+    """Return the strings of a module, and its patterns. Names in parameter definitions are omitted.
 
     An f-string such as ``f"{kind}_minimum"`` is a pattern that matches every ``kind``.
     """

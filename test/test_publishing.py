@@ -87,7 +87,7 @@ def test_a_command_waits_for_no_events_of_publishers() -> None:
 def test_stamps_follow_simulated_time_while_there_is_any(
     node: Node, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Stamps are in simulated time while this is active. Otherwise they are in system time."""
+    """Stamps are in simulated time while ``use_sim_time`` is true, otherwise in system time."""
     published: list[bytes] = []
 
     def published_at_s() -> float:

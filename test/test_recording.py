@@ -21,7 +21,6 @@ from omnibot_driver.recording import is_recording, open_recording
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 RAW = "std_msgs/msg/UInt8MultiArray"
 RX = "/omnibot_driver/raw_rx"
-# CDR typed by hand: little endian; without a dimension, offset 0, the count, the bytes.
 CHUNKS = [
     (1_790_000_000_000_000_000, b"Paused: 0 \n"),
     (1_790_000_000_000_000_001, b"\xff\xfa\x00"),
@@ -31,6 +30,7 @@ PACKETS = [(at_ns, (0, data)) for at_ns, data in CHUNKS]
 
 
 def cdr(data: bytes) -> bytes:
+    # CDR typed by hand: little endian; without a dimension, offset 0, the count, the bytes.
     header = bytes.fromhex("00 01 00 00")
     return header + bytes(8) + len(data).to_bytes(4, "little") + data
 

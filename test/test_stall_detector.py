@@ -143,7 +143,7 @@ def test_a_step_of_the_clock_after_a_standstill_makes_nothing_fresh_and_nothing_
     standstill.passed(103.6, wall_ns(103.6 + step_s))
     assert standstill.outlived_by(wall_ns(103.59 + step_s), 103.6)
     assert not standstill.outlived_by(wall_ns(102.0 + step_s), 103.6)
-    standstill.begun(105.0)  # the interval of both stalls is by one clock
+    standstill.begun(105.0)  # the steady clock gives the times of both stalls
     standstill.passed(105.0, wall_ns(105.0 + step_s))
     standstill.passed(105.4, wall_ns(105.4 + step_s))
     for sent in (102.0, 103.3, 104.9):

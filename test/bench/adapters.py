@@ -14,7 +14,7 @@ LARGEST_PIECE: Final = 16
 PACKET: Final = 62
 """Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""Rate of the adapter's clock, relative to the board's clock.
+"""Period of the adapter's timer, relative to its nominal period by the board's clock.
 
 Within 8 s, this difference makes the packets end at all phases of the board's tick.
 """

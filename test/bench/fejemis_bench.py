@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The Fejemis's part of ``make bench``: the delay of the front angle to the drive Teensy.
+"""The Fejemis's part of ``make bench``: the delay of the front wheel's angle to the drive board.
 
-The two simulated Teensys have their own process. Other processes keep the computer busy.
+The two simulated boards have their own process. Other processes keep the computer busy.
 """
 
 import contextlib
@@ -43,9 +43,9 @@ RELAYED: Final = re.compile(rb"fwl (-?[0-9.]+) *\n")
 
 
 def boards(masters: Sequence[int], seconds: float, results: Connection) -> None:
-    """Run both simulated Teensys in real time; then send a list of delays in s to ``results``.
+    """Run both simulated boards in real time; then send a list of delays in s to ``results``.
 
-    A delay begins when the front Teensy reports an angle. It ends when the drive Teensy receives
+    A delay begins when the front board reports an angle. It ends when the drive board receives
     this angle from the driver. The wheel swings, so that successive angles differ.
     """
     pair = SimulatedFejemis()

@@ -64,7 +64,7 @@ class Program:
 
     @property
     def children(self) -> list[int]:
-        """Return the numbers of the process's child processes."""
+        """Return the process ids of the process's children."""
         tasks = Path(f"/proc/{self.process.pid}/task").iterdir()
         return [int(pid) for task in tasks for pid in (task / "children").read_text().split()]
 

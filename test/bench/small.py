@@ -21,7 +21,7 @@ from stage import Stage
 from system import MPS2_PER_COUNT, SETTLING_S, command_latencies, latencies, p99
 
 PARTS: Final = (1.0, 0.25, 0.12, 0.08, 0.06, 0.05, 0.04)
-"""Shares of one core that are measured. The driver gets this share, and so does the floor."""
+"""Shares of one core that are measured in turn. Driver and floor get one such share each."""
 MEASURED_S: Final = 8.0
 RUN_S: Final = 1e-3
 """Processor time in s that a cgroup gets in each period. The kernel permits no shorter time."""
@@ -32,7 +32,7 @@ STOP: Final = b"\xff\xfe\x02"
 STOPPING_S: Final = 2.0
 """Time in s to wait for a Stop after the last command.
 
-The measurement waits for this fixed time, so that all shares of a core have the same duration.
+This time is fixed, so that the measurement takes equally long for every share of a core.
 """
 
 
@@ -129,9 +129,10 @@ def _table(parts: Sequence[float], seconds: float) -> list[str]:
 def _row(part: float, stage: Stage, seconds: float) -> str:
     with ear(*NAMES) as listener:
         with Program(str(HERE / "hand.py"), str(seconds), NAMES[0]) as hand:
-            sent = hand.result()[0]  # the start of hand.py disturbs the other processes
+            sent = hand.result()[0]
         time.sleep(STOPPING_S)
         result = listener.result()
+    # Earlier data is not used, because the start of hand.py disturbs the other processes.
     start, last = sent[0][0], sent[-1][0]
     rates, delays = [], []
     for heard, said, unit in zip(result["heard"], stage.said, (MPS2_PER_COUNT, 1.0), strict=True):

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Write the number and the name of each thread to the file in the environment variable NAMES.
+"""Write the native id and the name of each thread to the file in the environment variable NAMES.
 
 The driver's process imports this module before the driver starts.
 """

@@ -23,7 +23,7 @@ Chunker = Callable[[list[Byte], random.Random], Iterator[Read]]
 class Board:
     """A simulated stream of frames from a board.
 
-    ``skew``: relative error of the board's clock against the host's clock.
+    ``skew``: relative error of the board's tick by the host's clock; positive if it is too long.
 
     ``loss``: fraction of the frames that are lost.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Reads that contain only IMU readings. After them, the session has nothing to write or report."""
+"""Tests of ``Inbound.process``: when nothing is left to do, and which data answers a request."""
 
 from contextlib import suppress
 
@@ -37,7 +37,10 @@ REQUESTS = {400: Request.START, 700: Request.PAUSE, 1000: Request.START, 1300: R
 def test_where_nothing_is_left_there_is_nothing_to_write_or_to_tell(
     drives: bool, run: bool
 ) -> None:
-    """After a read that contains only IMU readings, the session writes and reports nothing."""
+    """``process`` returns False after most reads that contain only IMU readings.
+
+    The session then writes and reports nothing.
+    """
     session, board = opened(run=run), SimulatedBoard(BoardSettings(seed=2))
     nothing_left, told = 0, 0
     for tick in range(2000):

@@ -93,7 +93,7 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """Requests wait, and the board is silent. The session's next wake-up is in the future."""
+    """A request waits. The board sends data, or is silent. The next wake-up is in the future."""
     bench = Bench()
     bench.speaks = speaks
     bench.open()

@@ -19,7 +19,7 @@ If more are skipped, the decoded frame is right only if the next decoded frame m
 excludes false frames that happen to equal a much later true frame.
 """
 REACH_BYTES = 600
-"""The search for the true frame of a decoded one begins this number of bytes before the read."""
+"""The search for a decoded frame's true frame begins about this number of bytes before the read."""
 
 
 @dataclass(slots=True)

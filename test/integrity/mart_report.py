@@ -47,9 +47,9 @@ FAULTS: Final = {
     ),
 }
 WRONG_NEES: Final = 28.0
-"""Largest normalised squared error (NEES) of a right pose.
+"""Largest normalised squared error (NEES) of a pose that counts as right.
 
-If the covariances are right, 1 right pose in 270,000 has a larger error.
+If the covariances are right, 1 pose in 270,000 has a larger error by chance.
 """
 WRONG_M, WRONG_V = 0.08, 0.1
 FRONT_M, VOLTS = 5.0, 23.4
@@ -117,7 +117,11 @@ def drive(name: str, seconds: float, seed: int) -> Score:
 
 
 def _watch(bench: MartBench, score: Score) -> None:
-    """Run for 0.1 s, and compare each message with the truth at the time of its publication."""
+    """Run for 0.1 s, and count right and wrong messages.
+
+    Odometry is compared with the truth at its publication, other messages with the truth at the end
+    of the 0.1 s.
+    """
     seen = len(bench.events)
     for _ in range(10):
         told = len(bench.odometry)

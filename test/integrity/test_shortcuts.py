@@ -83,7 +83,7 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
     """Return one in ``number`` combinations of the choices.
 
-    They contain each pair of choices if ``number`` is not larger than any list of choices.
+    They contain each pair of choices if every list has at least ``number`` choices.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [

@@ -128,9 +128,9 @@ def stamp(
 ) -> Stamped:
     """Generate one stream and stamp its samples.
 
-    ``loss``: share of lost bytes. ``skew``: relative error of the board's clock. ``event``: what
-    happens in the middle of the stream, a key of ``EVENTS_S``. The host begins to read somewhere in
-    the first second of the stream.
+    ``loss``: share of lost bytes. ``skew``: relative error of the board's tick; positive if it is
+    too long. ``event``: what happens in the middle of the stream, a key of ``EVENTS_S``. The host
+    begins to read somewhere in the first second of the stream.
     """
     random = Random(f"{line} {loss} {skew} {seed}")
     truth = stream_of(SCENARIOS[scenario], seed, seconds / 2 if event == RESTART else seconds)

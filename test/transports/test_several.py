@@ -234,6 +234,6 @@ def test_the_same_port_twice_is_missing_once(ends: Ends) -> None:
 
 
 def test_a_port_that_cannot_be_waited_for_is_none_of_several() -> None:
-    """One of two lines is a port without a file descriptor. Opening them raises LinkError."""
+    """A port without a file descriptor cannot be one of several lines: LinkError is raised."""
     with pytest.raises(LinkError, match="does not work for a board with several ports"):
         Several([partial(SerialPort, "loop://", 115200)])

@@ -86,7 +86,7 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """The driver does not read. A channel keeps as many bytes as a terminal would.
 
-    Later bytes are dropped and counted.
+    Later bytes are dropped. The result of ``_send`` is the number of kept bytes.
     """
     served = InProcessBoard(toy_lines.ToyLines())
     taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]

@@ -84,7 +84,7 @@ def test_a_goal_in_odom_is_reached_wherever_the_board_believed_to_be(
 
 @pytest.mark.parametrize("turns", [-2, 0, 3])
 def test_the_robot_takes_the_shorter_turn_however_often_it_has_turned_before(turns: int) -> None:
-    """The board's heading counts full turns, and may begin at several of them.
+    """The board's heading counts full turns, and may begin several turns away from zero.
 
     The driver converts a goal so that the robot turns by less than half a turn.
     """

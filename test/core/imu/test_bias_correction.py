@@ -215,7 +215,7 @@ def test_a_wrong_range_is_told_once_with_the_right_one() -> None:
 def test_the_figures_count_what_happened() -> None:
     """``Session.figures`` counts readings, gaps, losses, restarts and limited commands.
 
-    They also count equal readings in a row, which show that a sensor is stuck.
+    It also counts equal readings in a row, which show that a sensor is stuck.
     """
     bench = running(gyro_stuck=(5, 5, 5))
     figures = bench.session.figures(bench.now)

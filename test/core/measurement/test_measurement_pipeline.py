@@ -65,8 +65,8 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
     """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
 
-    Up to 20 mm of it may be missing, because the board had not reported the last motion before the
-    reset.
+    It may be up to 20 mm too long, because the first displacement after the reset also contains the
+    motion that the board had not reported before.
     """
     for _ in range(10):
         bench.drive(0.5)

@@ -93,7 +93,7 @@ def test_a_word_that_leaps_once_is_refused_and_the_next_reading_comes_at_once(
 def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
     """One word of the readings jumps and stays there, as when a robot is set down on a slope.
 
-    All readings are released, the first of them one reading late.
+    All readings are released. The first one after the jump is released one reading late.
     """
     readings, through = row(60, {number: {0: 4.9} for number in range(50, 60)}), gate()
     came = admitted(readings, through)
@@ -104,7 +104,7 @@ def test_a_leap_that_lasts_is_late_by_one_reading_and_complete() -> None:
 
 
 def test_a_body_cannot_leap_in_its_turning_and_be_back_whatever_else_leaps() -> None:
-    """In one reading, values of another frame replace the gyro's values.
+    """In one reading, values of another frame replace the force along z and the gyro's values.
 
     This reading is rejected.
     """

@@ -30,7 +30,7 @@ def test_a_gap_held_the_mean_of_both_sides_as_often_as_displacements_are_missing
 def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
     """Displacements of ten seconds are missing. Only two seconds of motion are estimated for them.
 
-    If the board is silent for longer, the driver stops the robot.
+    For the remaining time no motion is added, because the driver stops the robot of a silent board.
     """
     bridge = GapInterpolation()
     bridge.tangents(body(0.02, 0.0), None)

@@ -22,7 +22,7 @@ SETTLED = 300
 """Number of readings after which the decoder has learned in which pieces the adapter sends."""
 IMU_LENGTH = 14
 DRIFT = 1.0002
-"""Rate of the adapter's clock, relative to the board's clock.
+"""Period of the adapter's timer, relative to its nominal period by the board's clock.
 
 Because of the difference, the adapter's packets end in turn at all phases of a tick.
 """

@@ -159,7 +159,7 @@ def test_commands_that_do_not_fit_the_wire_are_counted() -> None:
     commands.velocity(BodyTwist(3.3, 0.0, 0.0))
     assert commands.saturated == 1
     sent = bare(commands.velocity(BodyTwist(6.5534, 2.0, 0.0)))
-    assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice too fast: halved as one
+    assert sent == bytes.fromhex("FF FE 01 7F FF 27 10 00 00")  # twice the limit: halved
 
 
 def test_settings_may_be_replaced_while_it_runs() -> None:

@@ -74,7 +74,8 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
     stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)
     for place, number in damage_places(sent):
-        # Losing either of two equal neighbours has one result: the damage may be in either frame.
+        # If two neighbours are equal, losing either gives the same stream. So the damage may be in
+        # either frame.
         hurt = set() if stream[place] in (stream[place - 1], stream[place + 1]) else {number}
         found = decoded([stream[:place] + stream[place + 1 :]])
         if hurt:
