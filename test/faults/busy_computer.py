@@ -85,7 +85,7 @@ class PiecesTerminal(Terminal):
         return len(data) - lost
 
     def _arrival_s(self, count: int, to_come: int) -> float:
-        """Return when the next piece of a tick of ``count`` bytes is complete."""
+        """Return the time at which the next piece of a tick of ``count`` bytes is complete."""
         return self._tick_at + (count - to_come + min(PIECE, to_come)) * BYTE_S
 
 
@@ -117,7 +117,7 @@ def busy_loops() -> Iterator[None]:
 
 
 def wrong_and_missing(published: list[Key], sent: list[Key]) -> tuple[int, int]:
-    """Return how many messages were never sent, and how many sent frames have no message.
+    """Return how many messages match no frame, and how many frames are skipped between matches.
 
     Messages and frames are compared in order. Several frames may equal the first message, so the
     comparison is made from each of them. The result with the fewest errors is returned.

@@ -200,7 +200,9 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Test stops on a line that loses bytes to the board. The loss lasts until the last stop.
+        """Test stops on a line that loses bytes on the way to the board.
+
+        The loss lasts until the last stop.
 
         ``number_of_life``: index of the group of stops (``LIVES``) that each driver performs.
 

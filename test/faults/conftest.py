@@ -23,7 +23,7 @@ def lenience() -> dict[str, float]:
     """Return times of the rig, in s, for tests that also pass on a busy machine.
 
     These are the grace time for a stop, the time for the driver's end, and the time of rest after
-    a stop, in which ten commands come from a commander that goes on. ``make faults`` uses 0.1 s,
-    2 s and 1 s.
+    a stop. In this time of rest, a commander that continues would send ten commands.
+    ``make faults`` uses 0.1 s, 2 s and 1 s.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.5}

@@ -76,7 +76,7 @@ class Ending:
     def __call__(self, rig: Rig) -> None:
         """End the driver while the robot drives.
 
-        Check that the robot stops, the exit code, and that the board received Stop last.
+        Check the exit code, that the robot stops, and that the board received Stop last.
         """
         rig.drive()
         self.end(rig)

@@ -87,9 +87,8 @@ def half_restarts(half: str) -> Any:
 def half_is(half: str, what: str, allowed_s: float) -> Any:
     """Make a case in which one Teensy (``half``) has the fault ``what`` while the robot drives.
 
-    Commands must have no effect during the fault.
-
-    ``allowed_s``: time in s within which the robot must stop. 0: no limit.
+    ``allowed_s``: time in s within which the robot must stop, although commands continue. 0: the
+    robot may drive on until the end of the fault.
     """
 
     def case(rig: Rig) -> None:
@@ -157,9 +156,9 @@ BOARD: Final = RigBoard(
             "wheel_cmd has the wrong size",
             "two commanders in turn",  # the second one uses wheel_cmd
             "~/reset",
-            "SIGTERM while a call is pending",  # the call is that of ~/reset
-            "full for long, and told once",  # each attempt hears the board for a moment
-            "e-stop into a full port",  # judged by the OmniBot's frames
+            "SIGTERM while a call is pending",  # it calls ~/reset
+            "full for long, and told once",  # at each attempt, the driver receives some data
+            "e-stop into a full port",  # it checks frames of the OmniBot
             "faults_of_the_network",
             "faults_of_goals",
             "goal_ending",

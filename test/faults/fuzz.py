@@ -119,7 +119,7 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
             assert odd  # our own middleware refuses to send such bytes
     for future in futures:
         probe.wait_for_future(future)
-    # Messages on the topic estop may still wait in the driver. It takes one with each call.
+    # Messages of the topic estop may still be in the driver's queue. It takes one for each call.
     assert estop.wait_for_all_acked(Duration(seconds=PATIENCE_S))
     release = probe.client(SetBool, "estop")
     for future in [release.call_async(SetBool.Request(data=False)) for _ in range(stops)]:

@@ -46,7 +46,7 @@ BOARD: Final = RigBoard(
     without=frozenset(
         {
             "~/pause and un-pause",
-            "e-stop into a full port",  # judged by the OmniBot's frames
+            "e-stop into a full port",  # it checks frames of the OmniBot
             "faults_of_goals",
             "goal_ending",
             "random_input",

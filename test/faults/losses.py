@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes to the board until the robot must be at rest.
+"""Stops on a line that loses bytes on the way to the board until the robot must be at rest.
 
 The stops run in real time. test/integrity/outbound.py measures the rate of failures in simulated
 time.
@@ -28,7 +28,7 @@ GUARD_S: Final = 1.5
 
 
 def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
-    """Return a rig with a new driver and a still undamaged line.
+    """Return a rig with a new driver and a line that is not damaged yet.
 
     ``number``: selects the settings of the board, for example how its receiver finds frames.
     """
@@ -36,7 +36,7 @@ def losing_rig(folder: Path, kind: RigBoard, number: int, **more: float) -> Rig:
 
 
 def lose(rig: Rig, number: int) -> None:
-    """Begin to lose bytes to the board. ``number`` selects the rate and the lost bytes."""
+    """Begin to lose bytes on the way to the board. ``number`` selects the rate and the bytes."""
     rig.line.to_board = losing(RATES[number % len(RATES)], Random(number))
 
 

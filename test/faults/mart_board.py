@@ -336,7 +336,7 @@ BOARD: Final = RigBoard(
             "walk_with_goals",
             "busy_computer",
             "ctrl-C, plugged in but not yet open again",
-            "SIGTERM while a call is pending",  # the call is that of ~/reset
+            "SIGTERM while a call is pending",  # it calls ~/reset
             "SIGINT, the port full",
             "an exception, the port full",
             "SIGKILL, the port full",

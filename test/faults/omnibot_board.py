@@ -57,7 +57,7 @@ def lossy(number: int) -> BoardSettings:
 BOARD: Final = RigBoard(
     name="omnibot",
     make=make,
-    # 0.3 m/s and 0.2 rad/s, which the driver has repeated before
+    # 0.3 m/s and 0.2 rad/s, the default command of ``Rig.drive``
     old_command=bytes.fromhex("FF FE 01 00 15 00 00 00 64"),
     stop=STOP,
     opening=bytes(8) + STOP,

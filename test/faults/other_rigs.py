@@ -47,7 +47,7 @@ class GoalRig(Rig):
         return Navigator(self.probe, self.odom)
 
     def drive(self, vx: float = 0.3, vy: float = 0.0, yaw_rate: float = 0.2) -> None:
-        """Send a goal until the board drives to it."""
+        """Repeat a goal until the board drives to it."""
         for _ in range(50):
             self.hand.hold(vx, vy, yaw_rate)
             if self.wait_for_board(lambda line: line.board.driven, 0.2):

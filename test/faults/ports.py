@@ -54,13 +54,13 @@ class Terminal(PtyBoard):
 
     @contextmanager
     def full(self, old: bytes) -> Iterator[None]:
-        """Fill the kernel's buffer with ``old`` commands (20 kB), which the board does not read.
+        """Fill the kernel's buffer with ``old`` commands (20 kB) while the board does not read.
 
         At the end of the ``with`` block, wait until the board has received these commands.
         """
         self.deaf = True
         near = os.open(self.path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-        fill(near, old, full_s=0.05)  # before the driver gives the port up
+        fill(near, old, full_s=0.05)  # short, so that the driver still has the port open
         try:
             yield
         finally:
@@ -137,7 +137,7 @@ class Server(RunningBoard):
                 each.setsockopt(socket.SOL_SOCKET, SO_ATTACH_FILTER, rule)
 
     def come_back(self) -> None:
-        """Restore the network, with a server that has no connections."""
+        """Restore the network for new connections. The old connections stay cut."""
         self._listener.setsockopt(socket.SOL_SOCKET, SO_DETACH_FILTER, 0)
         self.deaf = self.mute = False
 

@@ -149,7 +149,7 @@ def server_dies(rig: NetworkRig) -> None:
 
 
 def server_vanishes(rig: NetworkRig) -> None:
-    """Cut the network without closing the connection. Later, restore it with a restarted server.
+    """Cut the network without closing the connection. Later, restore it for new connections.
 
     The robot must be at rest when the driver has connected again.
     """

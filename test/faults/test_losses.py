@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of each kind of stop on a line that loses bytes to the board. ``make faults`` has more."""
+"""Tests of each kind of stop on a line that loses bytes. ``make faults`` has more."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from omnibot_board import BOARD
 def test_the_robot_stands_though_bytes_are_lost_on_the_way_to_it(
     number: int, tmp_path: Path, lenience: dict[str, float]
 ) -> None:
-    """The line loses bytes to the board, even while the robot must stop.
+    """The line loses bytes on the way to the board, even while the robot must stop.
 
     Each kind of stop still works.
     """

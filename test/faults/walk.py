@@ -2,8 +2,8 @@
 
 """Faults in random order, several of them at the same time, under random commands.
 
-Every few steps, the commands and the faults end, except a loss of bytes to the board. The robot
-must come to rest, and then obey a fresh command.
+Every few steps, the commands and the faults end, except a loss of bytes on the way to the board.
+The robot must come to rest, and then obey a fresh command.
 """
 
 from collections.abc import Callable

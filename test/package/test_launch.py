@@ -157,7 +157,7 @@ def test_the_driver_has_every_parameter_that_is_offered() -> None:
 class Stub(ModuleType):
     """A substitute for a module of launch.
 
-    Each name in the module is a function. A call returns an object with its name and arguments.
+    Each name in the module is a function, which returns its name and the arguments of the call.
     """
 
     def __getattr__(self, name: str) -> Any:

@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = "omnibot_driver"
 CORE = f"{PACKAGE}.core"
 
-# rosdep keys of what is not a ROS package; ROS packages have one name for both.
+# rosdep keys of libraries by the name that Python imports. For a ROS package, both are the same.
 ROSDEP_KEYS = {
     "hypothesis": "python3-hypothesis",
     "matplotlib": "python3-matplotlib",
@@ -43,9 +43,9 @@ EXTRAS = {
     "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
 }
 
-# Libraries of these that rosdep does not install in a suitable version: it gets rosbags only from
-# pip, which Ubuntu 24.04 refuses, and textual in the distribution's version. The README says how to
-# install them.
+# Two of these libraries, which rosdep does not install in a suitable version. It would get rosbags
+# from pip, which Ubuntu 24.04 refuses, and textual in the distribution's version. The README says
+# how to install them.
 FROM_PIP = {"rosbags", "textual"}
 
 # Modules for values and arithmetic; none waits, reads a clock or has side effects.
@@ -117,7 +117,7 @@ def imports(file: Path) -> list[str]:
 def third_party(files: Iterable[Path]) -> set[str]:
     """Return the rosdep keys of libraries that these files import.
 
-    Python's own modules and those of this repository are left out.
+    Python's own modules, those of this repository and ``FROM_PIP`` are left out.
     """
     files = list(files)
     own = {PACKAGE}  # tests import their helpers by bare name
@@ -273,7 +273,7 @@ def test_mypy_checks_exactly_what_imports_no_ros() -> None:
 
 
 def test_every_source_file_says_whose_it_is() -> None:
-    """The first line of each source file names the owner, and the licence from package.xml."""
+    """The first line of each source file names the maintainer of package.xml, and the licence."""
     line = f"# Copyright {MANIFEST.findtext('maintainer')}. SPDX-License-Identifier: Apache-2.0"
     files = python_files(PACKAGE, "docs", "launch", "test", "setup.py")
     without = [str(file) for file in files if file.read_text().partition("\n")[0] != line]

@@ -82,8 +82,8 @@ def found() -> dict[str, list[str]]:
     places: dict[str, list[str]] = {}
     lowered = {name: text.lower() for name, text in texts().items() if name not in ALLOWED}
     for phrase, one in PATTERNS.items():
-        # Most patterns begin with a letter, which Python finds quickly. So the character before a
-        # match is looked at afterwards.
+        # Python searches faster if a pattern begins with a letter, as most do here. So the
+        # character before a match is checked afterwards.
         pattern = re.compile(rf"(?:{one})(?!\w)".replace(" ", r"(?: |\s*\n[\s#|]*)"), re.MULTILINE)
         for name, text in lowered.items():
             for match in pattern.finditer(text):

@@ -2,9 +2,9 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-``odo``: answers ``ok X``, in m.
+``odo``: answers ``ok X`` with the position X, in m.
 
-``move X``: drives X m at 0.5 m/s, then answers ``ok X``.
+``move D``: drives D m at 0.5 m/s, then answers ``ok X``, as to ``odo``.
 
 ``stop``: ends the move. The reply to the move is then a failure.
 """

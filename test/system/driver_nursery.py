@@ -139,7 +139,7 @@ def serve(descriptor: int) -> None:
         if control not in ready:
             continue
         request, descriptors, _, _ = socket.recv_fds(control, LARGEST_REQUEST, 2)
-        if not request:  # the tests were killed: a driver left over would open other ports
+        if not request:  # the tests were killed; their drivers might open ports of later tests
             for pid in statuses:
                 os.kill(pid, signal.SIGTERM)
             return

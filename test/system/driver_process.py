@@ -31,9 +31,12 @@ _nursery = Nursery()
 class Driver:
     """The driver as a separate process in a namespace, by default an unused one.
 
-    It is forked from a process that has already imported the driver.
+    It is forked from a process that has already imported the driver, except with ``interpreter``.
+
     ``before``: Python code that runs before the driver, in its process.
+
     ``interpreter``: whether the driver runs in a new interpreter, which also runs exit handlers.
+
     ``more``: further ROS arguments.
     """
 

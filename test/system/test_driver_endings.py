@@ -66,7 +66,7 @@ necessary, so the limits do not delay a test.
 def test_a_signal_while_driving_ends_with_the_stop_frame_and_exit_code_zero(
     start_board: Start, start_driver: Start, probe_of: Start, signals: list[signal.Signals]
 ) -> None:
-    """One or two signals arrive while the robot drives.
+    """One, two or three signals arrive while the robot drives.
 
     The driver sends Stop and exits with code 0. Ctrl-C on ``ros2 launch`` sends two signals.
     """

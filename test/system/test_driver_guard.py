@@ -62,11 +62,11 @@ def hang(driver: Driver, board: PtyBoard) -> int:
 
 
 def wait_until(predicate: Callable[[], object]) -> None:
-    """Poll the predicate until it holds. Processes and log lines give no event to wait for."""
+    """Poll the predicate until it holds."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
         assert time.monotonic() < end, "it did not come about"
-        time.sleep(0.02)  # neither a process that stops nor a file raises an event
+        time.sleep(0.02)  # processes and log lines give no event to wait for
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV, signal.SIGABRT])
@@ -130,7 +130,7 @@ def test_a_driver_that_hangs_is_stopped_for_and_stays_so_until_a_fresh_command(
     mark = hang(driver, board)
     assert board.wait_for(lambda b: LAST_WORDS in bytes(b.received[mark:]), PATIENCE_S)
     assert board.wait_for(still, PATIENCE_S)
-    deaf = board.board.tick + 200  # beyond the silence that a board is allowed
+    deaf = board.board.tick + 200  # longer than a board may be silent
     assert board.wait_for(lambda b: b.tick > deaf, PATIENCE_S)
     with board.lock:
         mark, said = len(board.board.commands), len(driver.lines)

@@ -125,7 +125,7 @@ def test_start_starts_a_board_that_was_left_paused(
 ) -> None:
     """The parameter ``auto_start`` is false.
 
-    The driver sends nothing until a user calls ``~/start``.
+    The driver does not start the board until a user calls ``~/start``.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path, auto_start=False))

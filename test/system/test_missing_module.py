@@ -43,7 +43,7 @@ def started_with(**environment: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_it_says_that_a_domain_is_too_large() -> None:
-    """ROS_DOMAIN_ID has no UDP ports. The driver says so. Fast DDS would end it in silence."""
+    """ROS_DOMAIN_ID is too large. The driver says so; Fast DDS would end it without a message."""
     done = started_with(ROS_DOMAIN_ID="233")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
@@ -52,7 +52,7 @@ def test_it_says_that_a_domain_is_too_large() -> None:
 
 
 def test_what_ros_says_about_a_missing_middleware_is_not_lost() -> None:
-    """RMW_IMPLEMENTATION is misspelt. ROS ends the process, and its message reaches the user."""
+    """The value of RMW_IMPLEMENTATION is misspelt. ROS ends the driver and prints the reason."""
     done = started_with(RMW_IMPLEMENTATION="rmw_fastdds_cpp")
     assert done.returncode not in (0, None)
     assert "rmw_fastdds_cpp" in done.stderr

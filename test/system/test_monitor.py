@@ -46,7 +46,7 @@ def steer(terminal: PseudoTerminal, board: PtyBoard, said: list[Twist]) -> None:
         terminal.type("w")
         if board.wait_for(lambda b: drives(b) and any(twist.linear.x for twist in said), 1.0):
             return
-        wait_for_ticks(board, 60)  # the zeros of this press
+        wait_for_ticks(board, 60)  # until the monitor has sent its zeros
     raise AssertionError("the robot does not drive")
 
 

@@ -102,7 +102,7 @@ def test_what_happens_on_the_way_ends_it_at_rest(
     shown = {each: once(action) for each, action in actions.items()}
     for each in ("other", "wheels"):  # a single message may be lost while the tool is held up
         shown[each] = repeated(actions[each])
-    publishers = [(estop, 1), (other, 2), (wheels, 2)]  # the driver, and except for estop the tool
+    publishers = [(estop, 1), (other, 2), (wheels, 2)]  # the driver; for commands, also the tool
     assert robot._wait(
         lambda: all(each.get_subscription_count() >= count for each, count in publishers),
         PATIENCE_S,

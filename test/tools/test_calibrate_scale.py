@@ -147,6 +147,6 @@ def test_planted_scales_are_found_and_applied(
     for name, planted in (("linear_scale", 80.0), ("angular_scale", 430.0)):
         value, sigma = row(table, name)
         assert abs(value - planted) < max(4 * sigma, 0.002 * planted)
-        assert sigma < 0.01 * planted  # half as much on an idle machine
+        assert sigma < 0.01 * planted  # on an idle machine, half of this
         assert written[name] == pytest.approx(value, rel=1e-3)
         assert applied[name] == written[name]

@@ -155,7 +155,8 @@ def test_a_motor_in_the_loop_turns_by_what_the_loop_says() -> None:
 def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
     """The proposed gains keep the limits of Ms and overshoot.
 
-    They make the control errors smaller.
+    They reduce the error after a load change. The mean of both control errors is smaller, too, each
+    relative to the error with the manual's gains.
     """
     gains = better_gains([motor])
     before, after = behaviour(motor, MANUAL), behaviour(motor, gains)

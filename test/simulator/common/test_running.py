@@ -40,7 +40,7 @@ class Motor:
 
 
 class LateBoard(RunningBoard[Motor]):
-    """A board whose thread a busy computer does not run for a while. A stop arrives meanwhile."""
+    """A board whose thread is delayed by a busy computer. A stop arrives during the delay."""
 
     def __init__(self) -> None:
         super().__init__(Motor())

@@ -2,7 +2,7 @@
 
 """A simulated LOIS ECU in simulated time.
 
-The driver's codec makes its commands and reads its reports.
+The driver's codec encodes the commands to the ECU and decodes the ECU's reports.
 """
 
 from omnibot_driver.core.lois_ecu import (
@@ -23,7 +23,7 @@ LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
 class Rig:
     """A simulated board and its host.
 
-    ``heard``: all reports of the board, each with the time of its last byte.
+    ``heard``: all reports of the board, each with the time at which its ``run`` ended.
     """
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:

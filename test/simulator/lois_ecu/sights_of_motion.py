@@ -120,7 +120,7 @@ def slow_timer(quirks: Quirks) -> bool:
     for _ in range(500):
         rig.board.step()
         parts.append(rig.board.wheels[0].exact_rpm / rig.board.motors[0].rpm)
-    near = [part for part in parts if abs(part - 1) < 0.03]  # no edge that was served late
+    near = [part for part in parts if abs(part - 1) < 0.03]  # without edges that were served late
     return sum(near) / len(near) > 1.0035
 
 

@@ -220,7 +220,7 @@ def test_a_message_can_be_asked_for_once_or_turned_off(quirks: Quirks) -> None:
 
 @pytest.mark.slow
 def test_the_gps_moves_with_the_robot() -> None:
-    """The robot drives along x, which points east. The reported longitude changes accordingly."""
+    """The robot drives. The reported longitude agrees with the robot's x, which points east."""
     rig = Rig(DOCUMENTED)
     rig.drive(40, 40, 20.0)
     fixes = [report for report in rig.run(3.0) if isinstance(report, GpsPosition)]

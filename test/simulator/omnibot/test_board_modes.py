@@ -31,7 +31,7 @@ from omnibot_driver.simulator.omnibot import (
 
 
 def test_a_booting_board_is_dead_and_then_says_that_it_is_paused() -> None:
-    """A booting board sends and obeys nothing. At the end of its boot it sends a paused text."""
+    """A booting board sends and obeys nothing. At the end of its boot it sends "Paused: 0"."""
     board = SimulatedBoard(BoardSettings(boot_time_s=0.3))
     board.receive(WAKE_UP + b"S")
     assert run(board, 0.29) == b""
@@ -75,7 +75,7 @@ def test_a_board_may_wake_up_by_what_it_hears_while_it_boots() -> None:
 def test_p_pauses_and_unpauses() -> None:
     """The letter P pauses a board, and a second P starts it again.
 
-    At the beginning of each pause, the board sends a paused text.
+    At the beginning of a pause, the board sends the text "Paused: 0".
     """
     board = SimulatedBoard(RUNNING)
     board.receive(b"P")

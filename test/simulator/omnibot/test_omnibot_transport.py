@@ -25,7 +25,7 @@ def read(transport: SimulatedTransport) -> bytes:
 
 
 def test_a_board_boots_and_obeys() -> None:
-    """The board boots and sends its paused text.
+    """The board boots and sends the text "Paused: 0".
 
     After it is woken and started, it sends data frames.
     """

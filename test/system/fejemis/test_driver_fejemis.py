@@ -115,7 +115,7 @@ def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe
     robot.wait_until(lambda board: board.vehicle.brush)
     lift.publish(Float32(data=6.0))
     robot.wait_until(lambda board: board.vehicle.lift.volts == 6.0)
-    robot.wait_until(lambda board: board.vehicle.lift.volts == 0.0)  # with cmd_vel_timeout
+    robot.wait_until(lambda board: board.vehicle.lift.volts == 0.0)  # after cmd_vel_timeout
     timer = probe.node.create_timer(0.1, lambda: lift.publish(Float32(data=-8.0)))
     robot.wait_until(lambda board: -8.0 <= board.vehicle.lift.volts < -7.9)
     assert probe.call(SetBool, "estop", data=True).success
@@ -215,7 +215,7 @@ def test_power_off_is_refused_while_driving(
     """A user calls ``~/power_off`` during a drive. The driver refuses.
 
     At rest, the power goes off after a delay. On a busy computer the driver may stall, which stops
-    the robot just before the call. ``~/start`` then withdraws the call.
+    the robot just before the call. ``~/start`` then cancels the power-off.
     """
     robot = robot_of(stack, tmp_path)
     probe: Probe = probe_of(started(robot, start_driver, power_off_delay=1.0))

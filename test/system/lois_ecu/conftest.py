@@ -2,7 +2,7 @@
 
 """Fixtures: a driver, and a simulated LOIS ECU that follows the manual or the public firmware.
 
-All tests of a module use the same ECU and driver of each kind, except those that use ``new``.
+For each firmware, all tests of a module use the same ECU and driver, except those that use ``new``.
 """
 
 from collections.abc import Callable, Iterator

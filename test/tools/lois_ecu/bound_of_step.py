@@ -51,7 +51,7 @@ def bound(rate: float, slow_s: float, fast_s: float, kind: str) -> float:
         places = (record + 0.5) / RECORDS + np.arange(SAMPLES + 1)
         values = np.array([rate, slow_s, fast_s, *places])
         slopes = np.array([_slope(values, place) for place in range(3)]).T
-        begin = _slope(values, slice(3, None))  # all marks shifted alike: where the record begins
+        begin = _slope(values, slice(3, None))  # the record begins at an unknown place
         ways_s = np.diff(times_s(values))
         jacobian = np.diff(np.column_stack((slopes, begin, rate * slopes[:, 0])), axis=0)
         jacobian /= ways_s[:, None]

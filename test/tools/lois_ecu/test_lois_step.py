@@ -140,7 +140,7 @@ def test_marks_that_were_missed_or_timed_late_cost_little() -> None:
 
 
 def test_records_that_are_too_short_are_refused() -> None:
-    """The records are too short. The error names ``record_samples``, which sets their length."""
+    """The records are too short. The error names ``--samples``, which sets their length."""
     with pytest.raises(ToolError, match="increase --samples"):
         fit([one[:20] for one in starts(PLANT, 3)], TICKS)
 
