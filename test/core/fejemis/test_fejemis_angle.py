@@ -79,7 +79,7 @@ def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
 def test_a_late_driver_is_not_blamed_on_the_front_board(first: int) -> None:
     """The driver does nothing for 80 ms, and then reads one port before the other.
 
-    Until it has read both ports, the refusal of a command names the computer.
+    Until it has read the front board's port, the refusal of a command names the computer.
     """
     bench = nominal()
     waiting = {DRIVE: b"", FRONT: b""}

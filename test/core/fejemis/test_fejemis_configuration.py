@@ -190,7 +190,7 @@ def test_a_small_difference_is_written_after_a_start() -> None:
 
 @pytest.mark.slow
 def test_a_damaged_line_without_a_sum_changes_no_setting() -> None:
-    """Without checksums, a query that loses one or two characters does not become a command."""
+    """Without checksums, a query that loses one or two characters never changes a setting."""
     bench = nominal(Simulated(firmware=Firmware(sums=False)))
     bench.run(8.0)
     texts = {text for channel in (DRIVE, FRONT) for text in bench.lines(channel)}

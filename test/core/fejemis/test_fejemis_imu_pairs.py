@@ -208,7 +208,7 @@ def assert_nothing_is_missing(result: Outcome, lines: list[Line], reads: list[Re
 @pytest.mark.parametrize("layout", LAYOUTS, ids=str)
 @pytest.mark.parametrize("period_s", [0.001, 0.004, 0.0075, 0.02, 0.033, 0.1])
 def test_every_sample_is_given_if_no_line_is_lost(layout: Layout, period_s: float) -> None:
-    """All lines arrive, in regular reads that are shorter or longer than the period of the samples.
+    """All lines arrive. The interval between reads is shorter or longer than the sampling period.
 
     Every sample is found.
     """

@@ -2,7 +2,7 @@
 
 """Tests of the lines of both Teensy boards: checksums, messages and damage.
 
-The lines in the ``GOLDEN`` tables are copied from the manual.
+The lines in ``GOLDEN`` are from the manual, or are formed from its lists of fields.
 """
 
 import random
@@ -221,7 +221,7 @@ BEAT = b"hbt 44.97199 90 110 24.95 10 0"
 def test_whether_lines_have_sums_is_learnt_from_the_heartbeat(*, sums: bool) -> None:
     """The first heartbeat shows whether the board's lines have checksums.
 
-    Afterwards, lines that differ from the heartbeat in this are discarded.
+    Afterwards, lines that differ from the heartbeat in this respect are discarded.
     """
     decoder = FejemisDecoder("auto")
     assert decoder.sums is None

@@ -20,7 +20,7 @@ def lift_it(bench: Bench, volts: float = 6.0) -> None:
 
 
 def test_the_lift_runs_no_longer_than_a_command() -> None:
-    """The driver sends a lift voltage with a time limit, and then nothing more.
+    """The driver sends a lift voltage with a time limit. Then its lines no longer arrive.
 
     The lift stops by itself when this time is over.
     """
@@ -71,7 +71,7 @@ def test_a_flood_of_voltages_or_colours_is_thinned_and_the_newest_wins() -> None
 def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
     """A lift voltage waits, because another was just sent. Its time limit begins when it is sent.
 
-    If the lift is switched off before, the waiting voltage is discarded.
+    If the lift is switched off before that, the waiting voltage is discarded.
     """
     machine = Machine()
     machine.lift(3.0, 0.0, 0.5)

@@ -206,7 +206,8 @@ def said_by_the_driver() -> set[str]:
     bench.board.services.set_brush(True, bench.now)
     bench.board.services.set_led(255, 128, 0, bench.now)
     bench.settle()
-    bench.board.settings = FejemisSettings()  # else the accelerometer must not be calibrated
+    # A parameter that sets its offsets would forbid the calibration of the accelerometer.
+    bench.board.settings = FejemisSettings()
     for job in Job:
         bench.board.services.ask(job, None, bench.now)
         bench.settle()

@@ -174,7 +174,7 @@ def test_a_power_off_without_an_answer_may_still_come() -> None:
 
 
 def test_a_power_off_that_no_board_confirms_does_not_claim_to_happen() -> None:
-    """The drive board sends heartbeats but hears nothing. The answer says: not confirmed."""
+    """The drive board sends heartbeats but receives nothing. The answer says "does not confirm"."""
     bench = nominal()
     bench.hears.clear()
     assert "does not confirm" in ask(bench, Job.POWER_OFF, 5.0).message

@@ -55,8 +55,8 @@ def stall(bench: Bench, stall_s: float, *, room: int, noticed: bool = True) -> N
 def test_the_motion_of_a_stall_is_in_odom(noticed: bool, stall_s: float, phase_s: float) -> None:
     """The robot drives a curve while the driver stalls, or reads late. Nothing is lost.
 
-    Without a stall, lines of more than a second ago are implausible. So the first displacement
-    covers seconds, and the next one 20 ms, at the same speed.
+    If the driver does not notice the stall, it rejects lines that are more than 1 s late. The first
+    displacement then covers seconds, and the next one 20 ms. Neither is regarded as implausible.
     """
     bench = nominal()
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
@@ -113,7 +113,10 @@ def test_samples_of_a_second_late_read_get_their_sampling_times_too(stall_s: flo
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [0.8, 0.81, 1.31, 3.01])
 def test_no_sample_after_lost_bytes_gets_a_time_at_which_they_were_lost(stall_s: float) -> None:
-    """The buffer was full during the stall, but the reads follow each other without a pause."""
+    """The buffer was full during the stall, but the reads follow each other without a pause.
+
+    No sample is stamped with a time at which bytes were lost.
+    """
     bench = nominal()
     bench.run(1.0)
     begin_s, before = bench.now, len(bench.imu)

@@ -17,7 +17,10 @@ from omnibot_driver.core.readings import ImuReading
 
 
 def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
-    """The second stamp is later than the first by the smallest amount a float can represent."""
+    """The second time is later than the first by the smallest amount a float can represent.
+
+    The second stamp is then 1 µs after the first.
+    """
     stamped = StampedReadings()
     reading = ImuReading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     for stamp_s in (50_000.0, 50_000.000000000007):
@@ -32,8 +35,8 @@ def test_two_stamps_never_differ_only_by_a_rounding_error() -> None:
 def test_stamps_in_nanoseconds_increase_after_restarts_that_are_read_late(seed: int) -> None:
     """The boards restart, and each read brings the lines of up to half a second.
 
-    A new clock begins within a read. The first stamps are then the time of this read, give or take
-    rounding errors.
+    A new clock begins within a read. The first stamps are then the time of this read, apart from
+    rounding errors. In nanoseconds, they still increase.
     """
     chance = random.Random(seed)
     bench = Bench()

@@ -18,7 +18,7 @@ def without_relays(lines: list[str]) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("resumes", [False, True])
 def test_an_estop_is_said_to_both_and_released_on_drive_alone(*, resumes: bool) -> None:
-    """An e-stop is latched on both boards. At its release, only the drive board gets ``start``.
+    """An e-stop stops both boards. At its release, ``start`` is sent to the drive board only.
 
     A Stop precedes ``start``, because some firmware resumes the old motion command after ``start``.
     """

@@ -30,9 +30,10 @@ HOST_GAINS = LoisEcuSettings(
         Setting.RIGHT_TD: 0.60868,
     },
 )
-"""Settings with the user's gains for the speed controllers of both wheels.
+"""Settings with gains for the speed controllers of both wheels, as a user may set them.
 
-With the board's own gains (public firmware), the right wheel's speed would oscillate.
+The ECU's own host writes these gains. With the gains that the public firmware boots with, the right
+wheel's speed would oscillate.
 """
 REPEAT_S = 0.05
 LATE_READS_S = (0.05, 0.35)

@@ -75,7 +75,7 @@ def test_after_a_square_with_turns_on_the_spot_it_is_within_3_sigma(name: str) -
 
 
 def test_hard_steering_to_both_sides_is_followed() -> None:
-    """The wheels reverse several times a second, on a board that counts ticks in both directions.
+    """The wheels often change their direction, on a board that counts ticks in both directions.
 
     The odometry ends within 5 cm and 5° of the true pose.
     """
@@ -91,9 +91,9 @@ def test_hard_steering_to_both_sides_is_followed() -> None:
 def test_with_a_hundredth_of_all_bytes_lost_it_is_hardly_worse(
     firmware: Firmware, name: str
 ) -> None:
-    """One byte in a hundred is lost, which damages 60 % of the reports.
+    """One byte in a hundred is lost, which damages about half of the tick and odometry reports.
 
-    The tick counts in later reports include the ticks of the lost ones, so the odometry stays
+    The tick counts in later reports include the ticks of the damaged reports, so the odometry stays
     accurate.
     """
     one = drive(nominal(firmware, 5), CLASSES[name], loss=0.01)

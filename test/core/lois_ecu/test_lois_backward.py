@@ -55,7 +55,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 ) -> None:
     """A wheel slows from 41 to 20 RPM and stops. The board still reports 20 RPM.
 
-    The odometry detects the rest. If it did not, its heading would be wrong by 600°.
+    The odometry detects that the wheel is at rest. Otherwise, its heading would be wrong by 600°.
     """
     one = motion(nominal("firmware", seed), "straight back", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(60)
@@ -65,7 +65,7 @@ def test_a_wheel_that_falls_to_its_set_point_and_stands_is_seen_and_started_agai
 def test_a_wheel_that_the_driver_starts_again_has_not_rolled_before() -> None:
     """A wheel at rest is commanded 7 RPM backward, and the board keeps reporting 12 RPM.
 
-    A rolling wheel would slow down, so the odometry detects the rest and adds no distance.
+    A rolling wheel would slow down. So the odometry detects the standstill and adds no distance.
     """
     one = motion(wrong("firmware", 1046), "place right", LoisEcuSettings())
     assert abs(one.error.yaw_rad) < math.radians(30)

@@ -110,7 +110,7 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """All reads are in time. Then the board's clock jumps by up to 0.2 s, as long as a late read.
+    """All reads are in time. Then the board's clock jumps by up to 0.2 s. A read may be as late.
 
     The delay of the next tick report is irregular. It would not be irregular without the jump.
     """

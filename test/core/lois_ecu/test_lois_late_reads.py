@@ -29,7 +29,7 @@ def ticks(*clocks_ms: int) -> list[Report]:
 
 
 def listening(unit: ClockUnit = "ms") -> LateReads:
-    """Return the times of a board whose ticks at 1000 to 1800 ms arrived at 1.0 to 1.8 s."""
+    """Return a ``LateReads`` that has received ticks of 1000 to 1800 ms at 1.0 to 1.8 s."""
     late_reads = LateReads()
     for clock_ms in range(1000, 2000, PERIOD_MS):
         at_s = clock_ms / 1e3
@@ -123,7 +123,10 @@ def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
 def test_times_never_decrease_and_are_not_after_the_arrival(
     told: list[tuple[int, float, bool]], unit: ClockUnit
 ) -> None:
-    """Whatever the clock shows, and however the reports are read."""
+    """The clock shows any values, and the reports are read at any times.
+
+    The times of the reports never decrease, and are not after the arrival.
+    """
     late_reads, clock_ms, now, last_s = listening(unit), 1800, 1.8, 1.8
     reports: list[Report] = []
     for passed_ms, pause_s, is_read in [*told, (200, 0.1, True)]:
@@ -148,8 +151,8 @@ def stalled_drive(
 
     Return the distance of odom from the true position, and its standard deviation, in m.
 
-    * ``most``: number of bytes that the kernel keeps. A read returns a buffer at most.
-    * ``during``: function that is called with the time since the begin of the stall, in s.
+    * ``most``: number of bytes that the kernel keeps. A read returns at most ``KERNEL_BUFFER``.
+    * ``during``: function that is called with the time since the beginning of the stall, in s.
     """
     origin, begin = bench.odometry[-1].pose, true_pose(bench)
     for _ in range(40):
@@ -210,7 +213,10 @@ def test_after_a_stall_twist_and_pose_are_those_of_the_robot(firmware: str, stal
 def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
     firmware: str, twist: BodyTwist, stall_s: float
 ) -> None:
-    """The public firmware does not count the ticks of a wheel that is commanded backward."""
+    """The driver stalls while a wheel rolls backward. The public firmware does not count its ticks.
+
+    The error of the position is at most 6 cm, or within 3 sigma.
+    """
     error_m, stddev_m = stalled_drive(Bench(firmware), stall_s, twist)
     assert error_m < max(0.06, 3 * stddev_m)
 
@@ -219,7 +225,7 @@ def test_a_stall_while_a_wheel_rolls_backward_leaves_the_pose_right(
 @pytest.mark.slow
 @pytest.mark.parametrize("stall_s", [6.0, 9.0])
 def test_a_backlog_in_several_reads_leaves_the_pose_right(firmware: str, stall_s: float) -> None:
-    """The operating system has kept 64 KiB. It returns them in reads of 4 KiB."""
+    """The operating system has kept 64 KiB, and returns 4 KiB in each read. The pose is right."""
     error_m, _ = stalled_drive(Bench(firmware), stall_s, most=65536)
     assert error_m < 0.06
 
@@ -227,7 +233,10 @@ def test_a_backlog_in_several_reads_leaves_the_pose_right(firmware: str, stall_s
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [0.3, 1.0, 2.5])
 def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
-    """The board of the public firmware restarts while the driver stalls, so the robot stops."""
+    """A board with the public firmware restarts while the driver stalls, so the robot stops.
+
+    The estimated position stops there too.
+    """
     bench = Bench("firmware")
     error_m, stddev_m = stalled_drive(
         bench, 3.0, during=lambda s: bench.board.reboot() if s == at_s else None
@@ -238,7 +247,10 @@ def test_a_restart_during_a_stall_ends_the_motion_of_odom(at_s: float) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [4.2, 5.0])
 def test_a_restart_at_rest_in_the_second_read_of_a_backlog_moves_nothing(at_s: float) -> None:
-    """The board of the manual has a clock in ns, so its restart shows only in the arrival times."""
+    """The robot is at rest. Its board restarts during a stall. The pose does not change.
+
+    The board of the manual has a clock in ns, so its restart shows only in the arrival times.
+    """
     bench = Bench("documented")
     for _ in range(14):
         bench.drive(0.25)
@@ -268,7 +280,8 @@ def test_a_full_buffer_leaves_an_error_that_the_covariance_describes(
 ) -> None:
     """The kernel's buffer could not hold all reports, so the last ones are lost.
 
-    The next counts show the distance and the turn since then, but not the curve.
+    The next counts show the distance and the turn since then, but not the curve. The covariance
+    includes this error.
     """
     bench = Bench(firmware)
     error_m, stddev_m = stalled_drive(bench, stall_s, twist)

@@ -148,7 +148,7 @@ def test_a_report_is_its_lines_both_ways(lines: bytes, report: Report) -> None:
 def test_odometry_behind_ticks_is_told_by_its_length() -> None:
     """Message 0x12 of the public firmware contains ticks (3 lines) or odometry (6 lines).
 
-    The decoder tells them apart by the number of lines.
+    The decoder distinguishes them by the number of lines.
     """
     decoder = LoisDecoder()
     ticks = b":12ffffffff39\n:120000019031\n:120000000a68\n:120000000930\n"

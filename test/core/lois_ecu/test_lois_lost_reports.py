@@ -91,7 +91,7 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
     """Most reports are lost. The few others show one speed of the right wheel, which may rest.
 
-    The standard deviation of the heading is half of the angle that is wrong in this case.
+    The standard deviation of the heading is at least half of its error in this case.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -111,8 +111,8 @@ def test_a_gap_between_reports_leaves_the_way_in_it_uncertain(
 ) -> None:
     """In a drive backward, reports are lost for 0.9 s. The wheels may have changed their speeds.
 
-    The standard deviation of the heading grows by more than without the gap. It grows even more if
-    the speed of a wheel swings.
+    The standard deviation of the heading grows more than without the gap. It grows even more if the
+    speed of a wheel swings.
     """
 
     def grown_deg(gap_s: float) -> float:

@@ -277,7 +277,8 @@ def test_duty_backward_is_known_by_commands_alone() -> None:
 def test_an_inverted_board_turns_the_other_way(firmware: Firmware) -> None:
     """On an inverted board, the board's left wheel is the robot's right wheel.
 
-    The estimate of the yaw is still right.
+    The simulated board is not inverted, so the estimated yaw is the simulated yaw with the other
+    sign.
     """
     rig = Rig(LoisSettings(quirks=nominal(firmware).quirks), LoisEcuSettings(inverted=True))
     rig.run(4.0)

@@ -76,7 +76,7 @@ def test_no_loss_of_up_to_two_characters_makes_another_line(
 
 @pytest.mark.parametrize("with_sum", [True, False], ids=["with sum", "without"])
 def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: bool) -> None:
-    """Characters in a row are lost from two lines, but fewer than a line has.
+    """Adjacent characters of two successive lines are lost, but fewer than a line has.
 
     The remaining characters never form another valid line.
     """
@@ -91,7 +91,7 @@ def test_no_run_of_fewer_characters_than_a_line_makes_another_line(with_sum: boo
 
 
 def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
-    """Characters are lost from two set-points in a row, exactly as many as a line has.
+    """Adjacent characters of two successive set-points are lost, exactly as many as a line has.
 
     The remaining characters are a valid line with a wrong set-point. To prevent this, the driver
     sends set-points at least 18 ms apart.

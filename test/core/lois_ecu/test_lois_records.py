@@ -37,7 +37,7 @@ def test_an_rpm_record_has_times_and_speeds(tmp_path: Path) -> None:
 def test_without_a_known_unit_there_are_counts_alone(tmp_path: Path) -> None:
     """The unit of the times in a record is unknown. The cells of times and speeds are empty.
 
-    A remark in the file explains why.
+    A remark for the log explains why.
     """
     assert read(tmp_path / "rpm.csv", RPM, None).splitlines()[1] == "0,,,,,500,250"
     assert "unit" in remark(RecordReading(RPM, None, 60))

@@ -124,7 +124,7 @@ def test_a_smaller_fall_is_the_end_of_a_fall_if_reports_are_lost() -> None:
 
 
 def test_a_speed_that_comes_again_and_again_between_gaps_is_that_of_a_wheel_that_stands() -> None:
-    """Most reports are lost. The reported speed is 14 RPM from the first report on.
+    """Most reports are lost. The reported speed never falls: it rises from 13 to 14 RPM, and stays.
 
     The whole fall may be in a gap. So the wheel may be at rest, and is surely at rest after many
     reports. The same reports without gaps show a wheel that rolls.

@@ -174,7 +174,7 @@ def test_a_long_record_is_not_taken_for_damage() -> None:
 def test_a_board_that_lost_power_within_a_line_sends_nothing() -> None:
     """The board loses power within a line. The notice says that no data arrives.
 
-    It does not say that the baud rate may be wrong.
+    The notice does not say that the baud rate may be wrong.
     """
     bench = Bench("firmware")
     while not bench.board._uart.sending:

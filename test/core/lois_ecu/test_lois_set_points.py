@@ -43,7 +43,7 @@ def test_stop_is_duty_zero_and_the_emergency_stop_is_rpm_zero() -> None:
     ],
 )
 def test_wheel_rates_are_whole_rpm_at_most_50(rates: tuple[float, float], line: bytes) -> None:
-    """Above 50 RPM both wheels are slowed by one factor. Rates that round to 0 are a Stop."""
+    """Above 50 RPM both wheels are slowed by the same factor. Rates that round to 0 are a Stop."""
     ecu = started()
     total = 0
     for character in line[:11]:
@@ -73,7 +73,7 @@ def test_an_inverted_board_has_its_wheels_exchanged() -> None:
 
 
 def test_duty_is_limited() -> None:
-    """Duty is in percent. Above the limit, both duties are reduced by one factor."""
+    """Duty is in percent. Above the limit, both duties are reduced by the same factor."""
     ecu = started(LoisEcuSettings(drive_mode="duty", max_duty=60))
     percent_radps = 1 / (130.0 * 0.13)
     assert ecu.wheels([50 * percent_radps] * 2) == b":01003200323b\n"

@@ -11,7 +11,10 @@ from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
 
 
 def variance(settings: LoisEcuSettings, holds_s: float) -> float:
-    """Return the yaw variance in rad² after three changes of sign, ``holds_s`` apart."""
+    """Return the yaw variance in rad² after three set-points of alternating sign.
+
+    ``holds_s``: time from one set-point to the next, in s.
+    """
     odometry = LoisOdometry(settings)
     group = BoardOdometry(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, appended=True)
     now, rpm, turned_s = 0.0, 20, 1.0

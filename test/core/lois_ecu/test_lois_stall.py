@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of a wheel that is commanded to turn but at rest.
+"""Detection of a wheel that is commanded to turn but is at rest.
 
 The public firmware may fail to start a wheel.
 """

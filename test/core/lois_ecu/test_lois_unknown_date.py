@@ -84,7 +84,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 ) -> None:
     """A position is a fix only if the GPS also reports a date.
 
-    Without a date, it sends zeros or one of the first days of the GPS calendar.
+    Without a date, it sends zeros, or the first day of a GPS epoch (1024 weeks).
     """
     rig = GpsRig(quirks, unknown=unknown)
     rig.run(6.0)

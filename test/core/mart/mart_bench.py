@@ -155,7 +155,7 @@ class MartBench(AnyBench):
         return ""
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
-        """Command the goal pose, and repeat the command every 0.1 s while it is refused."""
+        """Command the goal pose. While it is refused, repeat it every 0.1 s, for 5 s at most."""
         for _ in range(50):
             try:
                 self.session.command_pose(Pose(x_m, y_m, yaw_rad), self.now)

@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Random drives on networks of all kinds. At the end the robot must rest and the server answer.
+"""Random drives on networks of all kinds.
+
+At the end of each drive, the robot must be at rest, and the server must answer.
 
 ``PYTHONPATH=.:test:test/core python test/core/mart/mart_campaign.py 60``: 60 drives for each
 network. Results: docs/boards/mart.md.

@@ -76,14 +76,14 @@ class World(NamedTuple):
 Rules = Callable[[State, str, Motion], bool]
 """Table of the commands allowed in each state and motion."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
-"""The same, as all commands of a state and motion together."""
+"""The same table, as a function that returns all commands allowed in a state and motion."""
 Step = tuple[str, World]
 
 
 def ready(world: World, word: str) -> bool:
     """Return whether the modelled driver is ready to send ``word``, which its table allows.
 
-    It must have waited for late copies and checked the IMU, as the real driver does.
+    The driver must have waited for late copies and checked the IMU, as the real driver does.
     """
     driver = world.driver
     row = BY_TEXT[word]
@@ -110,7 +110,7 @@ def ready(world: World, word: str) -> bool:
             return driver.unanswered <= UNANSWERED
         return driver.unanswered >= UNANSWERED and halts.isdisjoint(world.copies)
     if driver.state is State.ASKING:
-        return {"SRM", "SM"}.isdisjoint(world.copies)  # it is sent again 3 s later
+        return {"SRM", "SM"}.isdisjoint(world.copies)  # SL and SS are repeated every 3 s
     return True
 
 
@@ -151,7 +151,7 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    A copy of the command that arrived meanwhile begins at the end of the move.
+    If a copy of a move has arrived during this move, the copy may begin at its end.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)

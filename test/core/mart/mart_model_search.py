@@ -62,7 +62,7 @@ def _can_stop(world: World) -> bool:
             words = LAST_HALTS[driver.motion]
     for word in words:
         server, _ = execute(server, word.text)
-    if server.moving and server.port == "free":  # a poll shows it, and all stops follow
+    if server.moving and server.port == "free":  # a poll shows the motion, so all stops are sent
         for word in HALTS[Motion.UNKNOWN]:
             server, _ = execute(server, word.text)
     return not server.moving and server.port != "hung"

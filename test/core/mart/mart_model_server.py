@@ -52,7 +52,7 @@ def execute(server: Server, word: str) -> tuple[Server, Reply]:
     if word in ("SL", "SS"):
         return _stop_port(server, word)
     if server.port != "free":
-        return server, None  # it waits in the queue, which has the effect of a late copy
+        return server, None  # the datagram waits in the queue, like a late copy
     motion = server.motion
     if word == "MSM":
         return server._replace(manual=False), "ok"

@@ -116,8 +116,8 @@ def test_no_late_ok_proves_the_imu() -> None:
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
     """The ok to another command may come late, and could be taken for the ok to RST IMU.
 
-    So the driver sends RST IMU, the check of the IMU, only when the reply to this check must come
-    after the other ok.
+    So the driver delays RST IMU, the check of the IMU, until no such ok can arrive as late as the
+    reply to this check.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -154,9 +154,9 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 
 
 def test_every_motion_is_stopped_by_its_own_word() -> None:
-    """Each motion is stopped only by its own command.
+    """Each motion has its own stop command, which the driver uses first.
 
-    The stop port is only for controlled moves.
+    Only for controlled moves is this a command on the stop port.
     """
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
@@ -285,7 +285,7 @@ def test_a_count_from_before_the_motion_moves_nothing() -> None:
 def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
     """During a motion, a smaller encoder count arrives after a larger one.
 
-    The network has delayed or doubled the count. The pose stays.
+    The network has delayed or duplicated the smaller count, which does not change the pose.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

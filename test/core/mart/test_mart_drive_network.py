@@ -50,7 +50,7 @@ def test_most_drives_go_on_although_datagrams_take_up_to_three_tenths_of_a_secon
 def test_lost_replies_neither_stop_a_drive_nor_show_a_dead_imu(
     seed: int, firmware: Firmware
 ) -> None:
-    """Each tenth datagram is lost in both directions. Only a lost start may stop the robot."""
+    """A tenth of all datagrams is lost in each direction. Only a lost start may stop the robot."""
     bench = on(NetworkFaults(lose=0.1), firmware, seed)
     bench.command(0.3, 0.0, 10.0)
     assert set(texts(bench)) <= {"the controller did not answer RM; robot stopped"}
@@ -79,7 +79,7 @@ def test_the_first_heading_of_a_drive_does_not_show_that_the_imu_is_dead() -> No
 def test_three_equal_headings_are_needed_to_show_a_dead_imu(firmware: Firmware) -> None:
     """On a network with late replies, two headings are often equal by chance.
 
-    Only three equal headings show a dead IMU, so the driver does not report one.
+    Only three equal headings show a dead IMU, so the driver does not report a dead IMU.
     """
     for seed in (5, 12, 14):
         bench = on(NetworkFaults(delay_s=0.2), firmware, seed)
@@ -168,7 +168,7 @@ def test_an_unanswered_change_of_the_motors_leaves_no_wrong_speed(
 ) -> None:
     """The request for a large change of the motors' units is lost, or the reply to it.
 
-    The measured speeds show which of both was lost. So the turn rate is soon as commanded.
+    The measured speeds show which of the two was lost. So the turn rate is soon as commanded.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.2, 0.4, 3.0)

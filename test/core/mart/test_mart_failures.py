@@ -70,7 +70,7 @@ def test_an_rm_that_fails_once_after_a_slow_stop_is_tried_again() -> None:
 def test_a_drive_whose_rm_has_failed_once_is_as_fast_as_commanded_two_seconds_after_its_step() -> (
     None
 ):
-    """The server answers the start of a forward drive with a failure. The driver repeats it soon.
+    """The server rejects the start of a forward drive. The driver soon sends the start again.
 
     Two seconds after the command, the speed is right.
     """
@@ -149,8 +149,8 @@ def test_an_imu_that_dies_while_the_robot_moves_stops_it_and_loses_the_server(
 ) -> None:
     """The IMU dies in a motion. The driver stops the robot, and reports that the server is lost.
 
-    It refuses motion until the server is restarted. A server as in the public source reports
-    headings only in forward drives, so only these are tested there.
+    It refuses motion until the server is restarted. The variant "source" reports headings only in
+    forward drives, so no other motion is tested with this variant.
     """
     bench = MartBench(firmware).ready()
     bench.command(*motion, 2.5)
@@ -267,7 +267,7 @@ def test_a_push_long_after_an_rm_that_failed_is_not_a_defect_of_the_server() -> 
 def test_a_copy_of_a_start_on_a_network_that_loses_replies_is_not_a_defect_of_the_server() -> None:
     """The server rejects a forward drive (RM). Later, a copy of RM arrives while replies are lost.
 
-    The driver stops the robot, but does not refuse motion for good.
+    The driver stops the robot, but does not refuse motion permanently.
     """
     bench = MartBench("source").ready()
     usual = bench.server.motions[Kind.REFERENCE].samples

@@ -62,7 +62,7 @@ def test_a_network_that_loses_a_few_replies_does_not_look_like_a_stuck_robot(
 def test_a_stop_that_takes_long_does_not_discard_the_next_goal(
     before: tuple[float, float], firmware: Firmware
 ) -> None:
-    """A goal follows a drive of a heavy robot, whose wheels turn for long after the stop.
+    """A goal follows a drive of a heavy robot, whose wheels still turn long after the stop.
 
     The server reports this as a failure. The driver says so once, and the robot reaches the goal.
     """

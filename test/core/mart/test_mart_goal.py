@@ -64,7 +64,7 @@ def test_a_move_is_slow_if_the_normal_one_is_faster_than_the_limits(
 ) -> None:
     """The driver requests a SLOW move if a normal one would exceed the speed limits.
 
-    Normal is 0.26 m/s or 1.3 rad/s.
+    A normal move drives at 0.26 m/s or turns at 1.3 rad/s.
     """
     settings, surplus = MartSettings(**limits), Surplus()
     to_the_left = next_move(Move(Pose(0.0, 1.0, 0.0)), Pose(), settings, surplus)
@@ -102,9 +102,9 @@ def test_equal_moves_in_a_row_are_all_counted(step: Pose, firmware: Firmware) ->
 
 @pytest.mark.parametrize("every_s", [2.0, 1.0, 0.2])
 def test_a_goal_that_is_repeated_is_reached_as_if_it_was_given_once(every_s: float) -> None:
-    """A program such as ``ros2 topic pub`` repeats a goal every second.
+    """A program such as ``ros2 topic pub`` repeats a goal at regular intervals.
 
-    The driver begins it only once.
+    The driver begins the goal only once.
     """
     once, repeated = MartBench().ready(), MartBench().ready()
     for _ in range(round(20.0 / every_s)):

@@ -37,10 +37,10 @@ def test_goals_are_reached_although_datagrams_take_up_to_a_tenth_of_a_second(
 
 
 def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
-    """Each tenth datagram is lost in both directions: moves, replies, counts and headings.
+    """A tenth of all datagrams is lost in each direction: moves, replies, counts and headings.
 
-    The driver cannot exclude a duplicated move, so it discards goals, but at most one in ten. The
-    covariance covers the error of the odometry.
+    The driver cannot exclude a duplicated move, so it discards goals, but at most one of twelve.
+    The covariance covers the error of the odometry.
     """
     discarded = 0
     for seed in range(4):
@@ -58,7 +58,7 @@ def test_losses_end_few_goals_and_the_odometry_stays_right() -> None:
 
 
 def test_duplicated_moves_end_few_goals_and_the_odometry_stays_right() -> None:
-    """Each tenth datagram arrives twice, so the server runs some moves twice.
+    """A tenth of all datagrams arrives twice, so the server runs some moves twice.
 
     The driver stops the second run and estimates the first one. It discards few goals. Where the
     odometry is wrong, its covariance says so.

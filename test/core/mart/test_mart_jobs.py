@@ -34,7 +34,10 @@ def test_the_gyro_is_not_calibrated_with_a_dead_imu(firmware: Firmware) -> None:
 
 
 def test_a_job_ends_with_the_reason_that_ended_it() -> None:
-    """The server falls silent, or the e-stop is latched, or a command comes in a calibration."""
+    """During a calibration, the server falls silent, the e-stop is latched, or a command arrives.
+
+    The job fails, and its result names this reason.
+    """
     bench = MartBench().ready()
     bench.hears = bench.speaks = False
     assert "no longer answers" in bench.job(Job.BIAS).message
@@ -53,7 +56,7 @@ def test_a_job_ends_with_the_reason_that_ended_it() -> None:
 
 
 def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
-    """A docking job sends a move that ends at the dock (TF DOCK). It succeeds at the dock.
+    """A docking job sends a move that ends at the dock (TF DOCK). At the dock, the job succeeds.
 
     An e-stop cancels a second docking job.
     """

@@ -142,7 +142,7 @@ def test_a_copy_of_the_reply_to_a_stopped_move_is_not_a_count() -> None:
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_late_replies_after_a_move_do_not_discard_the_goal(copied: bool) -> None:
-    """All replies come 0.28 s late. So the network may have duplicated a move, which runs again.
+    """All replies come 0.28 s late. So the driver must assume that a copy of a move may be running.
 
     The driver sends a stop after each move. Without a duplicate there is nothing to stop. The
     server then answers sooner than after the stop of a motion, and the robot reaches the goal. With

@@ -34,9 +34,10 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
     twist: tuple[float, float], quiet_s: float
 ) -> None:
-    """Two equal motions end with equal encoder counts. All replies to the second one are lost.
+    """Two equal motions end with equal encoder counts. The replies during both of them are lost.
 
-    The odometry adds both motions.
+    If the reply to the stop arrives, the odometry adds both motions. If not, the covariance covers
+    the error.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     for _ in range(2):
@@ -151,7 +152,7 @@ def test_a_count_that_stays_while_the_robot_is_driven_is_not_a_motion() -> None:
 
 
 def stopped(*replies: tuple[float, bytes]) -> bool | None:
-    """Return whether the replies show that a motion had begun, or None if they do not show it.
+    """Return whether a motion had begun, or None if the replies do not show this.
 
     The motion is started at 8 s. The driver sends stops at 10 s and 10.3 s. ``replies``: time in s
     and bytes of each reply.
@@ -349,7 +350,7 @@ def test_a_change_that_nothing_may_show_to_have_come_twice_is_small(
 def test_a_start_before_any_heading_has_a_finite_covariance() -> None:
     """The server has not reported a heading yet, and a drive begins.
 
-    Each covariance is finite, so the driver's checks of the odometry refuse none.
+    Each covariance is finite, so the driver's checks of the odometry reject none of them.
     """
     odometry = MartOdometry(MartSettings())
     odometry.begin(Motion.REFERENCE, 100.0)

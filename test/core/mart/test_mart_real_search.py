@@ -24,8 +24,8 @@ pytestmark = pytest.mark.slow
 def test_one_datagram_that_is_lost_late_or_doubled_hangs_nothing(seed: int) -> None:
     """One datagram is lost, late or doubled, or the IMU dies.
 
-    The server never hangs. The robot rests, or the server is reported lost. Over all seeds, each
-    wish comes first, and there is each fate.
+    The server never hangs. The robot rests, or the server is reported lost. The eight seeds contain
+    each fault, and each wish as the first of the two.
     """
     random, names = Random(seed), list(WISHES)
     wishes = (names[seed % len(names)], random.choice(names))

@@ -2,7 +2,7 @@
 
 """Tests that no sequence of commands, losses, copies and delays makes a MART fail.
 
-A failure: the server hangs, or the robot cannot be stopped.
+A MART fails if its server hangs, or if nothing can stop the robot.
 """
 
 from collections.abc import Callable
@@ -152,7 +152,7 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    A busy server answers only its stop port.
+    A busy server executes only the commands on its stop port, so only these are compared.
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

@@ -40,8 +40,8 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 ) -> None:
     """A motor turns from the first unit on, but its speed at 26 units is measured too low.
 
-    A straight line through the measured speeds would show motion at zero units, which is excluded.
-    The speed at 14 units is then higher than expected. It does not lower the expected speed.
+    A straight line through these speeds would show motion at zero units, which is impossible. The
+    speed at 14 units is then higher than expected. This does not lower the expected speed.
     """
     line = MotorLine()
     for _ in range(8):

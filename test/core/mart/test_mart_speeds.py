@@ -92,9 +92,9 @@ def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
 
 
 def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
-    """Something slows the first turn on the spot by 10 % for half a second, after three seconds.
+    """Four seconds after its command, something slows the first turn by 10 % for 0.6 s.
 
-    A new beginning would cost more than the error.
+    A new start of the turn would cost more than this error, so the driver continues the turn.
     """
     bench = MartBench("source", speed_mps_per_unit=MartSettings().speed_per_unit).ready()
     bench.command(0.0, 0.5, 4.0)

@@ -112,7 +112,7 @@ def test_a_late_copy_of_a_start_is_seen_and_stopped_within_a_second() -> None:
 
 
 def test_a_late_copy_of_a_controlled_move_is_stopped_within_a_second() -> None:
-    """The network delivers the command of a controlled move twice. The second copy comes late.
+    """The network delivers the command of a controlled move twice. The copy comes late.
 
     After the move, the server executes this copy too, and does not answer it. An e-stop ends this
     second move within 1 s.

@@ -15,7 +15,7 @@ from omnibot_driver.simulator.mart.settings import Stuck
 
 WHEELS = pytest.mark.parametrize("stuck", ["left", "right"])
 MOST_NEES = 16.3
-"""In one of 1000 drives, NEES is larger if the covariance is right."""
+"""If the covariance is right, NEES exceeds this value in one of 1000 drives."""
 
 
 @pytest.mark.slow
@@ -62,8 +62,8 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
 ) -> None:
     """The right wheel is stuck, so each start turns the robot by the left wheel until it fails.
 
-    After three starts the driver refuses this motion until the command ends. A new command starts
-    it again.
+    After three starts the driver refuses this motion until the command ends. A new command then
+    moves the robot again.
     """
     bench = MartBench("source").ready()
     bench.server.chassis.change(stuck="right")

@@ -41,7 +41,7 @@ def creeping(firmware: Firmware = "source") -> MartBench:
 
 
 def nth(bench: MartBench, word: bytes, number: int) -> Callable[[bytes], bool]:
-    """Return whether a datagram is the ``number``-th of this command from now on."""
+    """Return a function that is true for the ``number``-th datagram of this command from now on."""
     since = len(bench.written)
     return lambda data: data.startswith(word) and bench.said(since).count(data) == number
 

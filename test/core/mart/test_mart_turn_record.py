@@ -135,9 +135,9 @@ def test_goals_are_reached_with_unequal_motors_that_are_not_calibrated(inequalit
 def test_a_server_without_records_is_asked_three_times(
     missing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The server's records contain no usable angle, because the manual does not specify their form.
+    """The server's records contain no usable angle, or the server has no records.
 
-    The driver requests only three records.
+    The manual does not specify the records. The driver requests only three of them.
     """
     bench = MartBench("source").ready()
     if missing == "angle":
