@@ -20,9 +20,9 @@ ROUNDED: Final = 5
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
 ACROSS: Final = 10.0
-"""Limit in degrees. A text for an angle to the right may be damaged so that the checksum does not
-detect this. A board may then read an angle to the left. The driver avoids a text with which this
-wrong angle could reach the limit."""
+"""Limit in degrees. Damage that the checksum does not detect can turn the text of an angle to the
+right into an angle to the left. The driver avoids a text if this wrong angle could reach the limit.
+"""
 _NUMBER: Final = re.compile(r"-?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 

@@ -71,7 +71,8 @@ class Follower:
             self._since, self._from_rad = now, angle_rad
         if now - self._since <= FOLLOWS_WITHIN_S:
             return False
-        # Otherwise a node that keeps commanding would move the robot for a second again and again.
+        # After the second fault, only ~/start allows motion. Otherwise a node that keeps commanding
+        # would move the robot for a second again and again.
         second = now - self._fault_at < AGAIN_WITHIN_S
         self.refusal = UNTIL_START if second else UNTIL_IT_MOVES
         self._fault_at, self._stuck_rad = now, angle_rad

@@ -85,7 +85,7 @@ class ImuSamples:
         # A sample that arrives after a pose is not older than the pose.
         lost = math.ceil(max(0.0, (not_before_s - CYCLE_S - time_s) / PERIOD_S))
         delay_s = arrived_s - time_s - lost * PERIOD_S
-        waited = arrived_s > next_pose_s + PERIOD_S  # to be read, as the pose has
+        waited = arrived_s > next_pose_s + PERIOD_S  # sample and pose were read late
         if delay_s < -PERIOD_S / 2:
             lost += (more := round(delay_s / PERIOD_S))
             delay_s -= more * PERIOD_S

@@ -21,8 +21,8 @@ PERIOD_S: Final = 0.01
 # sample in one cycle, always in the same order. Three observations show a false pair: a line of
 # another kind between its lines that usually does not come there; a long pause between its lines,
 # so that it waits for the next pose; the next pose, if lines are missing since the previous pose.
-# One kind remains undetected: both lines are late, but close together, and no later pose is in the
-# read.
+# One kind of false pair remains undetected: both lines are late, but close together, and no later
+# pose is in the read.
 PAIR_WITHIN_S: Final = 0.005
 """If the second line of a pair arrives this time in s or more after the first line, the pair may be
 false. It must then wait for the next pose."""
@@ -149,7 +149,8 @@ class ImuPairs:
         """Receive the board's time of a pose, and accept or reject all pairs that still wait.
 
         The time since the previous pose shows how many gyro and acceleration lines were sent. If
-        lines of both kinds are missing, any of the pairs may be false, so all are rejected.
+        lines of both kinds are missing, or this is the first pose, any of the pairs may be false,
+        so all are rejected.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S
@@ -166,7 +167,7 @@ class ImuPairs:
         self._counts = {"gyro": 0, "acc": 0}
 
     def take(self) -> list[Pair | Oriented]:
-        """Return the pairs that are no longer doubtful, and the orientations, in order of arrival.
+        """Return the pairs and orientations up to the first doubtful pair, in order of arrival.
 
         The caller calls this after a pose and at the end of a read.
         """

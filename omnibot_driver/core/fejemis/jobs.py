@@ -28,8 +28,8 @@ UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99: a checksum does not detect the loss of both."""
 CALIBRATED_WITHIN_S: Final = 8.0
 ANSWERED_WITHIN_S: Final = 4.5
-"""``CALIBRATED_WITHIN_S``, ``ANSWERED_WITHIN_S``: time in s after which a calibration, or another
-job, ends as failed."""
+"""``CALIBRATED_WITHIN_S``: time in s after which a calibration ends as failed.
+``ANSWERED_WITHIN_S``: the same for any other job."""
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
 AGAIN_S: Final = 0.4
@@ -273,9 +273,10 @@ class Jobs:
 
 
 def _answers(role: Role, message: Message) -> bool:
-    """Return whether a board answers the request that follows ``eer``, so that it receives lines.
+    """Return whether ``message`` answers the request that follows ``eer``.
 
-    A front board that does not know the request answers with a comment.
+    An answer shows that the board receives lines. A front board that does not know the request
+    answers with a comment.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

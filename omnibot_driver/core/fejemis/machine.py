@@ -92,7 +92,7 @@ class Machine:
         self._lift_until = self._lift_at + seconds
 
     def set_colour(self, red: int, green: int, blue: int, now: float) -> None:
-        """Set the colour of the LED band; each part is in 0..255."""
+        """Set the colour of the LED strip; each part is in 0..255."""
         self.colour = red, green, blue
         self._led_left = TIMES
         self._led_at = max(now, self._led_again_at)

@@ -147,7 +147,10 @@ class PoseOdometry:
         )
 
     def _rolled(self, seconds: float, now: float) -> Pose | None:
-        """Return the motion in ``seconds`` at the last wheel speeds; None if they are too old."""
+        """Return the motion in ``seconds`` at the mean of the last two pairs of wheel speeds.
+
+        None if the speeds are too old, or if ``seconds`` exceeds ``FRESH_S``.
+        """
         speeds = self._speeds
         if speeds is None or now - self._speeds_at > FRESH_S or seconds > FRESH_S:
             return None
@@ -175,7 +178,7 @@ class PoseOdometry:
         off = way - rolled
         digit_m = 10.0**-decimals
         # If rounding does not explain the difference, lines were lost, or a wheel turned quickly.
-        # Then the poses decide; if the excess is small, the mean of both.
+        # Then the pose decides. If the excess is small, the mean of pose and wheels decides.
         if off.way_m > ROUNDINGS * digit_m or abs(off.yaw_rad) > ROUNDINGS * YAW_DIGIT_RAD:
             return (
                 way if off.way_m > 3.0 * digit_m or abs(off.yaw_rad) > 0.005 else _half(rolled, way)

@@ -36,7 +36,7 @@ def lines(*texts: bytes, sums: bool) -> bytes:
 
 
 def harmless(text: str) -> bool:
-    """Return whether the checksum detects the loss of any two characters of the text."""
+    """Return whether the checksum detects the loss of any two digits, signs, points or spaces."""
     codes = text.encode("ascii")
     return not any(
         one in codes and other in codes and (one != other or codes.count(one) > 1)

@@ -21,7 +21,8 @@ def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
     The board computes the turn from the angle of the front wheel.
     """
     # The line has a source (``2``), a speed and a turn rate. The board uses only the root of the
-    # sum of squares. If the source or a space is lost, the 0 becomes the speed: the line is a stop.
+    # sum of squares. If the source or the space after it is lost, the 0 becomes the speed: the line
+    # is a stop.
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
         return STOP

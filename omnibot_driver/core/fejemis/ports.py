@@ -3,7 +3,8 @@
 """Finds out which half is at which port, and addresses lines to the halves.
 
 A *half* is each of the two Teensys (drive or front); it is also called a board.
-An unidentified board only gets lines that stop or switch off something.
+An unidentified board only gets lines that stop or switch off something, and requests for its
+heartbeat.
 
 The module knows identities and ports; it does not know the meaning of a line.
 """

@@ -17,7 +17,10 @@ Quaternion = tuple[float, float, float, float]
 
 
 class Job(Enum):
-    """A request of the user other than motion. The value is its name in service answers."""
+    """A long request of the user, whose result is a JobDone.
+
+    The value of each job is its name in service answers.
+    """
 
     CALIBRATE_GYRO = "gyro calibration"
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Requests of the user other than motion: brush, lift, LED band, and jobs such as a calibration.
+"""Requests of the user other than motion: brush, lift, LED strip, and jobs such as a calibration.
 
 The module knows when each request is allowed; it does not know how it is sent or confirmed.
 """
@@ -60,14 +60,14 @@ class Services:
     def lift(self, volts: float, now: float) -> None:
         """Move the lift for at most ``command_timeout_s``; positive volts raise the front wheel.
 
-        Raises CommandRefused if the lift must not run now.
+        Raises CommandRefused for NaN or infinity, or if the lift must not run now.
         """
         if volts and (reason := self._why_not_turn()):
             raise CommandRefused(f"lift_cmd refused: {reason}")
         self._upkeep.machine.lift(volts, now, self._robot.settings.command_timeout_s)
 
     def set_led(self, red: int, green: int, blue: int, now: float) -> None:
-        """Set the colour of the LED band. Each part is limited to 0..255."""
+        """Set the colour of the LED strip. Each part is limited to 0..255."""
         red, green, blue = (max(0, min(255, part)) for part in (red, green, blue))
         self._upkeep.machine.set_colour(red, green, blue, now)
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The user's settings of a Fejemis. The boards do not report them."""
+"""The user's settings of a Fejemis: what the driver uses, and what it writes to the boards."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -21,7 +21,7 @@ is implausible."""
 LATE_S: Final = 1.0
 """Longest plausible delay of a line in s, even if the host was busy."""
 WAITED_S: Final = 1.0
-"""Time in s after a stall of the driver in which a line may be late by any time."""
+"""Time in s after a stall of the driver in which any delay of a line is plausible."""
 AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
@@ -121,7 +121,7 @@ class TeensyClock:
         # Lines that arrive in a shorter time may only have waited for a stalled host.
         if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
-        self.restarted = board_s < self._last_s  # not if earlier lines were late
+        self.restarted = board_s < self._last_s  # a later time: earlier lines were late
         self._begin_at(board_s, now)
         return True
 

@@ -69,7 +69,7 @@ class Translation:
         self._imu.unit = settings.acceleration_unit
 
     def connect(self) -> None:
-        """Forget the state of earlier connections."""
+        """Forget the state of earlier connections, except the last pose."""
         self.front.begin()
         self.odometry.begin()
         self._begin_imu()

@@ -222,7 +222,8 @@ class LoisEcuBoard(Board):
     def due(self, now: float) -> Packets:
         """Return the lines to write now.
 
-        They contain settings, repeated resets, the command to drop a ball, or RPM 0/0 after a Stop.
+        They write settings or modes, request a date or a record, repeat a reset, drop a ball, or
+        command RPM 0/0 after a Stop.
         """
         if self._leaving:
             return NO_PACKETS
@@ -282,8 +283,8 @@ class LoisEcuBoard(Board):
     def reset(self) -> Packets:
         """Return Stop and the reset command.
 
-        ``due`` repeats both up to ``RESETS`` times, until the ticks show the reset or the robot
-        drives.
+        ``due`` repeats both until the ticks show the reset or the robot drives. In total, both are
+        sent at most ``RESETS`` times.
         """
         if self._reset_shown:
             self._reset_proof = None  # a new reset needs a proof of its own
@@ -315,10 +316,14 @@ class LoisEcuBoard(Board):
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record. A later reading contains the record, or the reason of a failure.
 
-        Raises RequestRefused if the board could not complete the record.
+        Raises RequestRefused if the board could not complete the record, and while a mode or its
+        change forbids it.
         """
         self._ecu.record(kind, samples)
 
     def distribute_ball(self) -> None:
-        """Make ``due`` return the command to drop a ball once. A repetition would drop another."""
+        """Make the next ``due`` return the command to drop a ball.
+
+        The command is not repeated, because each repetition would drop another ball.
+        """
         self._once += packed(self._ecu.distribute_ball())

@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports that no odometry report follows directly. If odometry with its own command
-byte arrives after this number, the board works as in the manual."""
+"""Number of tick reports without odometry in the command byte of ticks. If odometry with its own
+command byte arrives after this number, the board works as in the manual."""
 UNCOUNTED_M: Final = 0.06
 """Sum of both wheels' distances in m. If the wheels roll backward this far and neither count falls,
 this board does not count ticks backward."""

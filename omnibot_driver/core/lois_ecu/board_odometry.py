@@ -2,8 +2,8 @@
 
 """Changes from one odometry report (0x20) to the next: turn, distance and wheel speeds.
 
-The public firmware reports whole RPM. A defect: its position stays the same while both wheels have
-the same speed.
+The public firmware reports whole RPM. It has a defect: the reported position stays the same while
+both wheels have the same speed.
 
 This module works on odometry reports, without their times.
 """

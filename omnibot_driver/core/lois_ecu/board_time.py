@@ -84,8 +84,9 @@ class BoardTime:
         """Return the delay of a tick report in s, and whether this delay is irregular.
 
         The delay follows from the fitted clock, and is negative if the report seems early. It is
-        irregular if a late read cannot explain it: if it is negative, or much larger than all
-        recent delays. Return 0 and False while too few reports are stored. Nothing is stored.
+        irregular if a late read cannot explain it: if it is clearly negative, or much larger than
+        all recent delays. Return 0 and False while too few reports are stored. This report is not
+        stored.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -87,7 +87,7 @@ class LoisConversation:
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[LoisReading]:
         """Return the readings that ``data`` completes.
 
-        Must also be called with b"" at the time ``held_until``.
+        The caller must also call this method with b"" at the time ``held_until``.
         """
         self._suspicion.look(data)
         return self._understood(self._decoder.feed(data, now), now)
@@ -173,9 +173,9 @@ class LoisConversation:
         odometry.reset()
 
     def stands(self, now: float) -> bool | None:
-        """Return whether the robot is at rest after a Stop. None if the ticks do not show this.
+        """Return whether the robot is at rest after a Stop. None if the ticks cannot show it.
 
-        This is so if the ticks are old, and after a backward command or RPM 0/0.
+        The ticks show nothing if they are old, and after a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -306,7 +306,11 @@ class LoisConversation:
         return self._lines(DistributeBall())
 
     def record(self, kind: RecordKind, samples: int) -> None:
-        """Request a record. Raises RequestRefused if the board could not complete the record."""
+        """Request a record.
+
+        Raises RequestRefused if the board could not complete the record, and while a mode or its
+        change forbids it.
+        """
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")
         self._upkeep.request.begin(kind, samples, self._decoder)

@@ -56,7 +56,9 @@ class Estimates:
         self.pose, self._ways_m = Pose(), (0.0, 0.0)
 
     def conclude(self, at_s: float, may_roll_mps: tuple[float, float]) -> FusedOdometry:
-        """Return the estimate at ``at_s``, the time of the filter's state. The next one follows it.
+        """Return the estimate at ``at_s``, the time of the filter's state.
+
+        The displacement of the next estimate begins at this estimate.
 
         ``may_roll_mps``: see ``now``.
         """

@@ -159,7 +159,7 @@ class Assembler:
     def _begin(self, code: int, now: float) -> None:
         """Begin a group, and set the longest pause that is allowed within it."""
         since_s = now - self._begun_at.get(code, -math.inf)
-        if since_s > QUIET_S and not self._after_ticks:  # neither read nor sent together
+        if since_s > QUIET_S and not self._after_ticks:  # the groups came separately
             self._late_s[code] = max(QUIET_S, min(LATE_S, LATE_PART * since_s))
         self._begun_at[code] = self._at = now
         self._code, self._payloads, self._done, self._astray = code, [], False, False

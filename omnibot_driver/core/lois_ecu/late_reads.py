@@ -22,8 +22,9 @@ LATE_S: Final = 0.4
 together are corrected. The odometry expects shorter delays."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
-"""Factor of the times between reports. If every read is late, the times would drift away from the
-arrival times, because the rate of the clock is not known exactly. So they drift towards them."""
+"""Factor by which the times between reports are increased. The rate of the clock is not known
+exactly. So if every read is late, the times could drift away from the arrival times. With this
+factor, they drift towards the arrival times."""
 
 
 @value(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class LateReads:
             at_s = self._time(ticks, arrived[place], late=late, shown=shown)
             if self._waited:
                 found[place:after] = [at_s] * (after - place)
-                if number == 1 and before:  # ticks before these reports were discarded
+                if number == 1 and before:  # the ticks of these reports were lost
                     leading_s = (before.at_s + at_s) / 2
         first = told[0][0] if told else len(reports)
         found[:first] = [min(at_s, leading_s) for at_s in arrived[:first]]

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
-"""When a wheel starts, the board's odometry (0x20) misses a part of its motion. Mean
-``START_TICKS`` and standard deviation ``START_STDDEV_TICKS`` of this part, in ticks."""
+"""When a wheel starts, the board's odometry (0x20) misses a part of the wheel's motion.
+``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation of this part, in ticks."""
 FAST_RPM: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses above

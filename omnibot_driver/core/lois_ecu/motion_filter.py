@@ -55,8 +55,8 @@ measured speed, in RPM."""
 EXCESS_MEAN: Final = (0.1, 0.1)
 EXCESS_STDDEV: Final = (0.02, 0.3)
 EXCESS_CHANGE: Final = (0.0, 0.15)
-"""How much faster than its set-point a wheel rolls backward, as a fraction of the set-point. Mean
-``EXCESS_MEAN`` and standard deviation ``EXCESS_STDDEV``.
+"""``EXCESS_MEAN``, ``EXCESS_STDDEV``: mean and standard deviation of how much faster than its
+set-point a wheel rolls backward, as a fraction of the set-point.
 
 ``EXCESS_CHANGE``: standard deviation that a change of the set-point adds.
 

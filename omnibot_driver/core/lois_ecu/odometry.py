@@ -43,7 +43,7 @@ FASTEST_MPS: Final = 5.0
 class LoisOdometry:
     """Odometry of a robot with a LOIS ECU. Pairs of values are for the left and the right wheel.
 
-    ``estimates``: the estimates that it returns.
+    ``estimates``: computes the estimates that the methods return.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

@@ -95,8 +95,8 @@ class RecordAssembler:
     def _ends(self, code: int, payload: int) -> bool:
         """Return whether this line ends the record.
 
-        The end of a torque record looks like a sample of 0/0. So it counts as the end only after
-        all samples.
+        The end of a torque record looks like a sample of 0/0. So such a line counts as the end only
+        after all samples.
         """
         if code == Code.RECORD_HEADING:
             return payload == HEADING_END

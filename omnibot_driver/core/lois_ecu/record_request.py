@@ -83,7 +83,9 @@ class RecordRequest:
         prevented: str,
         ticks_per_revolution: int,
     ) -> list[LoisReading]:
-        """Return the readings, followed by the result of the request if it is known now.
+        """Return the readings, with the result of the request if it is known now.
+
+        If there is no reading, but lines of the record are arriving, return RecordComes.
 
         ``prevented``: why the record cannot come, as a sentence. Empty if it can come.
         """

@@ -21,8 +21,8 @@ STEADY_TICKS: Final = 3
 """If a count of at least this size becomes zero while the wheel is at rest, the board has obeyed
 the reset. Backlash of the gears can cause smaller changes."""
 UNPROVED_S: Final = 2.5
-"""Longest time in s for which the driver repeats the reset and waits for a proof. If the counts
-were already zero before, no proof is possible."""
+"""Time in s after which the driver accepts counts near zero without a proof. If the counts were
+already near zero before, no proof is possible."""
 
 
 class ResetProof:

@@ -52,7 +52,7 @@ class ModeChange:
     def stop_first(self, why: str) -> None:
         """Stop the robot, and refuse motion until it is at rest.
 
-        ``reason`` then begins with ``why``.
+        ``reason`` then begins with ``why``, unless a sensor's mode is wanted or has not ended yet.
         """
         self._stopping, self._stopping_since_s = why, None
 
