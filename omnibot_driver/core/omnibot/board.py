@@ -174,6 +174,8 @@ class OmniBot:
 
         ``now``: arrival time of the bytes in s.
         """
+        if not data:
+            return []
         pieces, line = self._pieces, (self._decoder, self._translation)
         single = take_pieces(pieces, data, now, *line) if pieces else take_single(data, now, *line)
         if single:

@@ -7,6 +7,7 @@ arrival times show whether another frame is due.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import islice
 from random import Random
 
 import pytest
@@ -93,6 +94,14 @@ def test_hardly_a_frame_waits_for_the_next_packet(
     assert heard > TICKS - 10
     assert late <= waits * (heard - SETTLED)
     assert board.figures.discarded_bytes == 0
+
+
+def test_an_empty_read_changes_nothing() -> None:
+    """After each read, the board gets an empty read. The readings are the same as without it."""
+    one, other = OmniBot(OmniBotSettings()), OmniBot(OmniBotSettings())
+    for now, data in islice(pieces(), TICKS):
+        assert one.receive(data, now) == other.receive(data, now)
+        assert other.receive(b"", now + BYTE_S / 2) == []
 
 
 def test_a_line_that_lost_a_byte_is_not_calm_for_ten_seconds() -> None:
