@@ -36,6 +36,8 @@ class Bench:
 
     ``hears``: whether the board receives data.
 
+    ``obeys``: False for a recording in place of a board.
+
     ``speaks``: whether the board sends data.
     """
 
@@ -48,6 +50,7 @@ class Bench:
         limits: SpeedLimits | None = None,
         use_board_pose: bool = True,
         control: ControlMethod | None = None,
+        obeys: bool = True,
     ) -> None:
         self.board = SimulatedBoard(board or BoardSettings())
         frame, period_s = self.board.settings.frame, self.board.settings.delta_period_s
@@ -62,6 +65,7 @@ class Bench:
             run=run,
             axis_signs=axis_signs,
             control=control or self.board.settings.control,
+            obeys=obeys,
         )
         self.now = 1000.0
         self.hears = self.speaks = True

@@ -261,17 +261,18 @@ class CommandPipeline:
             return []
         if goal.alignment != self._odometry.alignments:
             why = "the origin of odom has changed, by ~/reset_odometry or a restart of the board"
-        elif any(
+        elif self._obeys and any(
             goal.is_left_by(estimate.pose)
             for estimate in estimates
             if isinstance(estimate, OdometryEstimate)
         ):
-            self.interlock.trip(now)
             why = (
                 "the robot is moving away from the goal; check that the board's switch is set to"
-                " positional control."
-                f" {self.interlock.until.value}"
+                " positional control"
             )
+            if self.monitored:
+                self.interlock.trip(now)
+                why += f". {self.interlock.until.value}"
         else:
             return []
         self.policy.halt(now)

@@ -222,6 +222,32 @@ def test_a_goal_that_the_robot_drives_away_from_trips_as_well() -> None:
     assert bench.session.figures(bench.now).commands.trips == 1
 
 
+def test_without_the_motion_monitor_such_a_goal_is_discarded_and_the_next_one_accepted() -> None:
+    """The motion monitor is off, and the robot drives away from its goal. The driver stops it."""
+    bench = started(BoardSettings(running=True, control="velocity"), control="position")
+    bench.configure(motion_monitor=False)
+    bench.go_to(-0.5, 0.0, 0.0)
+    bench.board.grip(0.4, 0.0, 0.0)
+    mark = len(bench.written)
+    bench.run(2.0)
+    (notice,) = [text for text in bench.notices if "moving away" in text]
+    assert "refused" not in notice
+    assert STOP in bench.written_since(mark)
+    assert bench.session.figures(bench.now).commands.trips == 0
+    bench.go_to(0.5, 0.0, 0.0)
+
+
+def test_the_motion_in_a_recording_discards_no_goal() -> None:
+    """The driver plays a recording, in which the robot drives. It cannot follow the goal."""
+    bench = started(BoardSettings(running=True), control="position", obeys=False)
+    bench.hears = False
+    bench.go_to(-0.5, 0.0, 0.0)
+    bench.board.grip(0.4, 0.0, 0.0)
+    bench.run(2.0)
+    assert bench.board.truth.x_m > 0.5
+    assert bench.notices == []
+
+
 def test_a_robot_that_is_faster_than_it_can_be_is_stopped() -> None:
     """The robot is too fast to be plausible, so all its displacements are rejected.
 
