@@ -62,7 +62,9 @@ def is_recording(url: str) -> bool:
 
 
 def open_recording(url: str, channels: Sequence[str] = ("",)) -> Recording:
-    """Return the recording that the URL names. The bag needs a topic for each channel.
+    """Return the recording that the URL names.
+
+    The bag needs a topic for one channel at least; a channel without a topic has no data.
 
     Raises ParameterError if the URL or the bag is wrong.
     """

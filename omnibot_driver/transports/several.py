@@ -127,8 +127,8 @@ class Several:
     def write(self, packets: Packets) -> None:
         """Write each packet to its line. Bytes that a line does not accept at once are sent later.
 
-        If some of them still wait after 0.2 s, they are discarded, and the line is regarded as
-        missing. A line that is missing already gets only the bytes that it accepts at once.
+        If bytes have waited for 0.2 s without a break, they are discarded, and the line is regarded
+        as missing. A line that is missing already gets only the bytes that it accepts at once.
         """
         now = time.monotonic()
         with self._writing:
@@ -201,7 +201,8 @@ class Several:
     def _write_what_waits(self, now: float) -> None:
         """Write waiting bytes to each line with room; let ``poll`` report room on the others.
 
-        A line that has no room for 0.2 s (``WRITE_TIMEOUT_S``) is regarded as missing.
+        A line that has not accepted all of them for 0.2 s (``WRITE_TIMEOUT_S``) is regarded as
+        missing.
         """
         with self._writing:
             for line in self._lines:
@@ -281,7 +282,7 @@ class Line:
         return self.flush(now)
 
     def flush(self, now: float) -> bool:
-        """Write waiting bytes; return False if some of them have waited for 0.2 s or more.
+        """Write waiting bytes; return False if bytes have waited for 0.2 s without a break.
 
         Before it returns False, the method discards all unsent bytes.
         """
