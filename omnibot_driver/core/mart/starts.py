@@ -146,7 +146,7 @@ class Starts(FailedStarts):
                 return None  # the server cannot change the rate of a turn, so the ramp ends first
             return self._turns.request(twist.yaw_rate_radps)
         if self.health.obstacle(motion, now):
-            self._block(motion, "an obstacle is too near")
+            self._block(motion, "seen by the sonar")
             return None
         if motion is Motion.REFERENCE:
             units = self.loop.first_units(twist.vx_mps, twist.yaw_rate_radps)
