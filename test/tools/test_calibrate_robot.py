@@ -186,6 +186,19 @@ def test_an_interruption_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig)
     assert rigged.port.wait_for(stands, PATIENCE_S)
 
 
+def test_parameters_are_restored_after_an_interruption(robot: Robot, rigged: Rig) -> None:
+    """Ctrl-C interrupts a measurement for which the tool has set a parameter of the driver.
+
+    After that, other parameters can no longer be set.
+    """
+    robot.set_parameters({"linear_scale": 60.0})
+    os.kill(os.getpid(), signal.SIGINT)
+    with pytest.raises(Interrupted):
+        robot.set_parameters({"linear_scale": 50.0})
+    robot.restore_parameters({"linear_scale": 70.0})
+    assert parameters_of(rigged.driver)["linear_scale"] == 70.0
+
+
 def test_a_defect_leaves_the_motion_monitor_on(robot: Robot, rigged: Rig) -> None:
     """A defect in the tool interrupts a motion.
 

@@ -125,6 +125,11 @@ class Client:
                 raise ToolError(f"the driver refuses {name}: {result.reason}")
         self.parameters.update(values)
 
+    def restore_parameters(self, values: Mapping[str, Value]) -> None:
+        """Set parameters as ``set_parameters`` does, also after the user has pressed ctrl-C."""
+        with self._interruption.deferred():
+            self.set_parameters(values)
+
     def apply(self, values: Mapping[str, Value]) -> None:
         """Set those parameters in ``values`` that may change while the driver runs."""
         changeable = {

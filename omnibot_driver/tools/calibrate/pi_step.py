@@ -10,6 +10,7 @@
 
 import argparse
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
 
@@ -79,8 +80,9 @@ def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
         try:
             wheels = _found(bench, arguments, goals)
         except BaseException as error:
-            _restore(bench, before, names)
-            left = [n for n in names if before[n] is None and robot.parameters[n] is not None]
+            with suppress(ToolError):  # the first error matters more
+                _restore(bench, before, names)
+            left = [name for name in names if robot.parameters[name] != before[name]]
             if left and isinstance(error, ToolError):
                 raise type(error)(f"{error}; {UNRESTORED.format(', '.join(left))}") from error
             raise
@@ -232,4 +234,5 @@ def _restore(bench: _Bench, before: Mapping[str, Any], names: Sequence[str]) -> 
 
     If a value in ``before`` is None, the parameter keeps its new value until a restart.
     """
-    bench.robot.set_parameters({name: before[name] for name in names if before[name] is not None})
+    known = {name: before[name] for name in names if before[name] is not None}
+    bench.robot.restore_parameters(known)

@@ -180,11 +180,10 @@ class Robot(Listener):
         try:
             yield
         except BaseException:  # also after an error in this program
-            with self._interruption.deferred(), suppress(ToolError):
-                self.set_parameters(before)
+            with suppress(ToolError):
+                self.restore_parameters(before)
             raise
-        with self._interruption.deferred():
-            self.set_parameters(before)
+        self.restore_parameters(before)
 
     def _follow(
         self,

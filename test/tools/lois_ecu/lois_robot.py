@@ -100,6 +100,9 @@ class SimulatedRobot:
         self.bench.session.configure(SETTINGS, self.bench.now, board=settings)
         self.bench.settle()
 
+    def restore_parameters(self, values: Mapping[str, Any]) -> None:
+        self.set_parameters(values)
+
     def rest(self, seconds: float) -> None:
         self.bench.run(seconds)
 

@@ -36,6 +36,7 @@ from omnibot_driver.simulator.lois_ecu import (
 from omnibot_driver.tools.calibrate import pi_step, step
 from omnibot_driver.tools.calibrate.arguments import command_line, require_able
 from omnibot_driver.tools.calibrate.console import Console
+from omnibot_driver.tools.calibrate.interruption import Interrupted
 from omnibot_driver.tools.calibrate.pi_loop import Loop, PiGains, answer, phase_margin_deg, traits
 from omnibot_driver.tools.calibrate.pi_tuning import Goals, Tuned, dead_time_s, told, tune
 from omnibot_driver.tools.calibrate.tick_fit import Column, Plant, fit, speed
@@ -363,6 +364,28 @@ def test_values_that_an_ended_measurement_leaves_are_told(
     with pytest.raises(ToolError, match=r"not move; .* left_short_correction, .*; restart both"):
         step.run(robot, Console(yes=True), command_line().parse_args(words))
     assert robot.parameters["left_short_correction"] is not None
+
+
+def test_an_interrupted_measurement_restores_the_parameters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C interrupts the tool during a record. The driver gets back the values it had before."""
+    robot = SimulatedRobot(tmp_path, random_motors(5))
+    before = dict(robot.parameters)
+    during: list[dict[str, object]] = []
+
+    def interrupt(*_arguments: object) -> None:
+        during.append(dict(robot.parameters))
+        monkeypatch.setattr(robot, "set_parameters", interrupt)  # refused after an interruption
+        raise Interrupted("interrupted")
+
+    monkeypatch.setattr(robot, "restore_parameters", robot.set_parameters)
+    monkeypatch.setattr(robot, "record", interrupt)
+    words = ["step", "--yes", "--records", "1", "--responses", "1", "--samples", "100"]
+    with pytest.raises(Interrupted):
+        step.run(robot, Console(yes=True), command_line().parse_args(words))
+    assert during[0] != before
+    assert robot.parameters == before
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
