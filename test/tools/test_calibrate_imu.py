@@ -97,6 +97,17 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
     assert found.walk == pytest.approx(walk, rel=0.4)
 
 
+@pytest.mark.parametrize(("seconds", "fitted"), [(50, False), (60, True)])
+def test_a_minute_of_readings_is_enough_for_the_walk_of_a_bias(seconds: int, fitted: bool) -> None:
+    """The bias drifts fast. A rest of a minute, the default, shows it; two readings are missing."""
+    random = np.random.default_rng(3)
+    steps = 2e-3 * random.standard_normal(100 * seconds - 2)
+    found = noise(allan(np.cumsum(steps), 0.01))
+    assert (found.walk > 0.0) is fitted
+    if fitted:
+        assert found.walk == pytest.approx(2e-3 / math.sqrt(0.01), rel=0.3)
+
+
 def test_a_bias_that_walks_is_known_less_well() -> None:
     """The bias drifts during a rest of ten minutes.
 

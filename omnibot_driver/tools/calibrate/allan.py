@@ -20,13 +20,18 @@ FEWEST_CLUSTERS: Final = 9
 The longest averaging time is therefore one ninth of the record.
 """
 FLICKER: Final = 2 * np.log(2) / np.pi
-WALK_FROM_S: Final = 60.0
-"""Shortest recording, in s, from which the tool estimates bias instability and random walk."""
+WALK_FROM_S: Final = 58.0
+"""Shortest recording, in s, from which the tool estimates bias instability and random walk.
+
+A recording of a minute may lack some readings.
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Allan:
     """Allan deviations of a sensor. All arrays have the shape (n,).
+
+    ``recorded_s``: duration of the recording, in s.
 
     ``tau_s``: averaging times, in s.
 
@@ -35,6 +40,7 @@ class Allan:
     ``sigma``: standard deviation of each value in ``deviation``.
     """
 
+    recorded_s: float
     tau_s: Column
     deviation: Column
     sigma: Column
@@ -84,17 +90,17 @@ def allan(readings: Column, period_s: float) -> Allan:
     ]
     deviation = np.sqrt(variance)
     sigma = deviation / np.sqrt(2 * (len(readings) / sizes - 1))
-    return Allan(tau_s, deviation, sigma)
+    return Allan(len(readings) * period_s, tau_s, deviation, sigma)
 
 
 def noise(curve: Allan) -> Noise:
     """Return the noise terms that fit the Allan deviations in ``curve`` best.
 
-    If the recording is shorter than 60 s (``WALK_FROM_S``), only white noise is fitted.
+    If the recording is shorter than a minute (``WALK_FROM_S``), only white noise is fitted.
     """
     tau_s, variance = curve.tau_s, curve.deviation**2
     terms = [1 / tau_s]
-    if tau_s[-1] * FEWEST_CLUSTERS >= WALK_FROM_S:
+    if curve.recorded_s >= WALK_FROM_S:
         terms += [np.full_like(tau_s, FLICKER), tau_s / 3]
     weight = 1 / np.maximum(2 * curve.deviation * curve.sigma, np.finfo(float).tiny)
     parts, _rest = nnls(np.stack(terms, axis=1) * weight[:, None], variance * weight)
