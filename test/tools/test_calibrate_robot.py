@@ -149,7 +149,9 @@ def test_a_robot_that_goes_too_far_is_stopped(robot: Robot, rigged: Rig) -> None
     A command above the speed limit is not sent.
     """
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
-    with pytest.raises(ToolError, match=r"it went too far \(0\.\d\d m from its start, 0\.05"):
+    with pytest.raises(
+        ToolError, match=r"limit of this drive \(it was 0\.\d\d m from its start, 0\.05"
+    ):
         robot.drive(steady(SLOWLY, 10.0), near)
     assert rigged.port.wait_for(stands, PATIENCE_S)
     with pytest.raises(ToolError, match="exceeds the limits of this calibration"):
@@ -253,7 +255,7 @@ def test_a_robot_that_is_not_seen_to_stand_is_to_be_cut_off(
     ):
         robot.drive(steady(SLOWLY, 0.5), BOUNDS)
     near = Bounds(speed=0.2, way=0.05, seconds=20.0, acceleration=1.0)
-    with pytest.raises(ToolError, match=r"it went too far .*; and Stop was sent, but"):
+    with pytest.raises(ToolError, match=r"at a limit of this drive .*; and Stop was sent, but"):
         robot.drive(steady(SLOWLY, 10.0), near)
 
 

@@ -103,6 +103,6 @@ def _ticks(text: str) -> float:
     ticks = seconds / TICK_S
     if not 0.999 < ticks < 1000.5 or abs(ticks - round(ticks)) > 1e-6:
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a period of the board; give a multiple of {TICK_S:g} up to 10"
+            f"{text!r} is not a period of the board; give a multiple of {TICK_S:g} s up to 10 s"
         )
     return seconds

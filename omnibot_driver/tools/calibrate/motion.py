@@ -84,15 +84,15 @@ class Bounds:
                 " that publishes such values"
             )
         if pose.way_m > self.way:
-            where = f"{pose.way_m:.2f} m from its start, {self.way:.2f} m allowed"
+            where = f"it was {pose.way_m:.2f} m from its start, {self.way:.2f} m allowed"
         elif abs(pose.yaw_rad) > self.turn:
-            where = f"turned by {abs(pose.yaw_rad):.1f} rad, {self.turn:.1f} rad allowed"
+            where = f"it turned by {abs(pose.yaw_rad):.1f} rad, {self.turn:.1f} rad allowed"
         elif seconds > self.seconds:
-            where = f"driving for {seconds:.0f} s, {self.seconds:.0f} s allowed"
+            where = f"it drove for {seconds:.0f} s, {self.seconds:.0f} s allowed"
         else:
             return
         raise ToolError(
-            f"the robot was stopped because it went too far ({where}): check `linear_scale` and"
+            f"the robot was stopped at a limit of this drive ({where}): check `linear_scale` and"
             " `angular_scale`, and whether `odom` is right (docs/commissioning.md)"
         )
 

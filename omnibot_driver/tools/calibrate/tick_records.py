@@ -41,20 +41,20 @@ def read(path: Path) -> dict[str, Column]:
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
-        columns = {side: [row[f"{side}_tick_s"] for row in rows] for side in SIDES}
+        columns = {
+            side: np.array([float(row[f"{side}_tick_s"] or "nan") for row in rows])
+            for side in SIDES
+        }
     except (OSError, KeyError, ValueError) as error:
         raise ToolError(f"the record {path} cannot be read: {error}") from error
-    for told in columns.values():
-        if not told or sum(not one for one in told[1:]) > UNTOLD * len(told):
+    for times_s in columns.values():
+        if not len(times_s) or np.isnan(times_s[1:]).sum() > UNTOLD * len(times_s):
             raise ToolError(
                 f"too many times are missing in the record {path}. Either the wheels turned too"
                 " slowly for the board to report the times (with a unit of 100 ns, it needs more"
                 " than 152 RPM), or the driver does not know the unit of the times"
             )
-    return {
-        side: np.array([float(one) if one else np.nan for one in told])
-        for side, told in columns.items()
-    }
+    return columns
 
 
 @dataclass(frozen=True, slots=True)

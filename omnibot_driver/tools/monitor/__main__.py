@@ -36,7 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ToolError as error:
         print(f"monitor: {error}", file=sys.stderr)
     except KeyboardInterrupt:
-        print("monitor: interrupted before the driver was found", file=sys.stderr)
+        print("monitor: interrupted", file=sys.stderr)
     except BrokenPipeError:  # the pipe's reader has ended
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 1

@@ -306,6 +306,14 @@ def test_a_record_that_the_board_could_not_tell_is_refused(tmp_path: Path) -> No
         read(path)
 
 
+def test_a_record_with_a_damaged_cell_is_refused(tmp_path: Path) -> None:
+    """A cell of the file is not a number. The error names the file."""
+    path = tmp_path / "rpm.csv"
+    path.write_text("left_tick_s,right_tick_s\n0.01,0.0x\n")
+    with pytest.raises(ToolError, match=r"rpm.csv cannot be read"):
+        read(path)
+
+
 def test_whoever_has_gains_as_parameters_can_do_it() -> None:
     """``calibrate step`` accepts every driver that has parameters for gains, with any board."""
     values = PARAMETERS.check_all({})
