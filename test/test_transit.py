@@ -134,7 +134,9 @@ def test_a_step_of_our_own_clock_refuses_nothing(sign: int, step_s: float, share
             sender.ahead_s += sign * step_s * shared
         assert not refused(receiver.hear(sender, now_s, 0.01))
         if number == 900:
-            assert refused(receiver.hear(sender, now_s, 1.0)), "it is still looked at"
+            assert refused(receiver.hear(sender, now_s, 1.0)), (
+                "a late command must still be refused"
+            )
 
 
 @given(st.floats(1.0, 1e6), st.floats(0.0, 0.3))

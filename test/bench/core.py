@@ -138,7 +138,7 @@ def cold(ticks: int) -> str:
             taken[forgotten].append(passed)
     hot_us, cold_us = (1e6 * median(taken[forgotten]) for forgotten in (False, True))
     return (
-        f"One IMU frame takes {short(hot_us)} µs from its bytes to the published message if another"
+        f"One IMU frame takes {short(hot_us)} µs from its bytes to its reading if another"
         f" IMU frame was processed just before, and {short(cold_us)} µs if other code has used the"
         " processor's caches before."
     )

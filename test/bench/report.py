@@ -74,7 +74,7 @@ def main() -> int:
     """Run the measurements, print them, and write them into the document. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
-        "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"
+        "--board", choices=("omnibot", *OTHERS), default="omnibot", help="board to measure"
     )
     arguments.add_argument("--quick", action="store_true")
     chosen = arguments.parse_args()

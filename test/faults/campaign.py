@@ -338,13 +338,16 @@ def main() -> int:
     """Run the campaign, print its table and write it. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
-        "--board", choices=BOARDS, default="omnibot", help="that this is measured on"
+        "--board", choices=BOARDS, default="omnibot", help="board to measure (default %(default)s)"
     )
     arguments.add_argument("--minutes", type=float, help="a soak of random walks only")
     arguments.add_argument("--losses", action="store_true", help="stops on a lossy line only")
     arguments.add_argument("--busy", action="store_true", help="a busy computer only")
     arguments.add_argument(
-        "--processes", type=int, default=os.cpu_count(), help="side by side (default %(default)s)"
+        "--processes",
+        type=int,
+        default=os.cpu_count(),
+        help="number of processes at the same time (default %(default)s)",
     )
     chosen = arguments.parse_args()
     board, minutes = chosen.board, chosen.minutes

@@ -132,4 +132,4 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
     rig.wait_ticks(200)
     imus = sum(frame[:2] == b"\xff\xfa" for frame in rig.line.sent[sent:])
     held = probe.comes_about(lambda: len(rig.imu) - heard >= HELD * imus)
-    rig.findings.expect(held, f"{len(rig.imu) - heard} of {imus} Imu came through")
+    rig.findings.expect(held, f"{len(rig.imu) - heard} of {imus} Imu messages were published")

@@ -127,7 +127,7 @@ def nonsense_for_parameters(rig: Rig) -> None:
         for one, result in zip(parameters, answer.results, strict=True)
         if result.successful
     ]
-    rig.findings.expect(not taken, f"nonsense was taken for {taken}")
+    rig.findings.expect(not taken, f"invalid values were accepted for {taken}")
     rig.hand.leave()
     rig.expect_still(rig.line.tick, "after nonsense for parameters")
 

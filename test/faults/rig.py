@@ -193,7 +193,9 @@ class Rig:
 
     def wait_ticks(self, ticks: int) -> None:
         end = self.line.tick + ticks
-        assert self.wait_for_board(lambda line: line.tick >= end), "the board stands still"
+        assert self.wait_for_board(lambda line: line.tick >= end), (
+            "the ticks of the board do not advance"
+        )
 
     # What can be seen
 
@@ -304,7 +306,7 @@ class Rig:
         )
         self.findings.expect(  # damaged bytes may look like a frame, so a few are allowed
             refused <= (len(imu) or len(odom)) / one_in,
-            f"{refused} readings were refused, and no bit was flipped",
+            f"{refused} readings were rejected, although no bit was flipped",
         )
         backwards = [(stamp_s(a), stamp_s(b)) for a, b in pairwise(imu) if stamp_s(b) <= stamp_s(a)]
         self.findings.expect(not backwards, f"imu stamps do not increase: {backwards[:9]}")

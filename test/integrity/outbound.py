@@ -194,7 +194,7 @@ def main() -> int:
     """Run the trials, print the results and write them. Return the exit code."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument(
-        "--board", choices=("omnibot", *OTHERWISE), default="omnibot", help="that is measured"
+        "--board", choices=("omnibot", *OTHERWISE), default="omnibot", help="board to measure"
     )
     arguments.add_argument("--share", type=float, default=1.0)
     arguments.add_argument("--scripts", type=int, default=SCRIPTS)

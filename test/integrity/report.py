@@ -98,7 +98,7 @@ def main() -> int:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--seconds", type=float, default=60.0)
     arguments.add_argument(
-        "--board", choices=("omnibot", *OTHERS), default="omnibot", help="that is measured"
+        "--board", choices=("omnibot", *OTHERS), default="omnibot", help="board to measure"
     )
     arguments.add_argument("--seeds", type=int, default=10)
     arguments.add_argument("--first", type=int, default=400)

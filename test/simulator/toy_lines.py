@@ -54,7 +54,9 @@ class ToyLines:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--angle", type=float, default=0.0, help="of the steered wheel at first")
+    parser.add_argument(
+        "--angle", type=float, default=0.0, help="initial angle of the steered wheel"
+    )
 
 
 def from_arguments(arguments: argparse.Namespace) -> ToyLines:

@@ -88,7 +88,7 @@ class Probe:
 
     def wait_for(self, predicate: Callable[[], object]) -> None:
         """Wait until the predicate holds. The probe checks it whenever a message arrives."""
-        assert self.comes_about(predicate), "it did not come about"
+        assert self.comes_about(predicate), "the condition did not become true in time"
 
     def comes_about(self, predicate: Callable[[], object]) -> bool:
         """Wait for the predicate, and return whether it holds within ``PATIENCE_S``."""
@@ -160,7 +160,7 @@ class Probe:
 
         timer = self.node.create_timer(0.02, look)
         self._executor.wake()
-        assert held.wait(PATIENCE_S), "the graph does not come to look like that"
+        assert held.wait(PATIENCE_S), "the ROS graph did not reach the expected state"
         self.remove(timer)
 
     def wait_for_node(self, name: str, namespace: str) -> None:

@@ -65,7 +65,7 @@ def wait_until(predicate: Callable[[], object]) -> None:
     """Poll the predicate until it holds."""
     end = time.monotonic() + PATIENCE_S
     while not predicate():
-        assert time.monotonic() < end, "it did not come about"
+        assert time.monotonic() < end, "the condition did not become true in time"
         time.sleep(0.02)  # processes and log lines give no event to wait for
 
 

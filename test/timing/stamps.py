@@ -53,7 +53,7 @@ def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
     ``head``: headings of the case's columns. ``rows``: results of the streams, by case.
     """
     lines = [
-        f"| {head} | steps, std (ms) | 99 % within (ms) | streams that keep both limits |",
+        f"| {head} | steps, RMS error (ms) | 99 % within (ms) | streams that keep both limits |",
         "|---" * (head.count("|") + 4) + "|",
     ]
     for name, figures in rows.items():

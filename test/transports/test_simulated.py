@@ -68,7 +68,7 @@ def test_a_read_that_waits_can_be_interrupted() -> None:
     assert board.read(PATIENCE_S) == (0, b"")
     canceller.join()
     board.cancel()
-    assert board.read(PATIENCE_S) == (0, b""), "and so is the next one, if none waits"
+    assert board.read(PATIENCE_S) == (0, b""), "if no read waits, ``cancel`` ends the next one"
 
 
 def test_after_closing_nothing_is_read_and_nothing_written() -> None:

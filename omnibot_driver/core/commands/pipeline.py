@@ -109,7 +109,10 @@ class CommandPipeline:
             self.policy.current.check_anew()
         except CommandRefused as error:
             self.policy.halt(now)
-            return [f"robot stopped: the current command does not fit the new scale ({error})"]
+            return [
+                f"robot stopped: the current command does not fit the new scale ({error}); send"
+                " another command"
+            ]
         return []
 
     def figures(self, now: float) -> CommandFigures:

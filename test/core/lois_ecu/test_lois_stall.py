@@ -224,7 +224,7 @@ def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
             cleared |= step > 10 and written.startswith(encode_command(SetRpm(0, 0)))
         driver.predicted(now + 0.15)
     assert sum(ways_m) < -1.0
-    assert max(ways_m) < 0.01, "a way was taken back"
+    assert max(ways_m) < 0.01, "a distance was subtracted again"
     assert cleared
 
 

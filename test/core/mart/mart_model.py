@@ -179,7 +179,7 @@ def _waits(world: World) -> Iterator[Step]:
         yield "no reply", world._replace(driver=driver._replace(state=State.STILL, pending=""))
     if state is State.STILL and server.port == "free" and server.moving:
         stray = _rests(driver)._replace(state=State.STOPPING, motion=Motion.UNKNOWN)
-        yield "a poll sees it move", world._replace(driver=stray)
+        yield "a poll shows that the robot moves", world._replace(driver=stray)
     late = any(BY_TEXT[copy] in HARMFUL_LATE for copy in world.copies)
     if state is State.STILL and server.port == "free" and not server.moving and not late:
         yield "a poll is answered", world._replace(driver=driver._replace(counted=True))
@@ -192,7 +192,7 @@ def _waits(world: World) -> Iterator[Step]:
             Motion.TURN,
         )
     ):
-        yield "it tells its name", world._replace(driver=_rests(driver))
+        yield "the server answers HELLO", world._replace(driver=_rests(driver))
     if sweeps_first(driver) and state is State.STOPPING:
         yield "asks what moves", world._replace(driver=driver._replace(state=State.ASKING))
     if state is State.ASKING and server.port == "free" and not world.copies:
@@ -220,7 +220,7 @@ def _asked(world: World) -> Step:
     _, reply = execute(server, "CHECK")
     driver = Driver(State.STOPPING, Motion.UNKNOWN)
     if reply == "conflict" and not world.server.moving:
-        return "a motion that stands is found", world._replace(
+        return "a motion in progress is found, but the robot is at rest", world._replace(
             driver=driver._replace(state=State.LOST)
         )
     return "SRM and SM do no harm", world._replace(driver=driver)
