@@ -300,10 +300,23 @@ def test_a_server_without_crashes_says_that_a_number_is_missing(text: str) -> No
     assert rig.ask("HELLO") == "ok BBB"
 
 
-def test_a_documented_server_stops_at_a_wall_and_when_its_imu_dies() -> None:
+def test_a_documented_server_stops_at_a_wall() -> None:
+    """A server as in the manual stops the robot before the robot hits a wall."""
+    for start, stop, answer in (
+        ("F", "SM", "fail insufficent clearence"),
+        ("RM 30", "SRM", "fail insufficient clearance"),
+    ):
+        rig = Rig(DOCUMENTED, front_m=45 * INCH_M)
+        rig.drive(start, 10.0)
+        assert not rig.moving
+        assert not rig.server.hit_wall
+        assert rig.ask(stop) == answer
+
+
+def test_a_documented_server_stops_when_its_imu_dies() -> None:
     """The IMU dies during a motion. A server as in the manual stops the robot."""
     for start in ("F", "RM 30", "R"):
-        rig = Rig(DOCUMENTED, imu_dies_s=1.0, front_m=200 * INCH_M)
+        rig = Rig(DOCUMENTED, imu_dies_s=1.0)
         rig.drive(start, 5.0)
         assert not rig.moving
         assert rig.ask("SRM" if start == "RM 30" else "SM") == "fail MPU6050 connection lost"
