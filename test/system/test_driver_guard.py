@@ -281,10 +281,16 @@ def test_an_orderly_end_needs_no_guard(board: PtyBoard, driver: Driver, probe: P
 
 
 def test_the_guard_can_be_done_without(board: PtyBoard, start_driver: Start) -> None:
-    """The parameter ``guard`` is false, for use with a debugger. The driver has no guard."""
+    """The parameter ``guard`` is false, for use with a debugger. The driver has no guard.
+
+    After the driver is killed, the board receives nothing.
+    """
     driver: Driver = start_driver(board.path, guard=False)
     driver.wait_for_line("state: nominal")
     assert driver.guards() == []
     driver.end(signal.SIGKILL)
-    with board.lock:
-        assert EMERGENCY_STOP not in bytes(board.board.received)
+    killed = board.board.tick
+    assert board.wait_for(lambda b: b.tick > killed + 1, PATIENCE_S)  # what was sent has arrived
+    mark = len(board.board.received)
+    assert board.wait_for(lambda b: b.tick > killed + 50, PATIENCE_S)
+    assert not board.board.received[mark:]
