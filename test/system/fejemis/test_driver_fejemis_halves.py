@@ -20,6 +20,7 @@ from two_ports import DRIVE, FRONT, TwoPorts
 from omnibot_driver.simulator.fejemis import Firmware
 
 Start = Callable[..., Any]
+STOP = "rc 2 0 0"
 
 
 @pytest.mark.parametrize(("channel", "name"), [(DRIVE, "drive"), (FRONT, "front")])
@@ -54,14 +55,23 @@ def test_a_half_that_is_unplugged_while_driving_stops_the_robot(
 def test_a_half_that_restarts_or_falls_silent_stops_the_robot(
     robot: TwoPorts, driver: Driver, probe: Probe, name: str, what: str
 ) -> None:
-    """One of the two Teensys restarts or becomes silent during a drive. The robot stops.
+    """One of the two Teensys restarts or becomes silent during a drive.
 
-    When both work again, the robot obeys new commands.
+    The driver stops the robot although the commands continue. When both work again, the robot obeys
+    new commands.
     """
     said = len(driver.lines)
     with driven(probe, robot):
         robot.do(lambda board: board.befall(name, what))
-        if what != "restart":
+        befell_s = robot.do(lambda board: board.now_s)
+        if what == "restart":
+            robot.wait_until(
+                lambda board: any(
+                    obeyed.text == STOP and obeyed.at_s > befell_s
+                    for obeyed in board.drive.commands
+                )
+            )
+        else:
             probe.wait_for_state("connecting")
             driver.wait_for_line(name, said)
             robot.stands_for_good()
