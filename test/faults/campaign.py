@@ -127,7 +127,7 @@ class Campaign(Outcome):
             if again:
                 rig.expect_obeys_again()
         except Exception as error:  # the other cases run after any error
-            rig.findings.expect(False, f"{row.name}: {error!r}")
+            rig.findings.expect(False, repr(error))
             rig.line.heal()  # the next case needs an undamaged line
         row.tried += 1
         rig.findings.stood_after_s.clear()

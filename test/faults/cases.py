@@ -31,7 +31,7 @@ DAMAGED_S: Final = 1.1
 
 The rig adds its grace time.
 """
-UNHEARD: Final = "robot moves although|moving without a command|stop unconfirmed"
+UNHEARD: Final = "moving without a command|stop unconfirmed"
 """Pattern of the log lines that a driver should print if the board does not receive Stop."""
 NEXT_ATTEMPT_S: Final = 2.0
 """Longest time in s until the driver tries again to open a lost port."""
@@ -170,8 +170,8 @@ def unplugged(rig: Rig) -> None:
     rig.unplug()
     rig.probe.wait_for_state("disconnected")
     rig.wait_for_diagnosis("does not exist")
-    rig.plug()
     mark = len(rig.line.board.received)
+    rig.plug()
     since = rig.line.tick
     rig.expect_still(since, "unplugged while driving, plugged in again", NEXT_ATTEMPT_S)
     opening = bytes(rig.line.board.received[mark:])
