@@ -100,7 +100,7 @@ def test_a_motion_frame_that_lost_a_byte_is_in_force_for_a_moment_only() -> None
     score = Score()
     line = Losing(begin + len(course.writes[moving].data) - 1)
     Trial(course, COUNTING, {}).run(line, score)
-    assert score.uncommanded <= 1
+    assert score.uncommanded == 1, shown(score)
     assert score.longest_s < 0.0015
 
 
