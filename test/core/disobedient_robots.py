@@ -60,7 +60,8 @@ def stopped_after_s(
 ) -> float:
     """Command the robot until the driver sends Stop.
 
-    Return the time in s from the robot's first deviation from the command to this Stop.
+    Return the time in s from the robot's first deviation from the command to this Stop. A Stop
+    before the deviation is an error.
     """
     begun, astray, mark = bench.now, math.inf, len(bench.written)
     first = bench.board.tick
@@ -71,7 +72,8 @@ def stopped_after_s(
         if goes_astray(bench, command):
             astray = min(astray, bench.now)
         if any(data == STOP for _, data in bench.written[mark:]):
-            return max(0.0, bench.now - astray)
+            assert astray < math.inf, "stopped before the robot deviated from the command"
+            return bench.now - astray
     raise AssertionError("never stopped")
 
 
