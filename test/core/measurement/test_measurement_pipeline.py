@@ -65,8 +65,8 @@ def test_stamps_go_forward_over_a_restart_and_a_reconnect(bench: Bench) -> None:
 def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Bench) -> None:
     """The odometry is reset during a drive. Afterwards, odom shows the distance since the reset.
 
-    It may be up to 20 mm too long, because the first displacement after the reset also contains the
-    motion that the board had not reported before.
+    It may be up to 20 mm too long, but never too short, because the first displacement after the
+    reset also contains the motion that the board had not reported before.
     """
     for _ in range(10):
         bench.drive(0.5)
@@ -79,7 +79,7 @@ def test_reset_odometry_zeroes_the_pose_and_the_way_goes_on_from_there(bench: Be
     bench.run(1.0)
     way = bench.board.truth.x_m - way_before
     unreported = 0.04 * 0.5
-    assert bench.odometry[-1].pose.x_m == pytest.approx(way, abs=unreported)
+    assert 0.0 <= bench.odometry[-1].pose.x_m - way <= unreported
 
 
 @pytest.mark.slow
