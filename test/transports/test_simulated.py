@@ -86,15 +86,24 @@ def test_after_closing_nothing_is_read_and_nothing_written() -> None:
 def test_bytes_that_nobody_reads_are_dropped_and_counted() -> None:
     """The driver does not read. A channel keeps as many bytes as a terminal would.
 
-    Later bytes are dropped. The result of ``_send`` is the number of kept bytes.
+    Later bytes are dropped and counted. The other channel still has room.
     """
-    served = InProcessBoard(toy_lines.ToyLines())
-    taken = [served._send(toy_lines.FRONT, bytes([number]) * 1000) for number in range(6)]
-    assert taken == [1000, 1000, 1000, 1000, UNREAD_LIMIT - 4000, 0]
+
+    class Talking(toy_lines.ToyLines):
+        def advance(self) -> list[tuple[int, bytes]]:
+            self.tick += 1
+            return [(toy_lines.FRONT, bytes([self.tick]) * 1000)]
+
+    served = InProcessBoard(Talking())
+    dropped = []
+    for _ in range(6):
+        served._let_pass(1)
+        dropped.append(served.dropped)
+    assert dropped == [0, 0, 0, 0, 5000 - UNREAD_LIMIT, 6000 - UNREAD_LIMIT]
     assert served._send(toy_lines.DRIVE, b"odo") == 3
     assert served.unread(toy_lines.FRONT) == UNREAD_LIMIT
     channel, data = served.read(0)
-    assert (channel, len(data), data[-1]) == (toy_lines.FRONT, UNREAD_LIMIT, 4)
+    assert (channel, len(data), data[-1]) == (toy_lines.FRONT, UNREAD_LIMIT, 5)
 
 
 def test_datagrams_that_nobody_reads_are_dropped_whole() -> None:
