@@ -45,6 +45,7 @@ class Bench:
         settings: FejemisSettings | None = None,
         *,
         limits: SpeedLimits | None = None,
+        commands: CommandSettings | None = None,
         run: bool = True,
     ) -> None:
         self.robot = SimulatedFejemis(simulated or SimulatedSettings())
@@ -53,7 +54,7 @@ class Bench:
             self.board,
             SessionSettings(
                 limits=limits or SpeedLimits(linear_mps=1.0, angular_radps=1.5),
-                commands=CommandSettings(),
+                commands=commands or CommandSettings(),
                 odometry=OdometrySettings(noise=OdometryNoise(wheels=WHEELS)),
             ),
             run=run,

@@ -13,6 +13,7 @@ import random
 import pytest
 from fejemis_bench import DRIVE, FRONT, Bench, nominal
 
+from omnibot_driver.core.commands.policy import CommandSettings
 from omnibot_driver.core.errors import CommandRefused
 from omnibot_driver.core.fejemis.messages import BoardPose
 from omnibot_driver.core.fejemis.settings import FejemisSettings, Written
@@ -85,12 +86,18 @@ def test_a_restart_at_any_phase_of_the_reads_is_survived(boot_s: float) -> None:
 def test_every_restart_stops_the_robot_and_is_reported(
     half: str, boot_s: float, read_s: float, *, says_start: bool
 ) -> None:
-    """A board restarts, with or without a line that reports it. The robot stops.
+    """A board restarts during a slow drive, with or without a line that reports it.
 
-    Without this line, the times in the board's other lines show the restart.
+    The robot stops, although the last command is still valid. Without this line, the times in the
+    board's other lines show the restart.
     """
-    bench = nominal(Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)))
+    bench = nominal(
+        Simulated(boot_s=boot_s, firmware=Firmware(says_start=says_start)),
+        commands=CommandSettings(timeout_s=60.0),
+    )
     bench.run(2.0)
+    bench.drive_on(0.05)  # slowly, as the drive board does not report its last motion
+    assert not bench.robot.standing
     bench.read_s = read_s
     before = dict(bench.robot.half(half).subscriptions)
     bench.robot.half(half).reboot()
