@@ -112,7 +112,7 @@ def test_a_slow_drive_that_is_blocked_teaches_nothing_about_the_motors() -> None
     bench.server.chassis.change(stuck="both")
     bench.command(0.06, 0.0, 3.0)
     assert any("does not" in notice for notice in bench.notices)
-    bench.server.chassis.change(stuck="")
+    bench.server.chassis.change(stuck="none")
     bench.command(0.0, 0.0, 1.0)
     bench.command(0.06, 0.0, 1.0)
     assert not bench.robot.stands

@@ -34,7 +34,10 @@ def test_a_wheel_that_gets_stuck_in_a_turn_to_a_goal_discards_it(
     bench.run(first_s)
     bench.server.chassis.change(stuck=stuck)
     bench.run(15.0)
-    assert any("one wheel may be stuck" in notice for notice in bench.notices)
+    (notice,) = bench.notices
+    assert "one wheel may be stuck" in notice
+    assert "the goal of cmd_pose is discarded" in notice
+    assert bench.board._pilot.goal_progress == "none"
     assert abs(bench.truth.yaw_rad) < 2.8
     assert nees(bench) < MOST_NEES
 
