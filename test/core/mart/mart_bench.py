@@ -3,6 +3,7 @@
 """A driver session and a simulated MART, in simulated time, with a bad network between them."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from any_board import TICK_S as BENCH_TICK_S
@@ -153,6 +154,18 @@ class MartBench(AnyBench):
         finally:
             self.settle()
         return ""
+
+    def command_until(
+        self, vx: float, yaw_rate: float, predicate: Callable[[], bool], limit_s: float = 2.0
+    ) -> None:
+        """Command the twist at each tick until ``predicate`` is true. No command may be refused."""
+
+        def holds() -> bool:
+            refusal = self.try_command(vx, yaw_rate)
+            assert not refusal, refusal
+            return predicate()
+
+        self.run_until(holds, limit_s)
 
     def go_to(self, x_m: float, y_m: float, yaw_rad: float) -> None:
         """Command the goal pose. While it is refused, repeat it every 0.1 s, for 5 s at most."""

@@ -125,7 +125,7 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
     The driver sends no motion until the server is ready.
     """
     bench = MartBench().ready()
-    bench.run_until(lambda: bench.try_command(0.0, 0.5) or b"RST IMU" in bench.said()[-1:], 2.0)
+    bench.command_until(0.0, 0.5, lambda: b"RST IMU" in bench.said()[-1:])
     bench.run(after_s)
     bench.server.restart(1.0)
     bench.command(0.0, 0.5, 6.0)

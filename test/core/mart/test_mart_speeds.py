@@ -118,7 +118,7 @@ def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: 
     if learned:
         bench.command(0.0, 0.5, 4.0)
         bench.command(0.0, 0.0, 2.0)
-    bench.run_until(lambda: bench.try_command(0.0, 0.5) or not bench.robot.stands, 2.0)
+    bench.command_until(0.0, 0.5, lambda: not bench.robot.stands)
     chassis = bench.server.chassis
     gains = chassis._gain_right, chassis._gain_left
     chassis._gain_right, chassis._gain_left = 0.3 * gains[0], 0.3 * gains[1]
