@@ -168,11 +168,12 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
         assert math.hypot(drive_v, math.radians(drive_w)) == pytest.approx(rim, rel=0.018)
 
 
-@pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, 1.25])
+@pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25])
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
     """A lift line has 60 to 100 % of the requested voltage.
 
-    If the line loses characters, the lift gets at most 12 V, and runs no longer than requested.
+    If the line loses characters, the lift gets at most the voltage of the line, in the direction of
+    the line, and runs no longer than the line says.
     """
     text, seconds = lift_line(volts, 0.5)
     data = line(text, sums=True)
@@ -182,8 +183,8 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
     for count in (1, 2):
         for lost in itertools.combinations(range(len(data) - 1), count):
             for found_volts, found_s in motions(without(data, lost), b"motv", 2):
-                assert abs(found_volts) <= 12.0
-                assert found_s <= 0.5
+                assert 0.0 <= found_volts / said_volts <= 1.0
+                assert found_s <= said_s
 
 
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
