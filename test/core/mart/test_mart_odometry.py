@@ -28,34 +28,66 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
     return Moment(at_s, at_s - 0.005, at_s + 0.005, doubtful)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("quiet_s", [0.05, 0.5], ids=["ok is heard", "ok is lost"])
-@pytest.mark.parametrize("twist", [(-0.2, 0.0), (0.3, 0.0), (0.0, 0.5)])
-def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
-    twist: tuple[float, float], quiet_s: float
-) -> None:
-    """Two equal motions end with equal encoder counts. The replies during both of them are lost.
+def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
+    """Let the robot make two motions that end with equal encoder counts, and return the bench.
 
-    If the reply to the stop arrives, the odometry adds both motions. If not, the covariance covers
-    the error.
+    The replies during both motions are lost, until ``quiet_s`` after the driver begins to stop
+    them. Check that the covariance always covers the error.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
+    pilot, counts = bench.board._pilot, []
     for _ in range(2):
-        for state in (State.STARTING, State.STOPPING):
-            for _ in range(60):
-                if bench.board._pilot.state is state:
-                    break
-                bench.command(*twist, 0.1)
-            bench.speaks = False
+        bench.command_until(*twist, lambda: pilot.state is State.STARTING, 6.0)
+        bench.speaks = False
+        bench.command_until(*twist, lambda: pilot.state is State.STOPPING, 6.0)
         bench.run(quiet_s)
         bench.speaks = True
         for _ in range(15):
             bench.run(0.1)
             assert nees(bench) < WRONG_NEES
-    chassis = bench.server.chassis
-    assert chassis.way_m > 0.4 or abs(chassis.yaw_rad) > 1.0
-    if quiet_s < 0.3:
-        assert bench.error.way_m < 0.05
+        counts.append(round(bench.server.chassis.counts))
+    assert counts[0] == counts[1] != 0
+    return bench
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "twist",
+    [
+        (-0.2, 0.0),
+        (0.3, 0.0),
+        pytest.param(
+            (0.0, 0.5),
+            marks=pytest.mark.xfail(
+                raises=AssertionError,
+                reason="the driver leaves the second turn out: it does not regard the angle in the"
+                " reply to SM as a proof that the turn has begun",
+            ),
+        ),
+    ],
+)
+def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
+    twist: tuple[float, float],
+) -> None:
+    """Only the replies to the stops of two equal motions arrive. The odometry adds both motions."""
+    error = after_equal_motions(twist, 0.05).error
+    assert error.way_m < 0.05
+    assert abs(error.yaw_rad) < 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("twist", "quiet_s"),
+    [((-0.2, 0.0), 0.5), ((0.3, 0.0), 0.5), ((0.0, 0.5), 0.5), ((0.0, 0.5), 0.05)],
+)
+def test_a_motion_that_may_be_left_out_for_a_count_like_the_last_is_covered_by_the_covariance(
+    twist: tuple[float, float], quiet_s: float
+) -> None:
+    """No reply proves to the driver that the second of two equal motions has begun.
+
+    If the odometry leaves this motion out, the covariance covers the error.
+    """
+    after_equal_motions(twist, quiet_s)
 
 
 def test_a_copy_of_an_ok_is_not_a_turn_where_the_start_was_lost() -> None:
