@@ -25,10 +25,10 @@ RARE = 16.3
 NETWORKS = {
     "good": NetworkFaults(),
     "late by up to 0.3 s": NetworkFaults(delay_s=0.3),
-    "10 % lost and doubled, late by up to 50 ms": NetworkFaults(
+    "10 % lost and duplicated, late by up to 50 ms": NetworkFaults(
         lose=0.1, duplicate=0.1, delay_s=0.05
     ),
-    "10 % lost and doubled, late by up to 0.3 s": NetworkFaults(
+    "10 % lost and duplicated, late by up to 0.3 s": NetworkFaults(
         lose=0.1, duplicate=0.1, delay_s=0.3
     ),
 }

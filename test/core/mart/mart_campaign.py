@@ -20,11 +20,11 @@ from omnibot_driver.simulator.mart import Firmware
 NETWORKS = {
     "good": NetworkFaults(),
     "10 % lost": NetworkFaults(lose=0.1),
-    "10 % doubled, late by up to 0.3 s": NetworkFaults(duplicate=0.1, delay_s=0.3),
-    "10 % lost and doubled, late by up to 0.3 s": NetworkFaults(
+    "10 % duplicated, late by up to 0.3 s": NetworkFaults(duplicate=0.1, delay_s=0.3),
+    "10 % lost and duplicated, late by up to 0.3 s": NetworkFaults(
         lose=0.1, duplicate=0.1, delay_s=0.3
     ),
-    "10 % lost and doubled, late by up to 50 ms": NetworkFaults(
+    "10 % lost and duplicated, late by up to 50 ms": NetworkFaults(
         lose=0.1, duplicate=0.1, delay_s=0.05
     ),
 }
@@ -80,7 +80,10 @@ def drive(faults: NetworkFaults, seed: int) -> Outcome:
 def main() -> None:
     """Print a row of results for each kind of network."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 20
-    print("| Network | Robot stood, server answers | Longest stop | Mean way |\n|---|---|---|---|")
+    print(
+        "| Network | Robot at rest at the end, server answers |"
+        " Longest time from a stop to standstill | Mean distance |\n" + "|---" * 4 + "|"
+    )
     for name, faults in NETWORKS.items():
         outcomes = [drive(faults, seed) for seed in range(count)]
         stood = sum(outcome.ended for outcome in outcomes)

@@ -24,7 +24,7 @@ NETWORKS = {
     "late by up to 0.3 s": NetworkFaults(delay_s=0.3),
     "3 % lost, late by up to 0.1 s": NetworkFaults(lose=0.03, delay_s=0.1),
     "10 % lost, late by up to 50 ms": NetworkFaults(lose=0.1, delay_s=0.05),
-    "3 % lost and doubled, late by up to 0.1 s": NetworkFaults(
+    "3 % lost and duplicated, late by up to 0.1 s": NetworkFaults(
         lose=0.03, duplicate=0.03, delay_s=0.1
     ),
 }
