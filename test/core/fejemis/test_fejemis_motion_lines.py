@@ -168,9 +168,22 @@ def test_the_outer_wheel_has_every_speed(v: float, w: float) -> None:
         assert math.hypot(drive_v, math.radians(drive_w)) == pytest.approx(rim, rel=0.018)
 
 
-@pytest.mark.parametrize("volts", [6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25])
+UNSAFE = pytest.mark.xfail(
+    raises=AssertionError,
+    reason="the only safe voltage from 50 to 100 % makes a line whose damage the checksum may hide",
+)
+
+
+@pytest.mark.parametrize(
+    "volts",
+    [
+        *(6.0, -6.0, 12.0, -12.0, 0.5, -0.7, 1.25),
+        pytest.param(1.99, marks=UNSAFE),
+        pytest.param(-0.1995, marks=UNSAFE),
+    ],
+)
 def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts: float) -> None:
-    """A lift line has 60 to 100 % of the requested voltage.
+    """A lift line has 50 to 100 % of the requested voltage.
 
     If the line loses characters, the lift gets at most the voltage of the line, in the direction of
     the line, and runs no longer than the line says.
@@ -179,12 +192,23 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
     data = line(text, sums=True)
     said_volts, said_s = motions(data, b"motv", 2)[0]
     assert said_s == seconds <= 0.5
-    assert 0.6 * abs(volts) < abs(said_volts) <= abs(volts)
+    assert 0.5 * abs(volts) <= abs(said_volts) <= abs(volts)
     for count in (1, 2):
         for lost in itertools.combinations(range(len(data) - 1), count):
             for found_volts, found_s in motions(without(data, lost), b"motv", 2):
                 assert 0.0 <= found_volts / said_volts <= 1.0
                 assert found_s <= said_s
+
+
+@pytest.mark.xfail(raises=IndexError, reason="no number from 50 to 100 % of this voltage is safe")
+@pytest.mark.parametrize("volts", [1.999, -1.999, 0.1999, -0.1999])
+def test_a_lift_voltage_just_below_a_gap_of_the_safe_numbers_has_a_line(volts: float) -> None:
+    """The driver makes a line for a voltage just below 2 V or 0.2 V.
+
+    No number with a ``1`` is safe, so none from 50 to 100 % of this voltage is.
+    """
+    text, _ = lift_line(volts, 0.5)
+    assert text.startswith(b"motv ")
 
 
 @pytest.mark.parametrize("text", [b"stop", b"start", b"leave", b"gyroc", b"confsi", STOP])
