@@ -250,7 +250,7 @@ def test_counts_of_several_robots_are_not_laid_to_one(drive: Drive) -> None:
     drive.imu.drop(6.0, 6.1)
     findings = judge(replace(drive.log(), alone=False))
     (gap,) = [finding for finding in findings if finding.text.startswith("imu/data_raw has")]
-    assert "diagnostics of this robot alone" in gap.advice
+    assert "while no other robot publishes on it" in gap.advice
     assert any("of several robots, on /dev/ttyUSB0" in finding.text for finding in findings)
 
 

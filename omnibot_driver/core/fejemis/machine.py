@@ -24,7 +24,7 @@ PACE_S: Final = 0.05
 sent."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
-LEAST_PART: Final = 0.5
+LEAST_PART: Final = 0.45
 """Smallest ratio of the sent to the wanted voltage of the lift. A lower voltage is sent if the
 checksum could not detect damage to the line with the wanted voltage."""
 LEAST_TIME_S: Final = 0.04
@@ -159,12 +159,13 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The numbers are chosen so that the checksum detects damage to the line.
+    The numbers are chosen so that the checksum detects damage to the line. For each voltage from
+    ``LEAST_VOLTS`` to ``MOST_VOLTS`` there is such a number from ``LEAST_PART`` of it on.
     """
     if not volts:
         return OFF[0], 0.0
     seconds, time_text = nearest(max(LEAST_TIME_S, longest_s), negative=True, down=True)
     most, sign = abs(volts), "-" if volts < 0.0 else ""
     texts = [text for _, text in between(LEAST_PART * most, most, negative=volts < 0.0)]
-    lines = [f"motv {sign}{text} {time_text}".encode("ascii") for text in reversed(texts)]
-    return next(filter(robust, lines), lines[0]), seconds
+    lines = (f"motv {sign}{text} {time_text}".encode("ascii") for text in reversed(texts))
+    return next(filter(robust, lines)), seconds
