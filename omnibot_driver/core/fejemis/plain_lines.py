@@ -2,7 +2,8 @@
 
 """Writes motion lines (``rc``) without a checksum. Their form limits the effect of damage.
 
-If a decimal point or a digit after it is lost, the board obeys a wrong number until the next line.
+If a decimal point, a digit after it or a minus sign is lost, the board obeys a wrong number until
+the next line.
 """
 
 import math
@@ -22,11 +23,13 @@ def plain_drive_line(speed_mps: float, turn_radps: float) -> bytes:
     """
     # The line has a source (``2``), a speed and a turn rate. The board uses only the root of the
     # sum of squares. If the source or the space after it is lost, the 0 becomes the speed: the line
-    # is a stop.
+    # is a stop. If the space before the 0 is lost, the speed is the same: it has a decimal point,
+    # so ``1. 0`` becomes ``1.0``, not ``10``.
     rim_mps = math.hypot(speed_mps, turn_radps)
     if rim_mps < LEAST_MPS:
         return STOP
-    return b"rc 2 %s 0" % _short(math.copysign(rim_mps, speed_mps or 1.0), 3)
+    speed = f"{math.copysign(rim_mps, speed_mps or 1.0):.3f}".rstrip("0")
+    return b"rc 2 %s 0" % speed.encode("ascii")
 
 
 def _short(number: float, decimals: int) -> bytes:

@@ -221,23 +221,38 @@ def plain(data: bytes) -> list[tuple[float, ...]]:
     return motions(data.replace(b";", b"?"))
 
 
+@pytest.mark.slow
 def test_without_sums_only_a_lost_point_or_digit_makes_the_outer_wheel_faster() -> None:
-    """A motion line without a checksum loses one character.
+    """A motion line without a checksum loses one character, at each speed in steps of 1 mm/s.
 
     The outer wheel becomes faster only if this character is a decimal point or a digit of the
-    speed.
+    speed. It changes its direction only if the character is the minus sign.
     """
-    for speed, turn in ((0.25, 0.0), (0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
-        text = plain_drive_line(speed, turn)
-        rim = math.hypot(speed, turn)
-        assert plain(text) == [(2.0, pytest.approx(math.copysign(rim, speed), abs=6e-4), 0.0)]
-        number = text.split()[2]
-        data = text + b"\n"
-        for lost in range(len(data)):
+    thousandths = [*range(1, 2001), *range(3000, 21_000, 1000)]
+    for speed in (sign * each / 1000 for each in thousandths for sign in (1, -1)):
+        text = plain_drive_line(speed, 0.0)
+        assert plain(text) == [(2.0, speed, 0.0)]
+        data = text + b"\nfwl 12\n"
+        begin = len(b"rc 2 ")
+        digits = range(begin + (speed < 0.0), begin + len(text.split()[2]))
+        for lost in range(len(text) + 1):
             for _, v, w in plain(without(data, (lost,))):
-                faster = math.hypot(v, math.radians(w)) > rim + 1e-3
-                at = data.index(number)
-                assert not faster or at <= lost < at + len(number), (text, lost)
+                assert w == 0.0, (text, lost)
+                assert abs(v) <= abs(speed) or lost in digits, (text, lost)
+                assert v * speed >= 0.0 or text[lost : lost + 1] == b"-", (text, lost)
+
+
+def test_without_sums_the_drive_board_gets_the_speed_of_the_outer_wheel() -> None:
+    """Without checksums, the drive board's line has one speed, and a turn rate of 0."""
+    for speed, turn in ((0.25, 0.5), (0.0, 0.6), (1.25, -1.0), (-0.3, 0.2)):
+        rim = math.copysign(math.hypot(speed, turn), speed)
+        assert plain(plain_drive_line(speed, turn)) == [(2.0, pytest.approx(rim, abs=6e-4), 0.0)]
+
+
+def test_without_sums_a_whole_speed_keeps_its_decimal_point() -> None:
+    """A line without a checksum loses its last space. The 0 after it must not extend the speed."""
+    assert plain_drive_line(1.0, 0.0) == b"rc 2 1. 0"
+    assert plain(b"rc 2 1.0\n") == [(2.0, 1.0, 0.0)]
 
 
 def test_without_sums_the_front_board_gets_both_numbers() -> None:
