@@ -19,6 +19,7 @@ ROUNDED: Final = 5
 """Largest allowed rounding of an angle, in tenths of a degree."""
 MOST_OWED: Final = 0.5
 """Largest rounding error that is added to the next angle, in degrees."""
+LARGEST_DEG: Final = 90.0
 ACROSS: Final = 10.0
 """Limit in degrees. Damage that the checksum does not detect can turn the text of an angle to the
 right into an angle to the left. The driver avoids a text if this wrong angle could reach the limit.
@@ -34,11 +35,11 @@ class AngleRelay:
 
     def text(self, angle_rad: float, *, sums: bool) -> bytes:
         """Return the ``fwl`` line with the angle; ``sums``: whether the caller adds a checksum."""
-        angle_deg = math.degrees(angle_rad)
-        wanted_deg = angle_deg + self._owed_deg
+        wanted_deg = math.degrees(angle_rad) + self._owed_deg
+        told_deg = max(-LARGEST_DEG, min(LARGEST_DEG, wanted_deg))
         # Without a checksum, the board detects no loss. A whole number never grows if a digit is
         # lost.
-        text = _with_sum(round(10 * wanted_deg)) if sums else b"%d" % round(wanted_deg)
+        text = _with_sum(round(10 * told_deg)) if sums else b"%d" % round(told_deg)
         self._owed_deg = max(-MOST_OWED, min(MOST_OWED, wanted_deg - float(text)))
         return b"fwl " + text
 
