@@ -2,7 +2,7 @@
 
 """Splits the bytes from one board into lines, checks the lines, and counts the damaged ones.
 
-The decoder does not read a clock and never raises on input. Between calls, it holds less than 200
+The decoder does not read a clock and never raises on input. Between calls, it holds at most 200
 bytes (``LONGEST_LINE``).
 """
 
@@ -72,13 +72,14 @@ class FejemisDecoder:
         *lines, rest = (self._held + data).split(b"\n")
         found = []
         for line in lines:
-            cut, self._cut = self._cut, False
-            message = None if cut or len(line) > LONGEST_LINE else self._take(line)
+            too_long = self._cut or len(line) > LONGEST_LINE
+            self._cut = False
+            message = None if too_long else self._take(line)
             if message is not None:
                 found.append(message)
-            elif cut or line.strip(b"\r \0"):
+            elif too_long or line.strip(b"\r \0"):
                 self._damaged(len(line) + 1)
-        if len(rest) >= LONGEST_LINE:
+        if len(rest) > LONGEST_LINE:
             self.statistics.discarded_bytes += len(rest)
             rest, self._cut = b"", True
         self._held = rest

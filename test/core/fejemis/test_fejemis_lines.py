@@ -10,6 +10,7 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import chunkings
 
 from omnibot_driver.core.fejemis.codec import parse
 from omnibot_driver.core.fejemis.decoder import LONGEST_LINE, FejemisDecoder
@@ -203,6 +204,45 @@ def test_a_line_may_have_200_characters_and_no_more() -> None:
     assert feed(decoder, b"\ngyro 1 2 3\n") == [Gyro(1.0, 2.0, 3.0)]
 
 
+@pytest.mark.slow
+@given(
+    st.lists(
+        st.sampled_from([b"gyro 1 2 3", b"\r"])
+        | st.builds(
+            lambda text, length, end: text.ljust(length) + end,
+            st.sampled_from([b"# x", b""]),
+            st.integers(LONGEST_LINE - 2, LONGEST_LINE + 2) | st.integers(0, 3 * LONGEST_LINE),
+            st.sampled_from([b"", b"\r"]),
+        ),
+        max_size=6,
+    ),
+    st.data(),
+)
+def test_the_limit_of_a_line_does_not_depend_on_the_chunking(
+    lines: list[bytes], data: st.DataObject
+) -> None:
+    """Lines of about 200 characters arrive in any pieces, even with the line end in another piece.
+
+    The decoder returns the same messages and counts as if all bytes arrived at once.
+    """
+    stream = b"\n".join(lines)
+    whole, split = FejemisDecoder(), FejemisDecoder()
+    wanted = feed(whole, stream)
+    pieces = data.draw(chunkings(stream))
+    assert [message for piece in pieces for message in feed(split, piece)] == wanted
+    whole.flush(0.0)
+    split.flush(0.0)
+    assert split.statistics == whole.statistics
+
+
+def test_a_line_of_200_characters_may_arrive_without_its_line_end() -> None:
+    """A read ends just before the line end of a line of 200 characters. The line is accepted."""
+    decoder = FejemisDecoder()
+    assert feed(decoder, b"# ".ljust(LONGEST_LINE, b"x")) == []
+    assert len(feed(decoder, b"\n")) == 1
+    assert decoder.statistics.faults == 0
+
+
 def test_half_a_line_at_the_end_is_none() -> None:
     """The bytes end without a line end.
 
@@ -289,12 +329,12 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 def test_no_input_raises_and_little_is_held(pieces: list[bytes]) -> None:
     """Random bytes in random pieces raise no error.
 
-    The buffer stays shorter than the longest line.
+    The buffer never holds more than the longest line.
     """
     decoder = FejemisDecoder()
     for piece in pieces:
         feed(decoder, piece)
-        assert len(decoder._held) < LONGEST_LINE
+        assert len(decoder._held) <= LONGEST_LINE
     decoder.flush(0.0)
 
 
