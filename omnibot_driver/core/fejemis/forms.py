@@ -49,9 +49,9 @@ class _Kind:
     def admit(self, form: Form, varies: int) -> bool:
         if self._varies:
             return True
-        self._seen += 1
-        if self._seen > OF:
+        if self._seen == OF:
             self._seen = self._strange = 0
+        self._seen += 1
         if form == self._form:
             self._others = 0
             return True

@@ -14,6 +14,7 @@ from strategies import chunkings
 
 from omnibot_driver.core.fejemis.codec import parse
 from omnibot_driver.core.fejemis.decoder import LONGEST_LINE, FejemisDecoder
+from omnibot_driver.core.fejemis.forms import OF
 from omnibot_driver.core.fejemis.messages import (
     Acceleration,
     Attitude,
@@ -323,6 +324,23 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
     for n in range(40):
         feed(decoder, b"acc 0.%d 1 %s\n" % (n, b"2.5" if n % 3 else b"7"))
     assert len(feed(decoder, b"acc 0.125 1.5 2\n")) == 1
+
+
+@pytest.mark.parametrize("windows", range(3))
+def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
+    """The last lines of a window and the first of the next include 7 lines each in another form.
+
+    Both counts are below the limit of 8, so these lines are discarded. An eighth line in the same
+    window ends the check of forms. Some ``windows`` without such lines come first.
+    """
+    learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
+    decoder = FejemisDecoder("on")
+    feed(decoder, learnt * OF * windows)
+    feed(decoder, learnt * (OF - 14) + (learnt + other) * 7)
+    feed(decoder, (other + learnt) * 7)
+    assert decoder.statistics.faults == 14
+    assert len(feed(decoder, other)) == 1
+    assert decoder.statistics.faults == 14
 
 
 @given(st.lists(st.binary(max_size=300), max_size=20))
