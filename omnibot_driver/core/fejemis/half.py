@@ -67,7 +67,7 @@ class Half:
         self.statistics = DecoderStatistics()
         self.clock = TeensyClock()
         self.unknown_words: dict[str, None] = {}
-        """Lines from the driver that the firmware does not know."""
+        """Lines from the driver that the firmware does not know, the latest last."""
         self.rejected = 0
         """How many lines from the driver the board has rejected as damaged."""
         self.identity: int | None = None
@@ -237,7 +237,9 @@ class Half:
         elif "CRC failed" in text:
             self.rejected += 1
         elif found := _UNHANDLED.search(text):
-            self.unknown_words[found[1].strip()] = None
+            words = found[1].strip()
+            self.unknown_words.pop(words, None)
+            self.unknown_words[words] = None  # at the end
             if len(self.unknown_words) > 64:
                 del self.unknown_words[next(iter(self.unknown_words))]
 

@@ -247,6 +247,17 @@ def test_help_text_and_unknown_answers_are_no_trouble() -> None:
     assert bench.board.figures.own["Drive lines unknown"] == "xyz"
 
 
+def test_the_diagnostics_show_the_latest_unknown_lines() -> None:
+    """The drive board does not know four lines, and the first of them comes again.
+
+    The diagnostics show the latest three lines, each of them once.
+    """
+    bench = nominal()
+    bench.robot.receive(b"wa\nwb\nwc\nwd\nwa\n", bench.now, DRIVE)
+    bench.run(0.1)
+    assert bench.board.figures.own["Drive lines unknown"] == "wc; wd; wa"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", [
     Firmware(acceleration_in_g=True), Firmware(timed_velocity=True), Firmware(tilt=True),
