@@ -100,7 +100,7 @@ class Jobs:
         """Why the robot must stand still for the running job; empty if it may move."""
         job = self.job
         if job is not None and (job in OFFSETS or job is Job.LOAD):
-            return f"a {job.value} is under way; wait for its answer"
+            return f"{job.value} is under way; wait for its answer"
         return ""
 
     def ask(
@@ -114,7 +114,7 @@ class Jobs:
         """
         if self.job is not None:
             raise RequestRefused(
-                f"a {self.job.value} is under way; wait for its answer, then call again"
+                f"{self.job.value} is under way; wait for its answer, then call again"
             )
         self.job, self._token = job, token
         self._begun_at = self._next_at = now + wait_s

@@ -26,7 +26,7 @@ class Job(Enum):
     CALIBRATE_ACCELEROMETER = "accelerometer calibration"
     SAVE = "saving of the configuration"
     LOAD = "loading of the configuration"
-    POWER_OFF = "power off"
+    POWER_OFF = "power-off"
 
 
 @value(frozen=True, slots=True)

@@ -213,6 +213,27 @@ def test_a_configuration_is_saved_and_loaded() -> None:
     assert ask(bench, Job.LOAD).success
 
 
+@pytest.mark.parametrize(
+    ("job", "name"),
+    [
+        (Job.CALIBRATE_GYRO, "gyro calibration"),
+        (Job.CALIBRATE_ACCELEROMETER, "accelerometer calibration"),
+        (Job.SAVE, "saving of the configuration"),
+        (Job.LOAD, "loading of the configuration"),
+        (Job.POWER_OFF, "power-off"),
+    ],
+)
+def test_a_refusal_during_a_job_names_the_job_without_an_article(job: Job, name: str) -> None:
+    """During a job, another job is refused. The text is English for the name of every job."""
+    jobs = Jobs()
+    jobs.ask(job, None, 0.0)
+    with pytest.raises(RequestRefused) as refused:
+        jobs.ask(Job.SAVE, None, 0.0)
+    begins = f"{name} is under way; wait for its answer"
+    assert str(refused.value) == f"{begins}, then call again"
+    assert jobs.at_rest in ("", begins)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("job", [Job.CALIBRATE_GYRO, Job.CALIBRATE_ACCELEROMETER, Job.LOAD])
 def test_a_robot_is_not_driven_while_a_job_needs_it_at_rest(job: Job) -> None:
