@@ -11,12 +11,6 @@ from typing import Final
 from omnibot_driver.core.fejemis.sums import MODULUS, sum_of, with_sum
 
 IN_NUMBERS: Final = frozenset(b" -.0123456789")
-_COMPLEMENTS: Final = tuple(
-    (one, other)
-    for one in sorted(IN_NUMBERS)
-    for other in sorted(IN_NUMBERS)
-    if one <= other and (one + other) % MODULUS == 0
-)
 
 
 @lru_cache(maxsize=1024)
@@ -33,15 +27,6 @@ def line(text: bytes, *, sums: bool) -> bytes:
 def lines(*texts: bytes, sums: bool) -> bytes:
     """Return the bytes of several lines, with line ends; ``sums``: whether to add checksums."""
     return b"".join([line(text, sums=sums) for text in texts])
-
-
-def harmless(text: str) -> bool:
-    """Return whether the checksum detects the loss of any two digits, signs, points or spaces."""
-    codes = text.encode("ascii")
-    return not any(
-        one in codes and other in codes and (one != other or codes.count(one) > 1)
-        for one, other in _COMPLEMENTS
-    )
 
 
 def robust(text: bytes) -> bool:

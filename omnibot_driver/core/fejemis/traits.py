@@ -9,10 +9,6 @@ from omnibot_driver.core.motion_monitor.monitor import Fault
 from omnibot_driver.core.requests import Request
 from omnibot_driver.core.traits import Traits
 
-DRIVE: Final = 0
-FRONT: Final = 1
-"""``DRIVE``, ``FRONT``: channel numbers of the two boards, if the ports are not swapped."""
-
 TRAITS: Final = Traits(
     channels=("drive", "front"),
     imu_period_s=0.01,

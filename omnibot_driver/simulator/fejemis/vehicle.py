@@ -169,6 +169,6 @@ def wheel_speeds(
     theta = abs(angle_deg) * pi / 180.0
     if theta < 1e-6:
         return outer, outer
-    radius_m = steer_m * cos(theta) / sin(theta) + base_m / 2 if sin(theta) else base_m / 2
+    radius_m = steer_m * cos(theta) / sin(theta) + base_m / 2
     inner = outer - outer * base_m / max(radius_m, base_m / 4)
     return (inner, outer) if angle_deg > 0.0 else (outer, inner)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from omnibot_driver.core.fejemis.machine import LEAST_VOLTS, MOST_VOLTS, lift_line
 from omnibot_driver.core.fejemis.motion_lines import STOP, drive_line, front_line
-from omnibot_driver.core.fejemis.outbound import harmless, line, robust
+from omnibot_driver.core.fejemis.outbound import line, robust
 from omnibot_driver.core.fejemis.plain_lines import plain_drive_line, plain_front_line
 from omnibot_driver.core.fejemis.sums import sum_of
 
@@ -96,7 +96,9 @@ def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
         v = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.3)
         w = chance.uniform(-1, 1) * 10 ** chance.uniform(-2, 0.8)
         for text in (front_line(v, w, FRONT_M), drive_line(v, w)):
-            assert text == STOP or (harmless(text[2:].decode()) and robust(text)), text
+            pairs = itertools.combinations(text.removeprefix(b"rc"), 2)
+            detected = all(sum(pair) % 99 for pair in pairs) and robust(text)
+            assert text == STOP or detected, text
 
 
 def test_nothing_can_be_lost_of_stop_that_makes_a_motion() -> None:
