@@ -165,7 +165,7 @@ class Teensy(Generic[C]):
             return b""
         self._told_s = now_s
         self._clock_s += STEP_S * self._rate
-        if self._clock_s >= (self._cycles + 1) * STEP_S:
+        while self._clock_s >= (self._cycles + 1) * STEP_S:  # 0 to 2 cycles
             self._cycles += 1
             self._next_cycle()
         if not self._out:

@@ -320,7 +320,7 @@ def test_ports_that_change_places_leave_each_board_its_own_time(ahead_s: float) 
     The driver does not use the front board's clock for the stamps of the drive board.
     """
     bench = Bench()
-    bench.robot.front._clock_s += ahead_s
+    bench.robot.front._restart(ahead_s)
     bench.open()
     bench.run_until(lambda: bench.session.state == "nominal")
     bench.run(3.0)

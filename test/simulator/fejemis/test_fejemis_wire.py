@@ -264,6 +264,22 @@ def test_the_two_clocks_run_apart() -> None:
     assert rig.board.front.clock_s == pytest.approx(19.994)
 
 
+@pytest.mark.slow
+def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
+    """The clocks run too fast and too slow. Both halves send a heartbeat every 0.4 s of their time.
+
+    So the time in a heartbeat is right within a millisecond, the duration of a cycle.
+    """
+    rig = Rig(clock_ppm=(200.0, -300.0))
+    rig.run(20.1)
+    for port in (DRIVE, FRONT):
+        beats = [line for _, at, line in rig.lines if at == port and line.startswith("hbt ")]
+        assert len(beats) > 45
+        for number, beat in enumerate(beats, 1):
+            late_s = float(beat.split()[1]) - 0.4 * number
+            assert -1e-5 < late_s < 0.00101, (port, beat)
+
+
 def test_bytes_to_the_boards_can_be_lost() -> None:
     """Some bytes to the halves are lost. The seed determines which."""
     heard = []
