@@ -2,6 +2,7 @@
 
 """Tests of a report's findings on a robot with a planted fault in its motion or its IMU."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -10,10 +11,14 @@ import pytest
 from drives import DELAY_S, Drive, Topic
 from verdicts import said, troubles
 
+from omnibot_driver.boards.fejemis import PARAMETERS
 from omnibot_driver.tools.report import following, plots
 from omnibot_driver.tools.report.findings import Level
 from omnibot_driver.tools.report.judge import judge
+from omnibot_driver.tools.report.log import Log
 from omnibot_driver.tools.report.recorder import Recorder
+
+JOINTS = ("left_wheel_joint", "right_wheel_joint", "front_steering_joint")
 
 
 @pytest.fixture
@@ -111,6 +116,49 @@ def test_a_sensor_that_stands_upright_is_noted(drive: Drive) -> None:
     """
     drive.imu.values[:, 2] *= -1.0
     assert "imu_rpy" in said(drive, "IMU", "upright").advice
+
+
+def of_a_fejemis(drive: Drive) -> Log:
+    """Return the log of this drive with the two wheels and the upright IMU of a Fejemis."""
+    log = drive.log()
+    imu = replace(log.imu, values=log.imu.values * [1, 1, -1, 1, 1, -1])
+    joints = replace(log.joint_states, values=log.joint_states.values[:, :2])
+    return replace(log, imu=imu, joint_states=joints, wheels=JOINTS[:2])
+
+
+def test_the_upright_sensor_of_a_fejemis_is_good(drive: Drive) -> None:
+    """The IMU of a Fejemis stands upright, as in its description. The report calls this good."""
+    found = judge(of_a_fejemis(drive))
+    assert all(finding.level <= Level.NOTE for finding in found)
+    (turns,) = [finding for finding in found if "by the gyro" in finding.text]
+    assert turns.level is Level.GOOD
+    assert "upright, as in the robot's description" in turns.text
+
+
+def test_a_sensor_of_a_fejemis_that_hangs_upside_down_is_noted(drive: Drive) -> None:
+    """The description of a Fejemis has the sensor upright, but the sign of the gyro contradicts it.
+
+    The advice names ``imu_rpy``.
+    """
+    drive.imu.values[:, [2, 5]] *= -1.0
+    (turns,) = [one for one in judge(of_a_fejemis(drive)) if "by the gyro" in one.text]
+    assert turns.level is Level.NOTE
+    assert "hangs upside down" in turns.text
+    assert "description has the sensor upright: set imu_rpy" in turns.advice
+
+
+def test_the_advice_for_a_fejemis_names_only_its_parameters(drive: Drive) -> None:
+    """A Fejemis has wrong turns, gravity and directions. All advice names parameters that it has.
+
+    ``imu_rpy`` is an argument of the robot's description.
+    """
+    drive.imu.values[:, 2] *= 1.2
+    drive.imu.values[:, 3:] /= 9.80665
+    drive.odom.values[:, [0, 3]] *= -1.0
+    advice = " ".join(finding.advice for finding in judge(of_a_fejemis(drive)))
+    assert {"wheel_radii", "track", "acceleration_unit"} <= {*re.findall(r"\w+", advice)}
+    of_robot = {row.name for row in PARAMETERS.rows} | {"imu_rpy"}
+    assert {*re.findall(r"(?<!/)\b[a-z]+_[a-z_]+\b", advice)} <= of_robot
 
 
 def test_vibration_is_told_with_its_frequency(drive: Drive) -> None:
@@ -230,9 +278,6 @@ def test_wheel_commands_are_compared_with_the_wheels(drive: Drive) -> None:
     assert followed.level is Level.WARN
     assert "wheel A 1.00" in followed.text
     assert "wheel B 0.50" in followed.text
-
-
-JOINTS = ("left_wheel_joint", "right_wheel_joint", "front_steering_joint")
 
 
 def two_wheels() -> Recorder:

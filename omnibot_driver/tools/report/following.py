@@ -19,6 +19,13 @@ TOLD: Final = 0.05
 
 Friction may prevent slower motions.
 """
+YAW_WEIGHT_M: Final = 0.143
+WHEEL_WEIGHT_M: Final = 0.029
+"""Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
+
+They fit an OmniBot. Other robots do not need their own: the factors only decide which speeds are
+motion, and how much each axis counts in the search for the lag. They do not change the ratios.
+"""
 STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
 SUSTAINED_S: Final = 1.0
@@ -53,7 +60,7 @@ def twists(log: Log) -> Pair:
         "cmd_vel",
         ("vx", "vy", "yaw rate"),
         ("m/s", "m/s", "rad/s"),
-        (1.0, 1.0, 0.143),
+        (1.0, 1.0, YAW_WEIGHT_M),
         scales,
         log.cmd_vel.only(log.cmd_vel.finite),
         Series(odom.arrived_s, odom.stamp_s, odom.values[:, 3:]),
@@ -65,7 +72,7 @@ def _scales(log: Log) -> tuple[str, str]:
 
     With two wheels, the parameters scale the odometry, otherwise the commands.
     """
-    if len(log.wheels) == 2:
+    if log.two_wheels:
         return "odom_linear_scale", "odom_angular_scale"
     return "linear_scale", "angular_scale"
 
@@ -80,7 +87,7 @@ def pairs(log: Log) -> list[Pair]:
         "wheel_cmd",
         tuple(map(wheel_name, log.wheels)),
         ("rad/s",) * count,
-        (0.029,) * count,
+        (WHEEL_WEIGHT_M,) * count,
         _scales(log)[:1] * count,
         log.wheel_cmd.only(log.wheel_cmd.finite),
         _sampled(log.joint_states),
@@ -269,7 +276,11 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
         yield Finding(Level.GOOD, "Commands", f"{figure}.")
         return
     if any(found.gains[axis] < -TOLERANCE for axis in off):
-        advice = "The robot moves the wrong way: set axis_signs (docs/commissioning.md)."
+        advice = (
+            "The robot moves the wrong way: check the wiring of the motors and the encoders."
+            if log.two_wheels
+            else "The robot moves the wrong way: set axis_signs (docs/commissioning.md)."
+        )
     else:
         scales = sorted({pair.scales[axis] for axis in off})
         advice = (

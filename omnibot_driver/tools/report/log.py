@@ -121,6 +121,15 @@ class Log:
     alone: bool = True
 
     @property
+    def two_wheels(self) -> bool:
+        """Whether the robot has two driving wheels; False without joint_states.
+
+        Among the boards with an IMU, only the Fejemis has two. Its IMU is mounted upright. The IMU
+        of an OmniBot, which has three, hangs upside down.
+        """
+        return len(self.wheels) == 2
+
+    @property
     def latched(self) -> list[Span]:
         """The spans of time in which the e-stop was latched."""
         return [span for span in self.estops if span.what == "latched"]

@@ -137,7 +137,7 @@ def judge(log: Log) -> Iterator[Finding]:
         )
     rest = at_rest(log, imu)
     if rest.sum() >= LEAST_REST_S * rate_hz(imu):
-        yield from _gravity(imu.values[rest, 3:].mean(axis=0))
+        yield from _gravity(log, imu.values[rest, 3:].mean(axis=0))
         if "gyro" not in stuck:
             yield from _bias(imu.values[rest, :3])
     else:
@@ -158,7 +158,7 @@ def longest_same(values: Array) -> int:
     return int(np.diff(np.concatenate([[0], changes, [len(values)]])).max())
 
 
-def _gravity(force: Array) -> Iterator[Finding]:
+def _gravity(log: Log, force: Array) -> Iterator[Finding]:
     norm = float(np.linalg.norm(force))
     figure = f"Gravity reads {norm:.3f} m/s² at rest; it should be {STANDARD_GRAVITY:.3f}"
     error = abs(norm / STANDARD_GRAVITY - 1.0)
@@ -169,14 +169,7 @@ def _gravity(force: Array) -> Iterator[Finding]:
             Level.NOTE, "IMU", f"{figure}.", "Set accel_bias: the accelerometer is slightly off."
         )
     else:
-        factor = STANDARD_GRAVITY / max(norm, 1e-3)
-        likely = [g for g in (2, 4, 8) if abs(factor / g - 1) < 0.1 or abs(factor * g - 1) < 0.1]
-        advice = (
-            f"Set accel_range to {factor:.3g} times its present value."
-            if likely
-            else "Check accel_range and accel_bias, and that nothing shook the robot."
-        )
-        yield Finding(Level.BAD, "IMU", f"{figure}.", advice)
+        yield Finding(Level.BAD, "IMU", f"{figure}.", _gravity_advice(log, norm))
     if norm > 0.5 * STANDARD_GRAVITY:
         tilt_deg = float(np.degrees(np.arccos(min(1.0, abs(force[2]) / norm))))
         figure = f"At rest the sensor is tilted by {tilt_deg:.1f}°"
@@ -190,6 +183,15 @@ def _gravity(force: Array) -> Iterator[Finding]:
             )
         else:
             yield Finding(Level.GOOD, "IMU", f"{figure}.")
+
+
+def _gravity_advice(log: Log, norm: float) -> str:
+    if log.two_wheels:
+        return "Check acceleration_unit and accel_calibration, and that nothing shook the robot."
+    factor = STANDARD_GRAVITY / max(norm, 1e-3)
+    if any(abs(factor / g - 1) < 0.1 or abs(factor * g - 1) < 0.1 for g in (2, 4, 8)):
+        return f"Set accel_range to {factor:.3g} times its present value."
+    return "Check accel_range and accel_bias, and that nothing shook the robot."
 
 
 def _bias(gyro: Array) -> Iterator[Finding]:
@@ -240,25 +242,27 @@ def _turning(log: Log, imu: Series, rest: Mask) -> Iterator[Finding]:
         f"The turns by the gyro are {abs(ratio):.3f} times the turns in odom"
         f" ({np.degrees(total):.0f}° in all)"
     )
+    mountings = {True: "is mounted upright", False: "hangs upside down"}
+    upright, described_upright = ratio > 0.0, log.two_wheels
     if abs(abs(ratio) - 1.0) > TURN_TOLERANCE:
+        sizes = "wheel_radii and track" if log.two_wheels else "base_radius and gyro_range"
         yield Finding(
-            Level.WARN,
-            "IMU",
-            f"{figure}.",
-            "Check base_radius and gyro_range, and whether the wheels slip.",
+            Level.WARN, "IMU", f"{figure}.", f"Check {sizes}, and whether the wheels slip."
         )
-    elif ratio > 0.0:
-        yield Finding(
-            Level.NOTE,
-            "IMU",
-            f"{figure}. The gyro has the same sign as odom, so the sensor is mounted upright.",
-            "The robot's description has the sensor upside down: set imu_rpy in the description.",
-        )
-    else:
+    elif upright == described_upright:
         yield Finding(
             Level.GOOD,
             "IMU",
-            f"{figure}. The sensor hangs upside down, as in the robot's description.",
+            f"{figure}. The sensor {mountings[upright]}, as in the robot's description.",
+        )
+    else:
+        sign = "the same sign as" if upright else "the opposite sign to"
+        described = "upright" if described_upright else "upside down"
+        yield Finding(
+            Level.NOTE,
+            "IMU",
+            f"{figure}. The gyro has {sign} odom, so the sensor {mountings[upright]}.",
+            f"The robot's description has the sensor {described}: set imu_rpy in the description.",
         )
 
 
@@ -278,7 +282,10 @@ def _vibration(imu: Series, rest: Mask) -> Iterator[Finding]:
     )
     if rms > STRONG_VIBRATION_MPS2:
         yield Finding(
-            Level.WARN, "IMU", f"{figure}.", "Look for a loose roller, a bent axle or rough ground."
+            Level.WARN,
+            "IMU",
+            f"{figure}.",
+            "Look for a loose wheel or roller, a bent axle or rough ground.",
         )
     else:
         yield Finding(Level.GOOD, "IMU", f"{figure}.")
