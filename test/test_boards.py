@@ -135,6 +135,21 @@ FEW = replace(
 OWN = Parameter("tow_distance", 1.0, "m", "How far.", low=0.0, high=5.0)
 
 
+@pytest.mark.parametrize("name", boards.PROFILES)
+def test_the_texts_about_an_imu_are_true_for_the_board(name: str) -> None:
+    """``~/calibrate_gyro`` measures ``gyro_bias`` only if it does not calibrate the board itself.
+
+    Only the OmniBot's table quotes the noise of the OmniBot's IMU.
+    """
+    profile = boards.load(name)
+    traits = profile.make(boards.check_all({"board": name})).traits
+    texts = {row.name: row.description for row in profile.PARAMETERS.rows}
+    if traits.imu:
+        measured_by_service = "~/calibrate_gyro measures it" in texts["gyro_bias"]
+        assert measured_by_service is not traits.calibrates_gyro
+    assert any("√Hz" in text for text in texts.values()) is (name == "omnibot")
+
+
 def refuse_far_docks(values: Mapping[str, Any]) -> None:
     if values["tow_distance"] > 2.0:
         raise ParameterError("too far")

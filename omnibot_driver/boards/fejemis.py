@@ -45,6 +45,17 @@ PARAMETERS: Final = table(
             "description": "Serial device of the drive board. sim:// is a simulated pair of boards"
             " inside the driver, and replay://bag plays a recorded bag.",
         },
+        "gyro_bias": {
+            "description": "Reading of the gyro at rest, in its own axes. The driver subtracts it."
+            " The command `calibrate imu` measures it. ~/calibrate_gyro calibrates the board"
+            " itself; afterwards the right value is 0."
+        },
+        "linear_acceleration_stddev": {
+            "description": "Standard deviation of one accelerometer sample, for the covariance."
+        },
+        "angular_velocity_stddev": {
+            "description": "Standard deviation of one gyro sample, for the covariance."
+        },
     },
     checks=(require_two_ports, require_whole_settings),
 )
