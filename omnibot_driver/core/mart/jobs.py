@@ -137,7 +137,7 @@ class Jobs:
             self._clear()
         if self.job is not None:
             raise RequestRefused(
-                f"a {self.job.value} is under way; wait for its answer, then call again"
+                f"{self.job.value} is under way; wait for its answer, then call again"
             )
         if job is Job.LOG_FILE and not self.logging:
             raise RequestRefused(
