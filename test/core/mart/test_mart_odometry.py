@@ -51,26 +51,12 @@ def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "twist",
-    [
-        (-0.2, 0.0),
-        (0.3, 0.0),
-        pytest.param(
-            (0.0, 0.5),
-            marks=pytest.mark.xfail(
-                raises=AssertionError,
-                reason="the driver leaves the second turn out: it does not regard the angle in the"
-                " reply to SM as a proof that the turn has begun",
-            ),
-        ),
-    ],
-)
-def test_a_motion_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
-    twist: tuple[float, float],
+@pytest.mark.parametrize("speed_mps", [-0.2, 0.3])
+def test_a_drive_of_which_no_reply_came_is_not_left_out_for_a_count_like_the_last(
+    speed_mps: float,
 ) -> None:
-    """Only the replies to the stops of two equal motions arrive. The odometry adds both motions."""
-    error = after_equal_motions(twist, 0.05).error
+    """Only the replies to the stops of two equal drives arrive. The odometry adds both drives."""
+    error = after_equal_motions((speed_mps, 0.0), 0.05).error
     assert error.way_m < 0.05
     assert abs(error.yaw_rad) < 0.02
 
