@@ -77,7 +77,7 @@ def omnibot() -> tuple[Board, Any]:
 
 
 class LoisRobot:
-    """The simulated LOIS ECU.
+    """The simulated LOIS ECU. ``steps``: encoder ticks of one turn of a wheel.
 
     ``late_s``: delay in s with which its robot follows a command.
     """
@@ -85,10 +85,11 @@ class LoisRobot:
     # 0.5 s until a wheel turns, then another 0.5 s until the wheel has its speed.
     late_s = 0.75
 
-    def __init__(self, firmware: Any) -> None:
+    def __init__(self, firmware: Any, steps: int = 60) -> None:
         from omnibot_driver.simulator.lois_ecu import QUIRKS, LoisSettings, SimulatedLois
 
-        self.board = SimulatedLois(LoisSettings(quirks=QUIRKS[firmware], running=True))
+        settings = LoisSettings(quirks=QUIRKS[firmware], running=True, steps=steps)
+        self.board = SimulatedLois(settings)
 
     @property
     def stands(self) -> bool:

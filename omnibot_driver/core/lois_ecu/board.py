@@ -79,6 +79,8 @@ class LoisEcuBoard(Board):
     def settings(self, settings: LoisEcuSettings) -> None:
         if settings != self._ecu.settings:
             self._ecu.settings = settings
+            if self._reset_proof is not None:
+                self._reset_proof.ticks_per_revolution = settings.ticks_per_revolution
 
     @property
     def mode(self) -> Mode:
@@ -295,7 +297,8 @@ class LoisEcuBoard(Board):
         known = self._ecu.translation
         steady = known.last_ticks_at_s - known.ticked_at_s >= STEADY_S
         if self._reset_proof is None:
-            self._reset_proof = ResetProof(known.ticks, steady=steady)
+            per_turn = self.settings.ticks_per_revolution
+            self._reset_proof = ResetProof(known.ticks, per_turn, steady=steady)
         else:
             self._reset_proof.again(known.ticks, steady=steady)
         return packed(self._ecu.reset())

@@ -57,9 +57,12 @@ class LoisConversation:
         self._forget_line()
 
     def _forget_line(self) -> None:
-        self._decoder = LoisDecoder(sum_required=self._settings.with_sum)
+        per_turn = self._settings.ticks_per_revolution
+        self._decoder = LoisDecoder(
+            sum_required=self._settings.with_sum, ticks_per_revolution=per_turn
+        )
         self._decoder.statistics = self._statistics
-        self._late_reads = LateReads()
+        self._late_reads = LateReads(per_turn)
         self._points.connect()
         self._stall = StallWatch(self._settings)
 
@@ -74,6 +77,8 @@ class LoisConversation:
         self._stall.settings = settings
         self._upkeep.configure(settings)
         self._decoder.sum_required = settings.with_sum
+        self._decoder.ticks_gate.ticks_per_revolution = settings.ticks_per_revolution
+        self._late_reads.ticks_per_revolution = settings.ticks_per_revolution
 
     # Inbound
 

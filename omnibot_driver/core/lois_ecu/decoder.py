@@ -12,7 +12,7 @@ from typing import Final
 from omnibot_driver.core.lois_ecu.groups import Assembler, Timed
 from omnibot_driver.core.lois_ecu.lines import BEGIN, END, LENGTH, line_of
 from omnibot_driver.core.lois_ecu.messages import RecordKind, Report, TerminalLine
-from omnibot_driver.core.lois_ecu.plausibility import ClockUnit
+from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, TicksGate
 from omnibot_driver.core.lois_ecu.record_lines import GroupStatistics
 
 LONGEST_LINE: Final = 256
@@ -39,14 +39,17 @@ class LoisDecoder:
 
     ``sum_required``: whether lines without a checksum are discarded.
 
+    ``ticks_gate``: check of the tick reports.
+
     ``terminal``: whether text that is not a line of the protocol is a sensor's line. Otherwise, it
     counts as damage.
 
     ``times``: for each report of the last call, the time in s at which its last line arrived.
     """
 
-    def __init__(self, *, sum_required: bool = True) -> None:
+    def __init__(self, *, sum_required: bool = True, ticks_per_revolution: int = 60) -> None:
         self.sum_required = sum_required
+        self.ticks_gate = TicksGate(ticks_per_revolution)
         self.terminal = False
         self.times: list[float] = []
         self.statistics = DecoderStatistics()
@@ -65,7 +68,7 @@ class LoisDecoder:
     @statistics.setter
     def statistics(self, statistics: DecoderStatistics) -> None:
         self._statistics = statistics
-        self._assembler = Assembler(statistics.groups)
+        self._assembler = Assembler(statistics.groups, self.ticks_gate)
 
     @property
     def group_statistics(self) -> GroupStatistics:
@@ -75,7 +78,7 @@ class LoisDecoder:
     @property
     def clock_unit(self) -> ClockUnit | None:
         """Unit of ``Ticks.time_counts``; None while unknown."""
-        return self._assembler.clock_unit
+        return self.ticks_gate.unit
 
     @property
     def resolves_at(self) -> float:

@@ -20,7 +20,6 @@ from omnibot_driver.core.lois_ecu.messages import (
     Ticks,
 )
 from omnibot_driver.core.lois_ecu.plausibility import (
-    ClockUnit,
     Gate,
     TicksGate,
     in_range,
@@ -65,9 +64,9 @@ class Assembler:
     nothing arrives.
     """
 
-    def __init__(self, statistics: GroupStatistics) -> None:
+    def __init__(self, statistics: GroupStatistics, ticks_gate: TicksGate) -> None:
         self.statistics = statistics
-        self._ticks_gate = TicksGate()
+        self._ticks_gate = ticks_gate
         self._odometry_gates: dict[bool, Gate[BoardOdometry]] = {
             False: odometry_gate(),
             True: odometry_gate(),
@@ -85,11 +84,6 @@ class Assembler:
         self._appends = True
         """Whether the board probably sends odometry directly after its ticks."""
         self._at = -math.inf
-
-    @property
-    def clock_unit(self) -> ClockUnit | None:
-        """Unit of ``Ticks.time_counts``; None while unknown."""
-        return self._ticks_gate.unit
 
     @property
     def resolves_at(self) -> float:

@@ -9,7 +9,6 @@ Input: reports and their arrival times; output: the time of each report.
 
 import math
 from collections import deque
-from itertools import pairwise
 from statistics import median
 from typing import Final
 
@@ -37,9 +36,13 @@ class Heard:
 
 
 class LateReads:
-    """Times of the reports from one board. They never decrease, and are not after the arrival."""
+    """Times of the reports from one board. They never decrease, and are not after the arrival.
 
-    def __init__(self) -> None:
+    ``ticks_per_revolution`` may be replaced at any time.
+    """
+
+    def __init__(self, ticks_per_revolution: int = 60) -> None:
+        self.ticks_per_revolution = ticks_per_revolution
         self._last: Heard | None = None
         self._waited = False
         """Whether the last tick report waited, so that the reports after it may have waited too."""
@@ -62,7 +65,7 @@ class LateReads:
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]
         known = [self._last.ticks] if self._last else []
         known += [ticks for _, ticks in told]
-        shown = self._unit == "ms" or not any(may_have_restarted(*pair) for pair in pairwise(known))
+        shown = self._unit == "ms" or not any(map(self._may_have_restarted, known, known[1:]))
         found, before = list(arrived), self._last
         leading_s = before.at_s if before and self._waited and not told else math.inf
         for number, (place, ticks) in enumerate(told, 1):
@@ -90,7 +93,7 @@ class LateReads:
         if last is not None:
             since_s = arrived_s - last.arrived_s
             passed = wrapped(ticks.time_counts - last.ticks.time_counts)
-            restarted = passed <= 0 or may_have_restarted(last.ticks, ticks)
+            restarted = passed <= 0 or self._may_have_restarted(last.ticks, ticks)
             if restarted:
                 passed = ticks.time_counts
             if self._rates:
@@ -103,11 +106,10 @@ class LateReads:
         self._last, self._waited = Heard(ticks, arrived_s, at_s), waited
         return at_s
 
+    def _may_have_restarted(self, before: Ticks, after: Ticks) -> bool:
+        """Return whether the board may have restarted between two tick reports.
 
-def may_have_restarted(before: Ticks, after: Ticks) -> bool:
-    """Return whether the board may have restarted between two tick reports.
-
-    Clock and counts have then begun at zero. A clock in ns also does so every 4.3 s.
-    """
-    fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
-    return fewer and began_within(math.inf, after)
+        Clock and counts have then begun at zero. A clock in ns also does so every 4.3 s.
+        """
+        fewer = abs(after.left) + abs(after.right) < abs(before.left) + abs(before.right)
+        return fewer and began_within(math.inf, after, self.ticks_per_revolution)

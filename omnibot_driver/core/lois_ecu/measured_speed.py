@@ -29,10 +29,10 @@ START_TICKS: Final = 0.5
 START_STDDEV_TICKS: Final = 0.9
 """When a wheel starts, the board's odometry (0x20) misses a part of the wheel's motion.
 ``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation of this part, in ticks."""
-FAST_RPM: Final = 50.0
+FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
 """Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses above
-``FAST_RPM``.
+``FAST_TICKS_PER_S``.
 
 While the board sends, it notices ticks late. If the next tick comes soon after a late one, the
 board measures no speed.
@@ -59,7 +59,7 @@ def measure_speeds(motion: "MotionFilter", step: Step, before: tuple[float, floa
             new[ALONG] -= lost / 2
             spread = START_STDDEV_TICKS * motion.tick_m
             step.noises.append(([(TURN, side), (ALONG, 0.5)], spread**2))
-        if speed > FAST_RPM * motion.rpm_mps:
+        if speed > FAST_TICKS_PER_S * motion.tick_m:
             variance = LOST_TICKS * motion.tick_m**2 * dt
             step.noises.append(([(TURN, side), (ALONG, 0.5)], variance))
         # At each tick of either wheel, 0x20 uses the last measured speeds of both. So while one

@@ -34,9 +34,12 @@ s if this is longer."""
 LOST_REPORTS_S: Final = 1.2
 """After a silence of less than this time in s, the reports are assumed to be lost, and the wheels
 to have followed their set-points, unless a set-point changed in the silence."""
-FEWEST_UNFORESEEN: Final = 2.0
-"""Smallest difference between a reported and an expected count, in ticks, that can show a restart
-of the board."""
+LEAST_UNFORESEEN_TURNS: Final = 1 / 30
+"""Smallest difference between a reported and an expected count, in turns of the wheel, that can
+show a restart of the board."""
+NUDGED_TURNS: Final = 1 / 60
+"""Largest count, in turns of the wheel, that shows a restart of a board at rest. One tick more or
+less shows nothing, so one tick is allowed in any case."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -143,15 +146,17 @@ class LoisOdometry:
         """Return whether only a restart of the board explains that the counts are near zero.
 
         This is so if the counts differ from the prediction by more than the wheels can have rolled.
-        For a robot at rest, the counts must also be at most 1, as after a restart. Larger counts
+        For a robot at rest, the counts must also be almost zero, as after a restart. Larger counts
         may come from a push.
 
         ``late_s``: how much later than usual the ticks arrived.
         """
-        found = self._unforeseen(ticks, now, late_s)
-        if self._motion.resting and max(abs(ticks.left), abs(ticks.right)) > 1:
+        found, per_turn = self._unforeseen(ticks, now, late_s), self._settings.ticks_per_revolution
+        most = max(NUDGED_TURNS * per_turn, 1)
+        if self._motion.resting and max(abs(ticks.left), abs(ticks.right)) > most:
             return False
-        return any(sure and abs(count) >= FEWEST_UNFORESEEN for count, sure in found)
+        least = LEAST_UNFORESEEN_TURNS * per_turn
+        return any(sure and abs(count) >= least for count, sure in found)
 
     def may_have_restarted(self, ticks: Ticks, now: float, late_s: float) -> None:
         """Add an error to each wheel's distance, because the board may have restarted unnoticed.

@@ -13,10 +13,12 @@ from typing import Final, Generic, Literal, TypeVar
 
 from omnibot_driver.core.lois_ecu.messages import BoardOdometry, GpsPosition, Ticks
 
-FASTEST_TICKS_PER_S: Final = 300.0
-"""Largest plausible rate of ticks: 60 ticks per turn at five turns per second. The firmware's
-highest speed is a sixth of this."""
-TICKS_MARGIN: Final = 30
+# A limit of a count consists of turns of the wheel and of ticks. Its ticks allow for the counts'
+# rounding, which matters with few ticks per turn.
+FASTEST_TURNS_PER_S: Final = 5.0
+"""Largest plausible speed of a wheel. The firmware's highest speed is a sixth of this."""
+TURNS_MARGIN: Final = 0.45
+TICKS_MARGIN: Final = 3
 FASTEST_MPS: Final = 5.0
 FASTEST_RADPS: Final = 20.0
 POSE_MARGIN_M: Final = 0.5
@@ -34,10 +36,11 @@ the unit is regarded as known."""
 LEARNT_FROM_S: Final = 0.15
 """Shortest time in s between two tick reports that can show the clock's unit. Over a shorter time,
 the errors of the arrival times are too large."""
-ROLLED_OUT_TICKS: Final = 10
-STARTING_TICKS_PER_S: Final = 20.0
-"""``ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * duration``: largest count, in ticks, after a restart
-of the board. A wheel may roll out and start again in this time."""
+ROLLED_OUT_TURNS: Final = 0.15
+ROLLED_OUT_TICKS: Final = 1
+STARTING_TURNS_PER_S: Final = 1 / 3
+"""``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * duration``, and ``ROLLED_OUT_TICKS`` more: largest
+count after a restart of the board. A wheel may roll out and start again in this time."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -52,10 +55,11 @@ def wrapped(difference: int) -> int:
     return (difference + _HALF) % _WRAP - _HALF
 
 
-def began_within(duration_s: float, ticks: Ticks) -> bool:
+def began_within(duration_s: float, ticks: Ticks, ticks_per_revolution: int) -> bool:
     """Return whether clock (in ns) and counts may have begun at zero in the last ``duration_s``."""
     age_s = ticks.time_counts * 1e-9
-    most = ROLLED_OUT_TICKS + STARTING_TICKS_PER_S * age_s
+    most = ROLLED_OUT_TURNS * ticks_per_revolution + ROLLED_OUT_TICKS
+    most += STARTING_TURNS_PER_S * ticks_per_revolution * age_s
     return age_s <= duration_s and max(abs(ticks.left), abs(ticks.right)) <= most
 
 
@@ -97,13 +101,14 @@ class Gate(Generic[Group]):
 
 
 class TicksGate(Gate[Ticks]):
-    """Check of the reports of encoder ticks.
+    """Check of the reports of encoder ticks. ``ticks_per_revolution`` may be replaced at any time.
 
     Their times show whether the board's clock counts ms or ns. Later reports must agree.
     """
 
-    def __init__(self) -> None:
-        super().__init__(_ticks_follow)
+    def __init__(self, ticks_per_revolution: int) -> None:
+        super().__init__(self._follow)
+        self.ticks_per_revolution = ticks_per_revolution
         self._fits: ClockUnit | None = None
         self._steps = 0
 
@@ -135,14 +140,15 @@ class TicksGate(Gate[Ticks]):
     def _begins_anew(self) -> None:
         self._fits, self._steps = None, 0
 
-
-def _ticks_follow(before: Ticks, after: Ticks, duration_s: float) -> bool:
-    most = FASTEST_TICKS_PER_S * duration_s + TICKS_MARGIN
-    return (
-        before.time_counts != after.time_counts
-        and abs(wrapped(after.left - before.left)) <= most
-        and abs(wrapped(after.right - before.right)) <= most
-    )
+    def _follow(self, before: Ticks, after: Ticks, duration_s: float) -> bool:
+        per_turn = self.ticks_per_revolution
+        most = FASTEST_TURNS_PER_S * per_turn * duration_s
+        most += TURNS_MARGIN * per_turn + TICKS_MARGIN
+        return (
+            before.time_counts != after.time_counts
+            and abs(wrapped(after.left - before.left)) <= most
+            and abs(wrapped(after.right - before.right)) <= most
+        )
 
 
 def _unit_of(before: Ticks, after: Ticks, duration_s: float) -> ClockUnit | None:

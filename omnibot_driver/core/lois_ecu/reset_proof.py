@@ -12,12 +12,16 @@ from typing import Final
 
 from omnibot_driver.core.lois_ecu.messages import Ticks
 
-FEW_TICKS: Final = 20
-"""Largest assumed number of ticks that a wheel rolls on after it was stopped: 0.4 s at 50 RPM."""
-JUMP_TICKS: Final = 60
-"""Number of ticks that no wheel can roll between a reset and the next counts. If a count falls by
-this number or more, the board has obeyed the reset."""
-STEADY_TICKS: Final = 3
+# A limit of a count consists of turns of the wheel and of ticks, for the counts' rounding.
+FEW_TURNS: Final = 0.3
+FEW_TICKS: Final = 2
+"""Largest assumed motion of a wheel after it was stopped: 0.4 s at 50 RPM."""
+JUMP_TURNS: Final = 0.95
+JUMP_TICKS: Final = 3
+"""Motion that no wheel can make between a reset and the next counts. If a count falls by this
+number or more, the board has obeyed the reset."""
+STEADY_TURNS: Final = 1 / 60
+STEADY_TICKS: Final = 2
 """If a count of at least this size becomes zero while the wheel is at rest, the board has obeyed
 the reset. Backlash of the gears can cause smaller changes."""
 UNPROVED_S: Final = 2.5
@@ -31,10 +35,13 @@ class ResetProof:
     ``before``: counts when the reset was sent, None if unknown.
 
     ``steady``: whether these counts had not changed for some time, so that the wheels were at rest.
+
+    ``ticks_per_revolution`` may be replaced at any time.
     """
 
-    def __init__(self, before: Ticks | None, *, steady: bool) -> None:
+    def __init__(self, before: Ticks | None, ticks_per_revolution: int, *, steady: bool) -> None:
         self._before, self._steady = before, steady
+        self.ticks_per_revolution = ticks_per_revolution
         self._waits_since_s = math.inf
         self._seen: Ticks | None = None
 
@@ -44,7 +51,7 @@ class ResetProof:
         The new counts replace the earlier ones if they can prove the reset. They can if they are
         not near zero and the wheels are at rest.
         """
-        if before is not None and steady and _largest(before) >= STEADY_TICKS:
+        if before is not None and steady and _largest(before) >= self._still:
             self._before, self._steady = before, steady
             self._waits_since_s, self._seen = math.inf, None
 
@@ -56,7 +63,7 @@ class ResetProof:
         """
         self._waits_since_s = min(self._waits_since_s, now)
         self._seen = ticks
-        if _largest(ticks) > FEW_TICKS:
+        if _largest(ticks) > self._few:
             return False
         return self._proved or now - self._waits_since_s >= UNPROVED_S
 
@@ -65,9 +72,18 @@ class ResetProof:
         before, seen = self._before, self._seen
         if before is None or seen is None:
             return False
-        if _largest(before) >= FEW_TICKS + JUMP_TICKS and _largest(seen) <= FEW_TICKS:
+        jump = JUMP_TURNS * self.ticks_per_revolution + JUMP_TICKS
+        if _largest(before) >= self._few + jump and _largest(seen) <= self._few:
             return True
-        return self._steady and _largest(before) >= STEADY_TICKS and not _largest(seen)
+        return self._steady and _largest(before) >= self._still and not _largest(seen)
+
+    @property
+    def _few(self) -> float:
+        return FEW_TURNS * self.ticks_per_revolution + FEW_TICKS
+
+    @property
+    def _still(self) -> float:
+        return STEADY_TURNS * self.ticks_per_revolution + STEADY_TICKS
 
     @property
     def remark(self) -> str:

@@ -21,6 +21,9 @@ STALLED_S: Final = 2.0
 """Time in s without motion after which a commanded wheel is regarded as stalled. With the
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
+LEAST_TICKS: Final = 2
+"""Smallest number of ticks in ``STALLED_S`` at the set-point of a wheel that is watched. With fewer
+ticks, a wheel that rolls may show no motion."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
@@ -63,8 +66,9 @@ class StallWatch:
         targets = [0, 0]
         if isinstance(command, SetRpm):
             targets = [command.left_rpm, command.right_rpm]
+        slowest_rpm = 60 * LEAST_TICKS / (STALLED_S * self.settings.ticks_per_revolution)
         for wheel, target in enumerate(targets):
-            if abs(target) < LEAST_RPM:
+            if abs(target) < max(LEAST_RPM, slowest_rpm):
                 self._seen_at[wheel] = math.inf
             elif self._seen_at[wheel] == math.inf or target * self._targets[wheel] < 0:
                 self._seen_at[wheel], self._quiet[wheel] = now, 0

@@ -38,10 +38,12 @@ UNKNOWN_FROM_YEAR: Final = 38
 """Two-digit year (38 for 2038). A date from this year on is false: the GPS receiver does not have
 the date yet."""
 TICKS_LINES, ODOMETRY_LINES, POSITION_LINES = 4, 7, 3
-RESTARTED_TICKS: Final = 20
-RESTARTED_TICKS_PER_S: Final = 60.0
-"""``RESTARTED_TICKS + RESTARTED_TICKS_PER_S * duration``: largest fall of a count, in ticks, that
-wheels can cause by rolling back. If a count falls further, the board has restarted."""
+RESTARTED_TURNS: Final = 0.3
+RESTARTED_TICKS: Final = 2
+RESTARTED_TURNS_PER_S: Final = 1.0
+"""``RESTARTED_TURNS + RESTARTED_TURNS_PER_S * duration``, and ``RESTARTED_TICKS`` more: largest
+fall of a count that wheels can cause by rolling back. If a count falls further, the board has
+restarted."""
 SILENT_S: Final = 1.0
 """Pause in s without tick reports. After a longer pause, counts near zero show a restart even if
 the wheels may have rolled back to them."""
@@ -169,13 +171,14 @@ class Translation:
         late = self._unit == "ms" and wrapped(ticks.time_counts - before.time_counts) < 0
         if contradicted:
             duration_s = min(duration_s, CONTRADICTED_S)
-        rolled = RESTARTED_TICKS_PER_S * duration_s
+        per_turn = self._settings.ticks_per_revolution
+        rolled = RESTARTED_TURNS_PER_S * per_turn * duration_s
         left, right = abs(before.left) - abs(ticks.left), abs(before.right) - abs(ticks.right)
         fewer = max(left - rolled, right - rolled, left + right - 2 * rolled)
-        began = left + right > 0 and began_within(duration_s, ticks)
+        began = left + right > 0 and began_within(duration_s, ticks, per_turn)
         if began and not contradicted:
             began = self._unit == "ns" and self._restart_is_shown(ticks, duration_s, now)
-        if late or began or fewer > RESTARTED_TICKS:
+        if late or began or fewer > RESTARTED_TURNS * per_turn + RESTARTED_TICKS:
             self.restarts += 1
             self.odometry.restarted(now, age_s)
             self._time.begin()

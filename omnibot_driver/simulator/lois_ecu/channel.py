@@ -14,7 +14,9 @@ from omnibot_driver.simulator.lois_ecu.settings import Quirks
 TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
-SHORTEST_US = 5000
+SHORTEST_PER_TURN_US = 300_000
+"""Shortest level whose speed is measured, times the number of ticks per turn. With 60 ticks per
+turn, this level is 5 ms long: 200 RPM."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024
@@ -36,6 +38,7 @@ class WheelChannel:
     ) -> None:
         self._quirks, self._steps = quirks, steps
         self._timer_us = SLOW_TIMER_US if quirks.slow_timer else TIMER_US
+        self._shortest_us = SHORTEST_PER_TURN_US / steps
         self.short_correction, self.long_correction = corrections
         self.controller = SpeedController(gains)
         self.ticks = 0
@@ -76,13 +79,13 @@ class WheelChannel:
         passed_us = int(passed_us * (self.long_correction if is_long else self.short_correction))
         self.rpm, self.exact_rpm = 0, 0.0
         measures = self._target != 0 or not quirks.sign_of_command
-        if passed_us > SHORTEST_US and measures:
+        if passed_us > self._shortest_us and measures:
             exact = 60e6 / (passed_us * self._steps)
             sign = self._target if quirks.sign_of_command else direction
             self.exact_rpm = copysign(exact, sign)
             self.rpm = int(copysign(int(exact), sign))
         records = self.record_left and not self._records_torque
-        if records and passed_us > SHORTEST_US and len(self.record) < RECORD_DEPTH:
+        if records and passed_us > self._shortest_us and len(self.record) < RECORD_DEPTH:
             unit_us = 100 if quirks.records_in_100_us else 0.1
             self._sample(min(int(passed_us / unit_us), 0xFFFF))
 

@@ -113,8 +113,8 @@ class Encoder:
             noise / 2 / 2**0.5 * random.gauss(0.0, 1.0) for _ in range(steps if noise else 1)
         ]
 
-    def turn(self, turns: float) -> tuple[float, bool, int] | None:
-        """Turn the disc. Return the edge that passed the sensor, or None.
+    def turn(self, turns: float) -> list[tuple[float, bool, int]]:
+        """Turn the disc. Return the edges that passed the sensor, in order.
 
         An edge: time as a fraction of the step, whether a long level ended, direction (1 forward,
         -1 backward).
@@ -123,16 +123,22 @@ class Encoder:
         after = self._periods = before + turns * self._per_turn
         begin, end = self._level_from, self._level_to
         if begin <= before < end and begin <= after < end:
-            return None
+            return []
         level_before, level_after = self._level(before), self._level(after)
         self._level_from, self._level_to = self._place(level_after), self._place(level_after + 1)
-        if level_before == level_after:
-            return None
         forward = after > before
-        edge = level_after if forward else level_before
-        at = self._place(edge)
-        is_long = (edge % 2 == 0) is forward
-        return (at - before) / (after - before), is_long, 1 if forward else -1
+        if forward:
+            edges = range(level_before + 1, level_after + 1)
+        else:
+            edges = range(level_before, level_after, -1)
+        return [
+            (
+                (self._place(edge) - before) / (after - before),
+                (edge % 2 == 0) is forward,
+                1 if forward else -1,
+            )
+            for edge in edges
+        ]
 
     def _place(self, edge: int) -> float:
         """Return the position of an edge, in periods."""

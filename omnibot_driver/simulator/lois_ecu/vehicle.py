@@ -93,8 +93,7 @@ class Vehicle:
         for index, motor, encoder, radius_m in self._wheels:
             turns = motor.advance(duties[index], step_s)
             way_m = turns * tau * radius_m
-            if turns and (edge := encoder.turn(turns)) is not None:
-                part, is_long, direction = edge
+            for part, is_long, direction in encoder.turn(turns) if turns else ():
                 edges.append(Edge(now_s - step_s * (1 - part), index, is_long, direction))
             if slip and way_m:
                 way_m += self._random.gauss(0.0, slip) * abs(way_m) ** 0.5

@@ -24,10 +24,15 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 class Bench(AnyBench):
-    """A session with a simulated LOIS ECU. It begins 1.5 s after the session has become nominal."""
+    """A session with a simulated LOIS ECU. It begins 1.5 s after the session has become nominal.
 
-    def __init__(self, firmware: str, settings: LoisEcuSettings | None = None) -> None:
-        self.lois = LoisRobot(firmware)
+    ``steps``: encoder ticks of one turn of a wheel.
+    """
+
+    def __init__(
+        self, firmware: str, settings: LoisEcuSettings | None = None, *, steps: int = 60
+    ) -> None:
+        self.lois = LoisRobot(firmware, steps)
         super().__init__(LoisEcuBoard(settings or LoisEcuSettings()), self.lois)
         self.open()
         self.run_until(lambda: self.session.state == "nominal")

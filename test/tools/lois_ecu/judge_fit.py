@@ -42,9 +42,7 @@ def starts(motor: MotorSettings, wheel: int, random: Random) -> list[Column]:
         turning, times_s, step, before = Motor(motor, LOAD_PERCENT, random), [], 0, -3000
         while len(times_s) < SAMPLES:
             step += 1
-            edge = encoder.turn(turning.advance(100.0, STEP_S))
-            if edge is not None:
-                part, is_long, _ = edge
+            for part, is_long, _ in encoder.turn(turning.advance(100.0, STEP_S)):
                 count = int((step - 1 + part) * STEP_S / COUNT_S)
                 corrected_s = (count - before) * TOLD_S * (long if is_long else short)
                 times_s.append(int(corrected_s / TOLD_S) * TOLD_S)

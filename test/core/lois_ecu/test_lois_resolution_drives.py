@@ -1,0 +1,129 @@
+# Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
+
+"""Drives of a simulated LOIS robot with few or many encoder ticks per turn.
+
+A simulated board measures the speeds of wheels with up to about 1000 ticks per turn. With more
+ticks, this file drives by duties. The public firmware loses ticks if they are frequent.
+"""
+
+import math
+from typing import Literal
+
+import pytest
+from lois_bench import Bench, configure
+
+from omnibot_driver.core.geometry.se2 import Pose
+from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+
+
+def true_pose(bench: Bench) -> Pose:
+    truth = bench.board.truth
+    return Pose(truth.x_m, truth.y_m, truth.yaw_rad)
+
+
+def error_m(bench: Bench) -> float:
+    """Return the distance in m from the true position to that of the odometry."""
+    return true_pose(bench).way_to(bench.odometry[-1].pose).way_m
+
+
+def rejected(bench: Bench) -> int:
+    """Return how many reports were rejected as implausible."""
+    board = bench.session.board
+    return int(board._ecu._decoder.group_statistics.implausible)
+
+
+def restarts(bench: Bench) -> int:
+    """Return how many restarts of the board the driver has noticed."""
+    return int(bench.session.board._ecu.translation.restarts)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("firmware", "per_turn", "mode", "speed_mps"),
+    [
+        *(("documented", per_turn, "rpm", 0.65) for per_turn in (12, 25, 60, 360, 1000)),
+        ("documented", 20_000, "duty", 0.2),
+        *(("firmware", per_turn, "rpm", 0.65) for per_turn in (25, 60)),
+    ],
+)
+def test_a_robot_with_such_encoders_drives_out_and_back(
+    firmware: str, per_turn: int, mode: Literal["rpm", "duty"], speed_mps: float
+) -> None:
+    """The robot drives out and back. The odometry is right within 0.1 m or 3 sigma.
+
+    No report is rejected, and no restart is assumed. Then the board restarts, and the driver
+    notices it.
+    """
+    settings = LoisEcuSettings(ticks_per_revolution=per_turn, drive_mode=mode)
+    bench = Bench(firmware, settings, steps=per_turn)
+    bench.drive_on(speed_mps, 3.0)
+    bench.drive_on(0.0, 0.6)
+    bench.drive_on(-speed_mps, 3.5)
+    bench.run(1.5)
+    last = bench.odometry[-1]
+    stddev_m = math.sqrt(last.covariance.xx + last.covariance.yy)
+    assert error_m(bench) < (0.1 if firmware == "documented" else 3 * stddev_m)
+    assert (rejected(bench), restarts(bench)) == (0, 0)
+    bench.drive_on(speed_mps, 1.5)
+    bench.run(1.5)
+    place = bench.odometry[-1].pose
+    bench.board.reboot()
+    bench.run(4.0)
+    assert restarts(bench) == 1
+    assert place.way_to(bench.odometry[-1].pose).way_m < 0.1
+
+
+@pytest.mark.slow
+def test_a_new_resolution_applies_while_the_driver_runs() -> None:
+    """The encoders have 1000 ticks per turn, but 60 is set, so fast counts are rejected.
+
+    The user sets 1000 during the connection. From then on, no report is rejected.
+    """
+    bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=60), steps=1000)
+    bench.drive_on(0.65, 3.0)
+    assert rejected(bench) > 5
+    bench.drive_on(0.0, 1.0)
+    configure(bench, LoisEcuSettings(ticks_per_revolution=1000))
+    bench.run(2.0)
+    before, place, true_place = rejected(bench), bench.odometry[-1].pose, true_pose(bench)
+    bench.drive_on(0.65, 3.0)
+    bench.drive_on(0.0, 1.5)
+    assert (rejected(bench), restarts(bench)) == (before, 0)
+    way_m = place.way_to(bench.odometry[-1].pose).way_m
+    assert way_m == pytest.approx(true_place.way_to(true_pose(bench)).way_m, abs=0.05)
+    bench.drive_on(0.3, 2.0)
+    assert bench.reset().message == "the board was reset"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrapped_for_s", [-0.25, 0.15])
+@pytest.mark.parametrize("per_turn", [25, 1000])
+def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: float) -> None:
+    """The board restarts while its clock in ns is near zero in any case. The driver notices it."""
+    bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
+    begin_drive(bench, wrapped_for_s)
+    bench.board.reboot()
+    bench.run(3.0)
+    assert restarts(bench) == 1
+    assert error_m(bench) < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("per_turn", [25, 1000])
+def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
+    """The robot drives out and back. Clock and counts are near zero then, and a read is late."""
+    bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
+    begin_drive(bench, -2.6)
+    bench.drive_on(-0.3, 2.6)
+    bench.stall(0.15)
+    bench.drive_on(-0.3, 1.0)
+    bench.run(2.0)
+    assert restarts(bench) == 0
+    assert error_m(bench) < 0.05
+
+
+def begin_drive(bench: Bench, wrapped_for_s: float) -> None:
+    """Drive for 2.4 s. The board's clock wraps ``wrapped_for_s`` before the drive ends."""
+    wraps_s = 2**32 / 1e9
+    bench.run((wrapped_for_s - bench.board.now_s - 2.4) % wraps_s)
+    bench.drive_on(0.3, 2.4)
