@@ -33,7 +33,8 @@ class ModeChange:
         """The terminal mode that was written last. None if the board's own messages have arrived
         since then."""
         self._said_at_s = self._again_at_s = -math.inf
-        self._stopping = ""
+        self._stopping: dict[str, str] = {}
+        """Changes that begin when the robot is at rest: new values of parameters, by name."""
         self._stopping_since_s: float | None = None
         self.left = False
         """Whether a terminal mode has ended. The code that reads this attribute clears it."""
@@ -44,17 +45,16 @@ class ModeChange:
 
     def want(self, mode: TerminalMode) -> None:
         """Request a terminal mode. The mode of a sensor begins only when the robot is at rest."""
-        if mode in SENSORS and mode is not self.wanted:
-            self.stop_first(f"terminal_mode is changing to {mode.name.lower()}")
+        if mode not in SENSORS:
+            self._stopping.pop("terminal_mode", None)
+        elif mode is not self.wanted:
+            self.stop_first("terminal_mode", mode.name.lower())
         self.wanted = mode
         self._again_at_s = -math.inf
 
-    def stop_first(self, why: str) -> None:
-        """Stop the robot, and refuse motion until it is at rest.
-
-        ``reason`` then begins with ``why``, unless a sensor's mode is wanted or has not ended yet.
-        """
-        self._stopping, self._stopping_since_s = why, None
+    def stop_first(self, parameter: str, value: str) -> None:
+        """Stop the robot, and refuse motion until it is at rest: ``parameter`` has a new value."""
+        self._stopping[parameter], self._stopping_since_s = value, None
 
     @property
     def terminal(self) -> bool:
@@ -72,14 +72,19 @@ class ModeChange:
     @property
     def reason(self) -> str:
         """Reason why motion is refused, as a sentence. Empty if motion is allowed."""
-        if self.sensor_wanted:
+        mode = self.wanted.name.lower()
+        if self.sensor_wanted and self._told is self.wanted:
             return (
-                f"terminal_mode is {self.wanted.name.lower()}, and the board reports no motion;"
+                f"terminal_mode is {mode}, and the board reports no motion;"
                 " set terminal_mode to host"
             )
-        if self._told is not None:
+        if self._told is not None and not self.sensor_wanted:
             return "the board has not left its terminal mode yet; wait until its data arrives"
-        return self._stopping and f"{self._stopping}, and the robot is being stopped first; wait"
+        what_to_do = "set terminal_mode to host" if self.sensor_wanted else "wait"
+        if self._stopping:
+            changes = (f"{name} is changing to {value}" for name, value in self._stopping.items())
+            return f"{' and '.join(changes)}, and the robot is being stopped first; {what_to_do}"
+        return f"terminal_mode is changing to {mode}; {what_to_do}" if self.sensor_wanted else ""
 
     @property
     def wake_at(self) -> float:
@@ -99,7 +104,7 @@ class ModeChange:
         if self._stopping_since_s is None:
             self._stopping_since_s = now
         elif stands or now - self._stopping_since_s >= UNPROVED_S:
-            self._stopping = ""
+            self._stopping.clear()
             self._again_at_s = -math.inf
             return False
         self._again_at_s = now + 0.05

@@ -45,9 +45,9 @@ class Upkeep:
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:
-            self.change.stop_first(f"drive_mode is changing to {settings.drive_mode}")
+            self.change.stop_first("drive_mode", settings.drive_mode)
         elif settings.drive_mode == "duty" and settings.duty_scale != before.duty_scale:
-            self.change.stop_first(f"duty_scale is changing to {settings.duty_scale:g}")
+            self.change.stop_first("duty_scale", f"{settings.duty_scale:g}")
         if settings.terminal_mode is not before.terminal_mode:
             self.change.want(settings.terminal_mode)
         if _written(settings) != _written(before):

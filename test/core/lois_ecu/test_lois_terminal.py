@@ -6,6 +6,8 @@ Before such a change, the driver stops the robot and refuses motion. In a termin
 passes on the lines of a sensor.
 """
 
+from dataclasses import replace
+
 import pytest
 from lois_bench import FIRMWARE, Bench, configure, told
 
@@ -15,6 +17,7 @@ from omnibot_driver.core.lois_ecu import RecordKind, TerminalLine, TerminalMode
 from omnibot_driver.core.lois_ecu.board import LoisEcuBoard
 from omnibot_driver.core.lois_ecu.readings import RecordFailed, TerminalLeft
 from omnibot_driver.core.lois_ecu.settings import LoisEcuSettings
+from omnibot_driver.core.lois_ecu.terminal import ModeChange
 from omnibot_driver.core.odometry.estimator import OdometryEstimate
 
 GPS = LoisEcuSettings(terminal_mode=TerminalMode.GPS)
@@ -34,7 +37,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     configure(bench, COMPASS)
     stood: list[bool] = []
     while bench.board.terminal_mode == 0:
-        with pytest.raises(CommandRefused, match="terminal_mode is compass"):
+        with pytest.raises(CommandRefused, match=r"terminal_mode is (changing to )?compass"):
             bench.drive()
         bench.run(0.05)
         stood.append(bench.board.standing)
@@ -42,6 +45,8 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     assert stood[-1]
     assert bench.written[begun][1].startswith(b":01000000003b\n")
     bench.run(2.0)
+    with pytest.raises(CommandRefused, match="terminal_mode is compass, and the board reports no"):
+        bench.drive()
     assert told(bench, TerminalLine)[-1].text.startswith("$HCHDT")
     assert bench.robot.stands
     bench.drive(0.0)
@@ -209,6 +214,106 @@ def test_a_terminal_mode_ends_a_record() -> None:
     bench.run(0.5)
     configure(bench, GPS)
     bench.run(0.5)
-    assert "terminal_mode is gps" in told(bench, RecordFailed)[0].reason
+    assert "terminal_mode is changing to gps" in told(bench, RecordFailed)[0].reason
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
     with pytest.raises(RequestRefused, match="terminal_mode is gps"):
         board.record(RecordKind.TORQUE, 500)
+
+
+def refusal(bench: Bench) -> str:
+    """Return the driver's reason for the refusal of a motion command. Empty if it is allowed."""
+    try:
+        bench.drive()
+    except CommandRefused as refused:
+        return str(refused).removeprefix("motion command refused: ")
+    return ""
+
+
+@pytest.mark.slow
+@FIRMWARE
+def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: str) -> None:
+    """The user sets a terminal mode during a drive, and later ends it.
+
+    The driver's reason is true at each time: while the robot is stopped, until the mode is written,
+    in the mode, and until the board has left the mode.
+    """
+    bench = Bench(firmware)
+    bench.drive_on(0.3, 3.0)
+    configure(bench, GPS)
+    assert "the robot is being stopped first" in refusal(bench)
+    told_before, told_in_gps, told_after = set(), set(), set()
+    while not any(b":1100000001" in data for _, data in bench.written):
+        told_before.add(refusal(bench))
+        bench.run(0.01)
+    assert all(one.startswith("terminal_mode is changing to gps") for one in told_before)
+    bench.run_until(lambda: bench.board.terminal_mode == 1)
+    for _ in range(20):
+        told_in_gps.add(refusal(bench))
+        bench.run(0.1)
+    assert told_in_gps == {
+        "terminal_mode is gps, and the board reports no motion; set terminal_mode to host"
+    }
+    configure(bench, LoisEcuSettings())
+    while not told(bench, TerminalLeft):
+        told_after.add(refusal(bench))
+        bench.run(0.05)
+    assert told_after == {
+        "the board has not left its terminal mode yet; wait until its data arrives"
+    }
+    assert refusal(bench) == ""
+
+
+def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
+    """The robot is at rest, but the driver still writes its settings, and then the mode.
+
+    Later the board sends its own messages, so it is not in the mode any more.
+    """
+    change = ModeChange()
+    change.want(TerminalMode.GPS)
+    assert change.stops(0.0, stands=False)
+    assert not change.stops(0.1, stands=True)
+    changing = "terminal_mode is changing to gps; set terminal_mode to host"
+    assert change.due(0.2, settled=False) is None
+    assert change.reason == changing
+    assert change.due(1.0, settled=True) is TerminalMode.GPS
+    assert change.reason.startswith("terminal_mode is gps, and the board reports no motion")
+    change.protocol_heard(2.0)
+    assert change.reason == changing
+
+
+def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
+    """The user sets a terminal mode, and then host again while the robot is being stopped.
+
+    The board stays in its normal mode, so motion is allowed. The earlier command is not continued.
+    """
+    bench = Bench("documented")
+    bench.drive_on(0.3, 1.0)
+    configure(bench, GPS)
+    bench.run(0.1)
+    configure(bench, LoisEcuSettings())
+    bench.run(2.0)
+    assert bench.robot.stands
+    assert refusal(bench) == ""
+    assert bench.board.terminal_mode == 0
+
+
+def test_a_terminal_mode_that_is_taken_back_does_not_end_another_stop() -> None:
+    """The user changes the drive mode, sets a terminal mode, and then sets host again.
+
+    The driver still stops the robot before the other drive mode begins, and says so.
+    """
+    bench = Bench("documented")
+    bench.drive_on(0.3, 2.0)
+    duty = LoisEcuSettings(drive_mode="duty")
+    configure(bench, duty)
+    configure(bench, replace(duty, terminal_mode=TerminalMode.GPS))
+    both = "drive_mode is changing to duty and terminal_mode is changing to gps, and the robot"
+    assert refusal(bench).startswith(both)
+    configure(bench, duty)
+    while reason := refusal(bench):
+        assert (
+            reason == "drive_mode is changing to duty, and the robot is being stopped first; wait"
+        )
+        bench.run(0.05)
+    bench.run(0.5)
+    assert not [line for line in bench.board.commands if line.command == 0x11]
