@@ -75,7 +75,7 @@ class ModeChange:
         mode = self.wanted.name.lower()
         if self.sensor_wanted and self._told is self.wanted:
             return (
-                f"terminal_mode is {mode}, and the board reports no motion;"
+                f"terminal_mode is {mode}, so the board reports no motion;"
                 " set terminal_mode to host"
             )
         if self._told is not None and not self.sensor_wanted:

@@ -45,7 +45,7 @@ def test_a_terminal_mode_stops_first_and_refuses_motion(firmware: str) -> None:
     assert stood[-1]
     assert bench.written[begun][1].startswith(b":01000000003b\n")
     bench.run(2.0)
-    with pytest.raises(CommandRefused, match="terminal_mode is compass, and the board reports no"):
+    with pytest.raises(CommandRefused, match="terminal_mode is compass, so the board reports no"):
         bench.drive()
     assert told(bench, TerminalLine)[-1].text.startswith("$HCHDT")
     assert bench.robot.stands
@@ -251,7 +251,7 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
         told_in_gps.add(refusal(bench))
         bench.run(0.1)
     assert told_in_gps == {
-        "terminal_mode is gps, and the board reports no motion; set terminal_mode to host"
+        "terminal_mode is gps, so the board reports no motion; set terminal_mode to host"
     }
     configure(bench, LoisEcuSettings())
     while not told(bench, TerminalLeft):
@@ -276,7 +276,7 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
     assert change.due(0.2, settled=False) is None
     assert change.reason == changing
     assert change.due(1.0, settled=True) is TerminalMode.GPS
-    assert change.reason.startswith("terminal_mode is gps, and the board reports no motion")
+    assert change.reason.startswith("terminal_mode is gps, so the board reports no motion")
     change.protocol_heard(2.0)
     assert change.reason == changing
 
