@@ -74,11 +74,6 @@ class WheelModel:
         """Whether a duty drives this wheel and the public firmware does not measure its speed."""
         return self.kind == "duty" and bool(self.target_mps) and not self.measured_sign
 
-    @property
-    def waiting(self) -> bool:
-        """Whether a command has not taken effect yet."""
-        return bool(self._effects)
-
     def command(self, at_s: float, kind: CommandKind, speed_mps: float) -> None:
         """Record that a command was written at ``at_s``."""
         if (kind, speed_mps) == self._heard and not (kind == "rpm" and not speed_mps):
