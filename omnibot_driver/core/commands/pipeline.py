@@ -110,7 +110,7 @@ class CommandPipeline:
         except CommandRefused as error:
             self.policy.halt(now)
             return [
-                f"robot stopped: the current command does not fit the new scale ({error}); send"
+                f"robot stopped: the current command does not fit the new settings ({error}); send"
                 " another command"
             ]
         return []

@@ -76,7 +76,7 @@ def test_a_goal_that_the_new_scale_cannot_say_ends_with_stop_and_a_sentence() ->
     bench = going_to(10.0)
     bench.configure_board(position_scale=10_000.0)
     assert last(bench) == bare(STOP)
-    assert "does not fit the new scale" in bench.notices[-1]
+    assert "does not fit the new settings" in bench.notices[-1]
     bench.run(2.0)
     assert bench.still()
 
