@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Detection of stalls: times in which this process, or its watchdog's thread, did not run.
+"""Detection of stalls: times in which this process, or its pacer thread, did not run.
 
 A command that was sent during a stall is outdated afterwards, so it must not be obeyed. Every
 ``now`` is a time of ``boot_time_s``. This module knows times; it does not know threads or commands.
@@ -35,9 +35,9 @@ def boot_time_ns() -> int:
 class StallDetector:
     """A detector of stalls: whether this process is stalled now, and when the last stall ended.
 
-    The watchdog's thread calls ``passed`` ten times a second, to show that it runs. Every other
-    thread calls ``begun`` before it uses the session. If ``begun`` reports a stall, that thread
-    must stop the robot first. The detector also works if the computer's clock is set while it runs.
+    The pacer thread calls ``passed`` ten times a second or more, to show that it runs. Every thread
+    calls ``begun`` before it uses the session. If ``begun`` reports a stall, that thread must stop
+    the robot first. The detector also works if the computer's clock is set while it runs.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class StallDetector:
         return length_s
 
     def passed(self, now: float, wall_ns: int) -> None:
-        """Record that the watchdog's thread runs now, which ends a stall.
+        """Record that the pacer thread runs now, which ends a stall.
 
         ``wall_ns``: the present time of day, in ns.
         """

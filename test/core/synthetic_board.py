@@ -35,7 +35,10 @@ def arc(vx: float, vy: float, turn: float) -> tuple[float, float]:
 
 
 class Trip:
-    """A simulated board with a given initial heading. Its axes may be reversed."""
+    """A drive of a robot: its true pose, and what its board reports.
+
+    The board has a given initial heading, and its axes may be reversed.
+    """
 
     def __init__(self, heading: float = 0.0, signs: tuple[int, int, int] = (1, 1, 1)) -> None:
         self.board = (12.0, -34.0, heading)

@@ -110,7 +110,8 @@ class ImuPairs:
         how many came within pairs."""
         self._skipped = 0
         self._silent = False
-        """Whether a silence precedes the lines since the last pose."""
+        """Whether, since the last pose or rejected pair, a gyro or acceleration line came more than
+        ``SILENT_S`` after the one before it. New pairs are then doubtful."""
         self._stalled, self._wary_until = False, -math.inf
         self._queue: deque[Pair | Oriented] = deque()
         self._pose_s = -math.inf

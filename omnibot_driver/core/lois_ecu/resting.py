@@ -82,7 +82,8 @@ class RestingWheel:
         self._lone = False
         self._repeats = 0
         self._gaps = False
-        """Whether reports were lost before the reported speed last changed."""
+        """Whether reports were being lost when the reported speed last changed; False for a robot
+        with gains of its user."""
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0
         self.chance = 0.0
@@ -93,7 +94,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Use an estimated speed, because no speed was reported in the last ``since_s``."""
+        """Remember an estimated speed, because the board reported none for ``since_s`` s."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 

@@ -2,7 +2,8 @@
 
 """What the driver has learned about the two motors: how fast each turns at how many motor units.
 
-A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. This module knows units,
+A command sets the motor units, 0 to 127. Each motor has a ``MotorLine``. Its speeds are in nominal
+units: at 10 motor units, an ideal motor has the speed 10. This module knows units,
 m/s and rad/s; it does not know what is commanded.
 """
 
@@ -89,7 +90,7 @@ class Motors:
         return self._right_line, self._left_line
 
     def _spin_speed(self, rate_radps: float) -> float:
-        """Return the speed of both wheels in a turn on the spot, in nominal units."""
+        """Return the speed of each wheel in a turn on the spot at this rate, in nominal units."""
         return abs(rate_radps) * self._settings.track_m / 2 / self.per_unit_mps
 
     def _balance(self, units: float) -> float:
@@ -106,7 +107,7 @@ class Motors:
         return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
     def _mean_speed(self, units: float) -> float:
-        """Return the mean speed of both motors at ``units``, in nominal units; not negative."""
+        """Return the mean of both motors' speeds at these motor units: nominal units, at least 0."""
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:

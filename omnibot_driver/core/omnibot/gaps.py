@@ -130,7 +130,10 @@ class InterFrameGaps:
         )
 
     def undecided(self, data: bytes | bytearray, start: int, end: int) -> bool:
-        """Return whether more bytes are needed to explain a pause within ``data[start:end]``."""
+        """Return whether only later bytes can show the cause of a pause in ``data[start:end]``.
+
+        False if another pause there was certainly an idle line.
+        """
         causes = [self._cause(gap, data, start, end) for gap in self._within(start, end)]
         return Cause.UNDECIDED in causes and Cause.IDLE_LINE not in causes
 

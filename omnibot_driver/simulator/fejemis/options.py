@@ -105,9 +105,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         metavar="SECONDS:HALF:WHAT",
         help="let the fault WHAT occur in one of the two Teensys (HALF: drive or front), SECONDS"
         " after the start."
-        " Repeat the option for more faults; well and sensor-well end earlier faults. WHAT in"
-        " either half:"
-        f" {', '.join(FAULTS)}; in the front half only: {', '.join(SENSOR_FAULTS)}",
+        " Repeat the option for more faults. The faults 'well' and 'sensor-well' end earlier"
+        f" faults. Faults of either half: {', '.join(FAULTS)}; of the front half only:"
+        f" {', '.join(SENSOR_FAULTS)}",
     )
 
 

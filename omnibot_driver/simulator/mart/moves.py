@@ -227,7 +227,7 @@ def last_distance_in(server: "MartServer") -> int:
 
 def stop(server: "MartServer", kind: Kind) -> None:
     """Stop an uncontrolled motion (SM, SRM)."""
-    if end_motion(server, COMMAND, server.motions[kind]):
+    if end_motion(server, server.motions[kind]):
         server.wait(COMMAND, kind, stopped, kind)
     else:
         server.later(WRITES_S, stopped, kind)

@@ -32,8 +32,12 @@ def obey(server: "MartServer", text: str) -> None:
         _limit(server, text)
 
 
-def end_motion(server: "MartServer", port: int, motion: Motion) -> bool:
-    """Stop an uncontrolled motion. Return whether the port must wait for the notice of the end."""
+def end_motion(server: "MartServer", motion: Motion) -> bool:
+    """Stop an uncontrolled motion (F, B, RM, R, L).
+
+    Return whether the caller must wait for the notice that the motion has ended. A motion that is
+    stopping already, or that the server does not supervise (except R and L), is left alone.
+    """
     if motion.kind is Kind.SPIN:
         if motion.stopping:
             return False
@@ -62,7 +66,7 @@ def _stop_first(server: "MartServer", kinds: tuple[Kind, ...]) -> None:
         if not motion.stopping:
             stop_motors(server, motion)
     elif quirks.stop_port_keeps_motion or kind is Kind.SPIN:
-        if end_motion(server, STOP, motion):
+        if end_motion(server, motion):
             server.wait(STOP, kind, None)
     elif not motion.stopping and motion.watching:
         motion.released = True

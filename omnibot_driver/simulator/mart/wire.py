@@ -7,14 +7,14 @@ Numbers are parsed as by C's ``atoi``. This module does not know the meaning of 
 
 import re
 
-LONGEST_REQUEST = 50
+LONGEST_REQUEST = 49
 BLOCK = 512
 
 _NUMBER = re.compile(r"\s*([+-]?\d+)")
 
 
 def text_of(datagram: bytes) -> str:
-    """Return the part of a request that the server reads: its first 50 bytes, up to a NUL."""
+    """Return the part of a request that the server reads: its first 49 bytes, up to a NUL."""
     return datagram[:LONGEST_REQUEST].partition(b"\0")[0].decode("latin-1")
 
 

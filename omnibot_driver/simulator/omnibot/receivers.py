@@ -52,7 +52,7 @@ def counting(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def naive(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``; but if another byte than FE follows FF, discard both bytes.
+    """Find frames as ``counting`` does; but if another byte than FE follows FF, discard both bytes.
 
     As a result, the header in FF FF FE is missed.
     """
@@ -62,7 +62,10 @@ def naive(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames like ``counting``, but discard an incomplete frame after ``IDLE_GAP_S``."""
+    """Find frames as ``counting`` does, but discard an incomplete frame before a long pause.
+
+    A pause of ``IDLE_GAP_S`` between two bytes is long.
+    """
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 
 

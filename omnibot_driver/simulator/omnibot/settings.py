@@ -16,7 +16,7 @@ ControlMethod = Literal["velocity", "position"]
 
 @dataclass(frozen=True, slots=True)
 class BoardPose:
-    """The board's own pose in its earth frame, as in the 5 Hz pose frame. The yaw is unwrapped."""
+    """The board's own pose in its earth frame, as sent at 5 Hz. The yaw is unwrapped."""
 
     x_mm: float = 0.0
     y_mm: float = 0.0

@@ -129,12 +129,15 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
-    """Return the set-point of the step that the goals describe, in whole RPM."""
+    """Return the speed to which the set-point steps, in whole RPM, at least 5.
+
+    It is ``goals.destination`` times the speed at full duty.
+    """
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 
 
 def told(plant: Plant, gains: PiGains, loop: Loop, goals: Goals) -> Tuned:
-    """Return these gains with their predicted effect on the step that the goals describe."""
+    """Return these gains with their predicted effect on a step to ``target_of``."""
     target = target_of(plant, goals)
     found = _foreseen(plant, gains, loop, goals)
     return Tuned(

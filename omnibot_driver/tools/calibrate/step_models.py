@@ -2,8 +2,9 @@
 
 """Models of a wheel's step response, as the odometry measures it.
 
-A model gives the angle that the wheel has turned since a step. The odometry gives the mean rate in
-deltas of 40 ms. This module knows models and times; it does not know measured data.
+A model gives the angle that the wheel has turned since a step. Each delta of the odometry gives the
+mean rate over 40 ms, which is the difference of two such angles. This module knows models and
+times; it does not know measured data.
 """
 
 from collections.abc import Callable

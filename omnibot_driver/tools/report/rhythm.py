@@ -264,8 +264,8 @@ def _gaps(log: Log, rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         )
     else:
         advice = (
-            f"The driver counts {counted_lost} messages as lost on the line or refused: check"
-            " cable, hub and ground."
+            f"The driver has counted {counted_lost} messages that were lost on the line or that it"
+            " rejected: check the cable, the hub and the electrical ground."
         )
     yield Finding(
         Level.BAD if rhythm.gap_s[longest] > LONG_GAP_S or share > MANY_LOST else Level.WARN,

@@ -325,7 +325,7 @@ def test_a_robot_that_rolls_out_after_a_failed_move_does_not_move_without_a_comm
 def test_motors_that_need_many_units_are_started_with_more_after_a_start_that_failed(
     twist: tuple[float, float], dead_units: float, firmware: Firmware
 ) -> None:
-    """The motors need more units than the driver knows, so the first start is too weak.
+    """The motors need more units to start than the driver assumes, so the first start fails.
 
     The next start is stronger.
     """

@@ -306,7 +306,7 @@ def test_an_obstacle_ends_rm_and_srm_tells() -> None:
     assert not rig.server.hit_wall
 
 
-def test_backward_rm_and_spins_see_no_obstacle() -> None:
+def test_backward_rm_sees_no_obstacle() -> None:
     """The robot drives backward with RM, usually the command of a forward drive.
 
     The server does not read the rear sonar, and the robot hits the wall.

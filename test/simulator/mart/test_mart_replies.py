@@ -94,6 +94,7 @@ def test_only_49_bytes_are_taken_of_a_request() -> None:
     """A request is longer than 49 bytes. The server discards the rest."""
     rig = Rig()
     assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 40 + "7") == "ok"
+    assert rig.ask("TIME 7 4 2024 12 30 0" + " " * 28 + "7") == "ok"  # the 50th byte
     assert rig.ask("HELLO" + "\0" * 60) == "ok BBB"
     assert rig.ask("HELLO" + "x" * 60) == NOT_SUPPORTED
 
