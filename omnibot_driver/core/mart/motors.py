@@ -107,7 +107,7 @@ class Motors:
         return self._left_line.speed(units) / max(1.0, self._right_line.speed(units))
 
     def _mean_speed(self, units: float) -> float:
-        """Return the mean of both motors' speeds at these motor units: nominal units, at least 0."""
+        """Return the mean speed of both motors at these motor units: nominal units, at least 0."""
         return max(0.0, (self._right_line.speed(units) + self._left_line.speed(units)) / 2)
 
     def sides(self, speed_mps: float, rate_radps: float) -> tuple[float, float]:
