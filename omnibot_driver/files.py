@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Write files completely or not at all, so that a crash or a full disk leaves no half of a file.
+"""Write files completely or not at all, so that a crash or a full disk leaves no partial file.
 
 This module knows paths; it does not know what is in the files.
 """

@@ -49,7 +49,7 @@ NO_ORIENTATION: Final = [-1.0] + [0.0] * 8
 Wheels = tuple[Pose, tuple[float, ...], tuple[float, ...]]
 """State of the wheels:
 
-* Sum of the robot's displacements along its own axes, in m and rad.
+* Sum of the robot's displacements along the board's axes, in m and rad.
 * Angle of each wheel, in rad.
 * Rate of each wheel, in rad/s. Empty if unknown.
 """
@@ -209,8 +209,8 @@ def is_planar(twist: Any) -> bool:
 def goal_pose(stamped: Any, odom_frame: str) -> Pose:
     """Return the planar pose of a geometry_msgs/PoseStamped; z is ignored.
 
-    Raises CommandRefused for another frame, NaN or infinity, a tilt, or a quaternion of a wrong
-    length.
+    Raises CommandRefused for another frame, NaN or infinity, a tilt, or a quaternion whose length
+    is far from 1.
     """
     frame, position, turn = stamped.header.frame_id, stamped.pose.position, stamped.pose.orientation
     if frame not in ("", odom_frame):

@@ -3,8 +3,9 @@
 """Standard output and standard error that never block the process.
 
 rclpy holds Python's global lock while it logs. After ctrl-S on the terminal, a log line would
-therefore block all threads, even the watchdog. To prevent this, output passes through a pipe. If
-the pipe is full, lines are lost. This module knows descriptors; it does not know what is printed.
+therefore block all threads, even the one that sends the guard's heartbeats. To prevent this, output
+passes through a pipe. If the pipe is full, lines are lost. This module knows descriptors; it does
+not know what is printed.
 """
 
 import contextlib

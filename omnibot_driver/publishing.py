@@ -246,7 +246,7 @@ class Publishing:
         self._node.get_logger().warning(notice.text)
 
     def _is_news(self, text: str) -> bool:
-        """Return whether this text was not logged since the board last sent valid data.
+        """Return whether this text is new since the board last began to send valid data.
 
         Repeated losses of a port are therefore logged only once.
         """

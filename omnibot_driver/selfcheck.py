@@ -94,11 +94,11 @@ def unread_files(arguments: Sequence[str], node: str) -> list[str]:
 
 def _is_for(node: str, file: str) -> bool:
     if not Path(file).is_file():
-        return True  # ROS has emptied the pipe, so nothing is known
+        return True  # a pipe, which ROS has emptied: its content is unknown
     try:
         content = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError):
-        return True  # ROS has read the file, so nothing is known
+        return True  # ROS could read this file, so do not warn
     return any(re.fullmatch(pattern, node) for pattern in _sections(content))
 
 

@@ -58,8 +58,11 @@ class SharedSession:
         self.on_exit: OnExit = "stop"
         """What the driver sends to the board when the link ends, in addition to Stop."""
         self.told = False
-        """Whether the last Stop was written to every line. It is written when the link ends, or
-        later, when a lost port is open again."""
+        """Whether the last Stop was written to every line when the link ended.
+
+        If the port was lost then, Stop is written when it is open again. ``told`` then stays False
+        if no stop was owed (``Shutdown.owed``).
+        """
         self.stood = False
         """Whether measurements showed the robot at rest when the link ended."""
         self.closing = threading.Event()
@@ -176,7 +179,7 @@ class SharedSession:
             self.settle()
 
     def heed_stall(self) -> bool:
-        """Stop the robot if this process was stalled; return whether it was stalled."""
+        """Stop the robot if this process was stalled; return whether this call stopped it."""
         return self._heed_stall(boot_time_s())
 
     def _heed_stall(self, boot_s: float) -> bool:

@@ -35,9 +35,10 @@ def boot_time_ns() -> int:
 class StallDetector:
     """A detector of stalls: whether this process is stalled now, and when the last stall ended.
 
-    The pacer thread calls ``passed`` ten times a second or more, to show that it runs. Every thread
-    calls ``begun`` before it uses the session. If ``begun`` reports a stall, that thread must stop
-    the robot first. The detector also works if the computer's clock is set while it runs.
+    The pacer thread calls ``passed`` ten times a second or more, to show that it runs. Other
+    threads call ``begun`` before they use the session. If ``begun`` reports a stall, the calling
+    thread must stop the robot first. The detector also works if the computer's clock is set
+    while it runs.
     """
 
     def __init__(self) -> None:

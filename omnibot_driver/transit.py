@@ -100,8 +100,8 @@ class Transit:
         """
         waited_ns = max(0, arrival.now_ns - arrival.received_ns)
         at_s = (arrival.steady_ns - waited_ns) / 1e9
-        # A step of both times of day changes only the second difference.
-        # A step of our time of day alone changes only the first. So the smaller delay is used.
+        # If both computers' times of day jump, only the second difference changes. If only our
+        # time of day jumps, only the first changes. So the smaller delay is used.
         differences_s = (
             (arrival.received_ns - arrival.sent_ns) / 1e9,
             (arrival.steady_ns - waited_ns - arrival.sent_ns) / 1e9,

@@ -17,8 +17,8 @@ from omnibot_driver.parameters import Parameter
 SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
-"""Largest rate of commands in a terminal mode, in Hz. In this mode, the board forwards each command
-to its compass over a slow line, which can carry at most 34 commands per second."""
+"""Largest rate of commands in a terminal mode, in Hz. In such a mode, the board forwards each
+command to its sensors over slow lines; that of the compass carries at most 34 commands a second."""
 
 WHEELS: Final = (
     Parameter(
@@ -272,7 +272,7 @@ def require_checksum_in_terminal_mode(values: Mapping[str, Any]) -> None:
 def require_slow_commands_in_terminal_mode(values: Mapping[str, Any]) -> None:
     """Raise ParameterError if the command rate would delay Stop in a terminal mode.
 
-    In such a mode, the board forwards each Stop to a sensor over a line with 4800 baud.
+    In such a mode, the board forwards each Stop to a sensor over a line with 4800 or 9600 baud.
     """
     if values["terminal_mode"] != "host" and values["command_rate"] > MOST_TERMINAL_RATE_HZ:
         raise ParameterError(

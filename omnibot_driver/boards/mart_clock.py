@@ -2,8 +2,8 @@
 
 """When the command TIME, which sets the controller's clock, may be sent, and with which arguments.
 
-TIME sets the clock to a full minute. If the clock is set back between two motions, the controller
-computes a wrong heading. This module knows times only.
+TIME sets the clock to a full minute, and ignores the seconds. If the clock is set back between two
+motions, the controller computes a wrong heading. This module knows times only.
 """
 
 import time

@@ -44,7 +44,7 @@ class BoardFigures:
 
     * ``rates_hz``: expected rate of each kind of reading.
     * ``trouble``: why the robot cannot be driven, as a sentence; empty if it can.
-    * ``faults``: how often the framing was lost.
+    * ``faults``: number of framing faults, at which bytes belong to no frame.
     * ``discarded_bytes``: bytes that belong to no valid frame.
     * ``saturated``: commands that exceeded the range of the board's encoding.
     * ``odom_hz``: rate of the topic ``odom``; None: published once per odometry reading.
@@ -160,7 +160,7 @@ class Board(Protocol):
         """Forget the mode, because the board has been silent for ``Traits.silence_s``."""
 
     def stalled(self) -> None:
-        """Record that this process stalled, so its watchdog may have sent ``last_words``.
+        """Record that this process stalled, so its guard process may have sent ``last_words``.
 
         These packets stop the robot. They may also have switched off another motor, e.g. a brush.
         """
@@ -172,7 +172,7 @@ class Board(Protocol):
         return math.inf
 
     def due(self, now: float) -> Packets:
-        """Return the subscriptions, polls and relayed values that are due, but no motion commands.
+        """Return the due packets that subscribe, poll or relay values; no motion commands.
 
         Called at ``wake_at``. The driver always writes these packets.
         """
@@ -217,7 +217,7 @@ class Board(Protocol):
         return
 
     def start(self) -> Packets:
-        """Return the packets that make the board run in any mode. They may be sent repeatedly."""
+        """Return the packets that start the board from any mode. They may be sent repeatedly."""
         return NO_PACKETS
 
     def pause(self) -> Packets:
@@ -248,7 +248,7 @@ class Board(Protocol):
         return NO_PACKETS
 
     def last_words(self) -> tuple[Packets, Packets]:
-        """Return two sets of packets; the watchdog process sends one if this process hangs.
+        """Return two sets of packets; the guard process sends one of them if this process hangs.
 
         First: Stop. Second, for a latched e-stop: emergency stop, then Stop. Called after each
         input and before each output.

@@ -66,7 +66,7 @@ class Inbound:
     def process(self, now: float) -> bool:
         """Handle the readings of the last ``hear``.
 
-        Return False if nothing is left to write or report.
+        Return True if the caller must look for packets to write and events to report.
         """
         last, self._last = self._last, None
         if (
@@ -108,7 +108,7 @@ class Inbound:
             self._safety.set_out(now)
 
     def end(self, now: float) -> None:
-        """Process the remaining readings, because the port was lost."""
+        """Process the remaining readings, because the port was lost or closed."""
         if readings := self._board.flush(now):
             self._last = readings[-1]
         self._reporter.events += self._measurement.hear(readings, now)

@@ -14,7 +14,8 @@ from omnibot_driver.core.traits import Traits
 class Liveness:
     """The times at which a board last sent data, and the limits for its silence.
 
-    * ``heard_at``: arrival of the last reading, in s.
+    * ``heard_at``: arrival of the last reading, in s. The start of a connection and the end of a
+      stall also count as an arrival.
     * ``came_at``: arrival of the last bytes, valid or not, in s.
     """
 

@@ -26,7 +26,7 @@ FLOWING_S: Final = 0.1
 """Longest interval between two reads, in s, that is added in full to the time of uninterrupted
 data.
 
-Of a longer interval, only this time is added. A running board sends every 10 ms.
+Of a longer interval, only ``FLOWING_S`` is added. A running board sends every 10 ms.
 """
 IN_FLIGHT_S: Final = 0.1
 """Longest time, in s, that a command, or a notice of a paused board, takes to arrive.
@@ -215,7 +215,7 @@ class ModeManager:
             self._begin(now)
 
     def tick(self, now: float) -> None:
-        """Repeat commands that are due, and fail the request that is overdue."""
+        """Confirm a pause, repeat a start that is due, or fail the request that is overdue."""
         if self.phase is Phase.PAUSING and now >= self._shown_at + IN_FLIGHT_S:
             self._settle("paused")
         elif now >= self._deadline:

@@ -30,7 +30,7 @@ class DisplacementReading:
     """Motion of the robot in a short time, in m and rad.
 
     * ``frame``: the board's earth frame, or the body's own axes.
-    * ``duration_s``: in s; None if unknown, e.g. after a pause.
+    * ``duration_s``: length of this time, in s; None if unknown, e.g. after a pause.
     * ``lost``: number of missing displacements before this one.
     * ``restarted``: whether the board's counters and earth frame seem to start again here.
     * ``measured``: False if the board only reports the commanded values.
@@ -81,11 +81,12 @@ class PausedReading:
 class OdometryReading:
     """The board's own odometry, in a frame whose origin ``Board.reset_odometry`` moves.
 
-    * ``stamp_s``: in s of the host's steady clock.
+    * ``stamp_s``: time of measurement, in s of the host's steady clock.
     * ``twist``: in the board's body axes.
     * ``twist_variances``: of linear and angular speed, in m²/s² and rad²/s².
-    * ``rolled``: sum of all wheel motion, in body axes, since the board object was made.
-    * ``rolling``: rate of ``rolled``; None while the board does not report it.
+    * ``rolled``: sum of the tangents (twist x time) that the wheels have measured since the board
+      object was made, in the board's body axes.
+    * ``rolling``: twist by which ``rolled`` changes; None while the board does not report it.
     """
 
     stamp_s: float

@@ -40,8 +40,8 @@ class Session:
 
     * ``run``: whether to start the board whenever it is connected.
     * ``axis_signs``: for x, y, yaw: -1 if the board's axis is opposite to REP-103's.
-    * ``control``: position of the board's control switch; None without this switch.
-    * ``obeys``: False for a recording, which cannot follow commands.
+    * ``control``: control method that a switch on the board selects; None without this switch.
+    * ``obeys``: False if the session replays a recording, which cannot follow commands.
     """
 
     def __init__(
@@ -125,7 +125,9 @@ class Session:
     # Inputs from the link and from the clock
 
     def configure(self, settings: SessionSettings, now: float, *, board: object = None) -> None:
-        """Apply new settings to later commands and frames. A stricter limit stops the robot.
+        """Apply new settings to later commands and frames.
+
+        A stricter limit or timeout stops the robot, unless it drives to a goal.
 
         ``board``: new settings of the board itself; the current command is encoded again.
         """
@@ -174,7 +176,10 @@ class Session:
         self._task.tick(now)
 
     def stood_still(self, seconds: float, now: float) -> None:
-        """Stop the robot, because this process or its watchdog stalled for ``seconds``."""
+        """Stop the robot, because this process or its pacer thread stalled for ``seconds``.
+
+        This has no effect while the port is closed.
+        """
         if self._mode_manager.phase is not CLOSED:
             self._safety.stalled(seconds, now)
 

@@ -51,8 +51,8 @@ class Shutdown:
     def fall_silent(self, now: float) -> bool:
         """End the repetition of Stop, and demand a new proof that the robot stands still.
 
-        The line may have damaged the last Stop. If no proof is possible, or the e-stop is latched,
-        change nothing and return False.
+        The new proof shows that the line has not damaged the last Stop. If no proof is possible, or
+        the e-stop is latched, change nothing and return False.
         """
         if self._board.mode is not Mode.NOMINAL or self._policy.latched:
             return False

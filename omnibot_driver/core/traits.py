@@ -17,13 +17,16 @@ class Traits:
     * ``channels``: names of the lines to the board; a single line needs no name.
     * ``imu_period_s``: time between two ImuReadings, one per tick, in s; None without an IMU.
     * ``authorities``: the topics that may command motion.
+    * ``requests``: the requests that the board supports.
     * ``wheels``: names of the wheels, in the order of ``wheel_cmd``.
     * ``unheard_s``: time without data, in s, after which the robot is stopped.
     * ``silence_s``: time without data, in s, after which the mode is unknown.
     * ``own_odometry``: OdometryReadings give the pose; else the driver integrates displacements.
     * ``stands_after_s``: time without motion, in s, that proves a standstill.
     * ``unproved_s``: longest time, in s, for which Stop is repeated without this proof.
-    * ``calibrates_gyro``: the board subtracts the bias; its profile offers ``~/calibrate_gyro``.
+    * ``baudrate``: whether the line has a baud rate.
+    * ``calibrates_gyro``: the board subtracts the gyro's bias; its profile offers
+      ``~/calibrate_gyro``.
     * ``stops_within_s``: longest time to obey an acknowledged stop, in s; 0: no acknowledgement.
     * ``slack_mps``, ``slack_radps``: extra tolerance of the motion monitor, for coarse
       displacements or lagging wheels.

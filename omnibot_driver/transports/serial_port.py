@@ -84,7 +84,7 @@ class SerialPort:
         return None if count is None else count - self._overruns_before
 
     def read(self) -> Packet:
-        """Return all received bytes, after waiting for the first one."""
+        """Return the received bytes, after waiting up to 0.2 s for the first one."""
         return 0, self._read()
 
     def _read(self) -> bytes:
@@ -166,7 +166,7 @@ class SerialPort:
 
 
 def _read_whole(port: serial.Serial, arrivals: select.poll) -> bytes:
-    """Read all available bytes. This takes two system calls; pyserial needs five."""
+    """Return up to 4096 available bytes. This takes two system calls; pyserial needs five."""
     for ready, _ in arrivals.poll(1e3 * READ_TIMEOUT_S):
         if ready != port.fd:
             os.read(ready, 1000)  # pyserial's ``cancel_read``

@@ -2,8 +2,9 @@
 
 """Interlocks: whether a command, request, task or gyro calibration is possible now.
 
-Each method returns the reason for a refusal, as a sentence with a remedy, or an empty string if
-there is no reason. This module knows the board's mode, and whether a request is in progress.
+Each method ``why_not_…`` returns the reason for a refusal, as a sentence with a remedy, or an
+empty string if there is no reason. This module knows the board's mode, and whether a request is in
+progress.
 """
 
 from omnibot_driver.core.board import Board, Mode

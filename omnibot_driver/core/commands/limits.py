@@ -2,7 +2,8 @@
 
 """Speed limits for commands. They never change the direction of the linear velocity.
 
-All functions expect finite numbers, and ``require_finite`` rejects NaN and infinity.
+``require_finite`` rejects NaN and infinity. Of the other functions, only ``SpeedLimits.allow``
+accepts these values.
 """
 
 import math
@@ -51,9 +52,10 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
-        """Return the twist reached from ``now`` in ``duration_s`` with limited acceleration.
+        """Return the twist that a robot with the twist ``now`` reaches in ``duration_s``.
 
-        The linear velocity changes along a straight line. The yaw rate changes independently of it.
+        The accelerations are limited. The linear velocity changes along a straight line. The yaw
+        rate changes independently of it.
         """
         vx, vy = _step(
             (now.vx_mps, now.vy_mps),

@@ -42,7 +42,7 @@ class CommandPipeline:
     * ``policy``: the command in effect, its expiry and the e-stop latch.
     * ``interlock``: refuses motion after the motion monitor has stopped the robot.
     * ``monitored``: whether the motion monitor is enabled.
-    * ``obeys``: False for a recording, which cannot follow commands.
+    * ``obeys``: False if the session replays a recording, which cannot follow commands.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class CommandPipeline:
     def configure(self, settings: SessionSettings, now: float) -> list[str]:
         """Apply new settings to later commands and frames; return notices for the user.
 
-        A stricter limit or timeout ends a motion in progress.
+        A stricter limit or timeout ends a motion in progress, but not a drive to a goal.
         """
         if settings.motion_monitor is not self.monitored:
             self.monitored = settings.motion_monitor

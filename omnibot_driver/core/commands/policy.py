@@ -89,7 +89,7 @@ class CommandPolicy:
             self._actuator.apply(None, now)
 
     def connect(self, now: float) -> None:
-        """Begin a new connection. A latched e-stop is sent again."""
+        """Begin a new connection. If the e-stop is latched, send the emergency stop again."""
         self.current = self._stopping_since = None
         self.proof.begin()
         self._actuator.connect()
@@ -97,9 +97,10 @@ class CommandPolicy:
             self._actuator.apply(EMERGENCY_STOP, now)
 
     def halt(self, now: float) -> None:
-        """Drop the current command, and repeat Stop until the robot is shown to stand still.
+        """Drop the current command, and repeat Stop until a standstill is proved.
 
-        With a latched e-stop, the emergency stop is repeated.
+        Stop is repeated for at least ``STOPPING_S``, and without proof for ``unproved_s``. With a
+        latched e-stop, the emergency stop is repeated.
         """
         self.current = None
         self.quiet = False

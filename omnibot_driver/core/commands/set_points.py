@@ -16,7 +16,8 @@ from omnibot_driver.core.geometry.se2 import Pose
 from omnibot_driver.core.geometry.twist import BodyTwist
 
 LONGEST_STEP_S: Final = 0.05
-"""Longest time, in s, by which one step advances a ramp, even if more time has passed."""
+"""Longest time, in s, by which one call of ``order`` advances a ramp, even if more time has
+passed."""
 AT_REST: Final = BodyTwist(0.0, 0.0, 0.0)
 
 LEAVING_M: Final = 0.3
@@ -64,7 +65,8 @@ class BaseSetpoint:
 
     * ``is_zero``: as an attribute, whether the order makes the robot stand still. As an argument,
       the function that returns this; it may raise CommandRefused.
-    * ``before``: the previous set-point. A ramp starts at its velocity; at rest if it has none.
+    * ``before``: the previous set-point. If it is a body velocity, the ramp starts at it, otherwise
+      at rest.
     * ``since``: earliest time, in s, at which a ramp can begin.
     """
 

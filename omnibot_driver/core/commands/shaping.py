@@ -33,7 +33,7 @@ class CommandShaper:
     """The checks and limits of motion commands. Every method may raise CommandRefused.
 
     * ``limits``, ``kinematics``: may be replaced at any time.
-    * ``control``: position of the board's control switch; None without this switch.
+    * ``control``: control method that a switch on the board selects; None without this switch.
     """
 
     def __init__(

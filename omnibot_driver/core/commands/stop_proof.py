@@ -42,7 +42,8 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether, since Stop, no motion was sent and the robot stood for ``still_s``.
+    * ``proved``: whether the robot has stood for ``still_s`` since Stop, or the board has paused,
+      and no motion was sent since then.
     * ``owed``: whether a motion was sent, and no standstill was proved since then.
     * ``measured``: whether a measured displacement has arrived since Stop.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Correction of the IMU's biases, and IMU figures for diagnostics, measured at standstill."""
+"""Subtraction of the IMU's biases, and the figures of the IMU for the diagnostics."""
 
 from dataclasses import dataclass
 

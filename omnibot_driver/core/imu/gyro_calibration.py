@@ -35,8 +35,8 @@ They are ten times the sensors' noise. A robot that is touched exceeds them.
 """
 STILL_M: Final = 0.002
 STILL_RAD: Final = 0.002
-"""``STILL_M``, ``STILL_RAD``: largest displacement, in m and rad, that is accepted as rest: resting
-wheels may report one count back and forth."""
+"""``STILL_M``, ``STILL_RAD``: largest displacement, in m and rad, that is accepted as rest: the
+encoder of a resting wheel may change by one count and back."""
 LARGEST_BIAS_RADPS: Final = math.radians(20.0)
 """Largest accepted bias in rad/s: the initial zero-rate output in the MPU-6050 product
 specification, section 6.1."""
@@ -48,7 +48,8 @@ corrected in 14 s."""
 class Look:
     """One observation of the robot: readings of the IMU, and displacements of the same time.
 
-    * ``began_s``, ``last_s``: first and last stamp, in s; NaN before the first.
+    * ``began_s``, ``last_s``: stamps of the first and the last reading, in s; NaN without
+      readings.
     """
 
     def __init__(self) -> None:

@@ -38,8 +38,8 @@ STILL: Final = 0.08
 """An implausible change of the IMU's readings was a spike only if at most this fraction of the
 change remains in the next reading.
 
-If every other value changes by at most this fraction of the largest change, only one value is
-regarded as changed.
+If each of the other values changes by at most this fraction of the largest change, only one value
+is regarded as changed.
 """
 END_OF_SCALE: Final = 0.99996
 """Smallest fraction of the accelerometer's full scale that is regarded as the end of the scale. The
@@ -89,8 +89,8 @@ class OutlierFilter:
 
     * ``limits``: may be replaced at any time.
     * ``tick_s``: time between two ImuReadings, in s.
-    * ``corrected``: the board corrects its own estimate, so impossible steps are passed on with
-      ``measured`` False.
+    * ``corrected``: whether the board corrects its own odometry. If so, an impossible but finite
+      displacement is passed on with ``measured`` False.
     """
 
     def __init__(self, limits: MotionLimits, tick_s: float, *, corrected: bool = False) -> None:
@@ -161,7 +161,7 @@ class OutlierFilter:
 
     def _admit_displacement(self, reading: DisplacementReading, stamp_s: float) -> list[Stamped]:
         before_s, self._displaced_at_s = self._displaced_at_s, stamp_s
-        seconds = reading.duration_s or None  # None for 0 s: two arrived at once
+        seconds = reading.duration_s or None  # 0 s: it came with the one before
         if seconds is None:
             self._motion_leaps.forget()
             seconds = None if before_s is None else (stamp_s - before_s) or None
@@ -268,7 +268,7 @@ class _Spikes:
         if leaping is not None and self._sure is not None:
             leapt = max(_steps(self._sure, leaping))
             was_single = max(_steps(self._sure, values)) <= self._left * leapt
-            if was_single:  # an equal leap is now a shock; a larger one may be a spike
+            if was_single:  # from now on, only a larger leap may be a spike
                 self._restless = max(self._restless, leapt / OUT_OF_PROPORTION)
             else:
                 self._restless = max(self._restless, leapt)

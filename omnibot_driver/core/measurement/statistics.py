@@ -21,7 +21,7 @@ from omnibot_driver.core.readings import (
 class StreamStatistics:
     """Counts and sums since the driver began.
 
-    Only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
+    Of the counts, only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
 
     * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by it, shows
       how many IMU readings the board has sent. None if lost IMU readings are not counted in this
@@ -42,8 +42,8 @@ class StreamStatistics:
     reads: int = 0
     """Number of reads whose last reading was an IMU sample or a displacement."""
     delay_s: float = 0.0
-    """Sum of delays in s: for each of the ``reads``, the age of its newest sample. An age is never
-    negative."""
+    """Sum of delays in s: for each of the ``reads``, the age of its newest sample. An age may
+    be a few microseconds below 0, because stamps must increase."""
     squared_delay_s2: float = 0.0
     same_force: int = 0
     same_rate: int = 0

@@ -38,7 +38,7 @@ STOOD_S: Final = 0.5
 If it moves after that, the cause is not a lost Stop, but for example a push.
 """
 STOPS_S: Final = 5.0
-"""Time in s for which the command policy repeats Stop if the robot keeps moving."""
+"""Time in s for which the command policy repeats Stop, by default, if the robot keeps moving."""
 
 REFUSED_IN_A_ROW: Final = 4
 COSINE_60: Final = 0.5
@@ -184,9 +184,10 @@ class MotionMonitor:
         return self._blocked(motion, seconds, heading_known=heading_known)
 
     def _blame(self, fault: Fault, now: float) -> Fault:
-        """Return ``fault``, and suspend the checks until some time after the next set-point.
+        """Return ``fault``, and suspend the checks.
 
-        Until then, the robot may still roll to a halt.
+        They are resumed 0.8 s (``UNKNOWN_S``) after the next set-point. Until then, the robot may
+        still be slowing down.
         """
         self._error.reset()
         self._history.add(None, now)
@@ -195,8 +196,9 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot that moves outside its envelope.
 
-        If it moves within 60° of a set-point's direction, it is too fast. Otherwise, it moves in
-        the wrong direction.
+        A velocity within 60° of a set-point's direction is too fast, and so is a yaw rate with the
+        sign of a set-point's. Otherwise the direction is wrong. If the heading is not known, a
+        linear velocity is always too fast.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:

@@ -28,7 +28,7 @@ FORGOTTEN_S: Final = 6.0
 FORGOTTEN_AT_REST_S: Final = 20.0
 """``FORGOTTEN_S``, ``FORGOTTEN_AT_REST_S``: time constants of the wind-up's decay, in s.
 
-A robot that is still held at rest keeps its wind-up.
+The second is for a robot whose set-point is rest: if it is still held, it keeps its wind-up longer.
 """
 HELD_PART: Final = 0.7
 """A robot that is slower than this fraction of its recent set-points is regarded as held."""

@@ -178,8 +178,8 @@ class Odometry:
         """Convert ``place`` from the odometry frame into the board's frame.
 
         The board's heading includes full turns. The result has the heading that the robot reaches
-        by the shorter turn. Return None before a pose of the board has shown how the frames are
-        related.
+        by the shorter turn. Return None while no pose of the board shows how the frames are
+        related, and if ``use_board_pose`` is False.
         """
         if self._board is None or self._restarted is not None or not self._settles:
             return None

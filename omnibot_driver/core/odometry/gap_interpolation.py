@@ -23,7 +23,7 @@ NO_WAY: Final = Pose()
 class GapInterpolation:
     """Estimates the motion of lost displacements from the displacements before and after them.
 
-    * ``last``: newest tangent in body axes, and its duration in s; None if unknown.
+    * ``last``: newest tangent (twist x time) in body axes, and its duration in s; None if unknown.
     """
 
     def __init__(self) -> None:

@@ -83,6 +83,8 @@ class PoseGate:
     def reachable(self, told: Pose, seconds: float, mps: float, radps: float) -> bool:
         """Return whether the robot can have reached a pose since the last accepted one.
 
+        The result is False if no pose was accepted yet.
+
         ``seconds``: time in s in addition to the time that ``passed`` has recorded.
 
         ``mps``, ``radps``: largest speeds of the robot, in m/s and rad/s.

@@ -85,7 +85,10 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add at once the lost motion of a gap, which a pose of the board has shown."""
+        """Add the lost motion of a gap, which a pose of the board has shown, to the best pose.
+
+        The published pose follows as fast as the robot could move.
+        """
         self.follower.correct(roll(self._part(tangent)), 0.0)
 
     def correct(self, tangent: Pose) -> None:

@@ -131,7 +131,7 @@ class DeviceClock:
             if came:
                 self._single_reads = self._single_reads + 1 if came == 1 else 0
                 short = self._compare(line, edge, now, counted=DisplacementReading in kinds)
-        # If a counter took ticks back, there must still be room for stamps in the readings' order.
+        # If a displacement's counter has lowered the tick number, the stamps must still increase.
         least_s = 0.0 if len(ticks) < 2 or ticks == sorted(ticks) else SMALLEST_STEP_S
         stamps = []
         for left, tick, reading in zip(range(len(ticks), 0, -1), ticks, readings, strict=True):
