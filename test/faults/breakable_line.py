@@ -2,7 +2,7 @@
 
 """A simulated board on a line that can be broken, and a record of what the board sent.
 
-This module knows bytes and ticks; it does not know frames.
+This module does not depend on the format of the frames.
 """
 
 from collections.abc import Callable
@@ -45,7 +45,7 @@ def losing_bursts(rate: float, random: Random) -> Damage:
 def gaining(rate: float, random: Random) -> Damage:
     """Return a function that inserts bytes of any value into the line.
 
-    ``rate``: the probability that a byte is inserted at a place.
+    ``rate``: the probability that a byte is inserted before a byte of the line.
     """
 
     def damage(data: bytes) -> bytes:

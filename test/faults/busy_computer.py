@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A busy computer: busy loops on every core, and an adapter that delivers four bytes at a time.
+"""A busy computer: four busy loops, and an adapter that delivers four bytes at a time.
 
 The line is undamaged, so no data may be lost.
 """

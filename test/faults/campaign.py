@@ -2,8 +2,7 @@
 
 """The fault campaign: ``make faults`` runs it and writes its table into docs/internals/faults.md.
 
-With ``--minutes`` the campaign is only a long walk through random faults. The exit code is 1 when
-anything was wrong.
+With ``--minutes`` the campaign has only random faults. The exit code is 1 when anything was wrong.
 """
 
 import argparse
@@ -200,7 +199,7 @@ class Campaign(Outcome):
                 self.run(row, case, rig, again=False)
 
     def losses(self, number_of_life: int, numbers: range) -> None:
-        """Test stops on a line that loses bytes on the way to the board.
+        """Test how the robot stops if the line loses bytes on the way to the board.
 
         The loss lasts until the last stop.
 

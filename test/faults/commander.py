@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Commanders: programs that send motion commands to the robot until they leave."""
+"""Commanders: programs that send motion commands until a test calls ``leave``."""
 
 import math
 import threading

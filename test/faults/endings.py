@@ -56,7 +56,7 @@ class Ending:
 
     ``before``: Python code that runs in the driver's process before the driver.
 
-    ``allowed_s``: how long the robot may still drive.
+    ``allowed_s``: how long the robot may still drive, in s.
 
     ``late_s``: additional time within which the driver's process must end, in s.
 

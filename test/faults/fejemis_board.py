@@ -2,7 +2,7 @@
 
 """The Fejemis in the fault campaign: two ports, lines of text with checksums, one robot.
 
-Messages are not compared with what was sent, because the boards send at different rates.
+Published messages are not compared with the sent ones: the two boards send at different rates.
 """
 
 import re

@@ -21,7 +21,7 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""Least share of the readings that the driver must publish, during random input and 2 s longer."""
+"""Least share of the sent IMU frames that must be published within 2 s of the random input."""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 
@@ -119,7 +119,7 @@ def fuzz(rig: Rig, count: int, random: Random) -> None:
             assert odd  # our own middleware refuses to send such bytes
     for future in futures:
         probe.wait_for_future(future)
-    # Messages of the topic estop may still be in the driver's queue. It takes one for each call.
+    # The driver's queue may still hold messages of estop. The driver takes one for each call.
     assert estop.wait_for_all_acked(Duration(seconds=PATIENCE_S))
     release = probe.client(SetBool, "estop")
     for future in [release.call_async(SetBool.Request(data=False)) for _ in range(stops)]:

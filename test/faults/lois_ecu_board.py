@@ -2,7 +2,7 @@
 
 """The LOIS ECU in the fault campaign: lines of text, two wheels, no IMU.
 
-Messages are not compared with what was sent, because odometry is predicted.
+Published messages are not compared with the sent ones, because the driver predicts odometry.
 """
 
 from typing import Final

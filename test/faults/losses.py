@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stops on a line that loses bytes on the way to the board until the robot must be at rest.
+"""Stops of the robot while the line loses bytes on the way to the board.
 
-The stops run in real time. test/integrity/outbound.py measures the rate of failures in simulated
-time.
+The loss ends when the robot must be at rest. The stops run in real time. In simulated time,
+test/integrity/outbound.py measures the rate of failures.
 """
 
 import signal

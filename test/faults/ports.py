@@ -2,7 +2,7 @@
 
 """Boards whose port can be stuck, full or half-open, or can disappear without notice.
 
-This module knows descriptors and sockets; it does not know frames.
+This module does not depend on the format of the frames.
 """
 
 import contextlib

@@ -39,7 +39,7 @@ NEW_VARIANCE, GAP_MPS2 = 1e-4, 2.5
 ``GAP_MPS2``: largest acceleration in a gap of data, in m/s².
 """
 WRONG_ONE_IN: Final = 500
-"""If one byte in 100 is lost, at most one published message in this number may be wrong."""
+"""If one byte in 100 is lost, at most one of this number of messages may be wrong."""
 ENDS_WITHIN_S: Final = 2.0
 
 
@@ -67,7 +67,9 @@ class Findings:
 
 
 class Rig:
-    """Context manager of a driver and its simulated board, whose port is a symbolic link.
+    """Context manager that runs a driver and its simulated board.
+
+    By default, the driver's port is a symbolic link to the board's terminal.
 
     ``before``: Python code that runs in the driver's process before the driver.
 
@@ -161,7 +163,10 @@ class Rig:
             self._terminal, self._unplugged_at_s = None, time.monotonic()
 
     def plug(self) -> None:
-        """Make a new terminal. It has another name, but the same symbolic link."""
+        """Make a new terminal. It has another name, but the same symbolic link.
+
+        Before that, the board runs for the time in which it had no terminal.
+        """
         if self._unplugged_at_s is not None:
             for _ in range(round((time.monotonic() - self._unplugged_at_s) / TICK_S)):
                 self.line.advance()
@@ -274,7 +279,9 @@ class Rig:
     def judge_stream(self, damaged_bytes: bool = False) -> None:
         """Expect that the board has sent every published message, and that odometry does not jump.
 
-        ``damaged_bytes``: whether a few wrong messages are allowed.
+        Also check that timestamps increase, and that the driver rejected no readings.
+
+        ``damaged_bytes``: whether a few wrong messages and rejected readings are allowed.
         """
         imu, odom, sent = list(self.imu), list(self.odom), list(self.line.sent)
         one_in = WRONG_ONE_IN if damaged_bytes else math.inf

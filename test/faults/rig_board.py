@@ -20,11 +20,11 @@ class RigBoard:
 
     ``ports``: returns the driver's port parameters for the symbolic link of the board.
 
-    ``old_command``: the bytes of a motion command.
+    ``old_command``: the bytes of a motion command, with which tests fill the port.
 
     ``stop``: the last bytes to the board when a driver ends.
 
-    ``opening``: the first bytes to the board on a new line.
+    ``opening``: the first bytes to the board after its port is opened.
 
     ``tuning``: parameters that must refuse invalid values.
 
@@ -40,7 +40,7 @@ class RigBoard:
 
     ``silent_s``: longest usual pause between two transmissions of the board.
 
-    ``jump_stddevs``: allowed correction of predicted odometry, in its standard deviations.
+    ``jump_stddevs``: allowed correction of predicted odometry, in standard deviations of the pose.
 
     ``sent``: returns the frames of the board's last tick.
 

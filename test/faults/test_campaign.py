@@ -58,7 +58,7 @@ def test_random_input_from_ros_does_not_disturb_the_node(rig: Rig) -> None:
 def test_faults_in_random_order_and_at_once(rig: Rig) -> None:
     """Faults occur in random order, several at the same time. The robot rests in time, then obeys.
 
-    ``make soak`` runs a long walk.
+    ``make soak`` runs many more faults.
     """
     walk(rig, Random(0), steps=6)
     assert not rig.findings.take(), rig.driver.output

@@ -43,7 +43,7 @@ def test_a_terminal_that_is_closed_ends_the_driver_in_order(
 ) -> None:
     """The driver's terminal is closed, so the driver gets SIGHUP and cannot print.
 
-    It still stops the robot and exits in order.
+    It still stops the robot and exits with code 0.
     """
 
     def run(rig: Rig, end: Ending) -> None:

@@ -2,7 +2,7 @@
 
 """Tests of the launch files: what they start, and with which arguments and parameters.
 
-Where launch is not installed, the files are only parsed.
+Where launch is not installed, the tests that run a launch file are skipped.
 """
 
 import ast

@@ -43,9 +43,9 @@ EXTRAS = {
     "tools": ["matplotlib", "numpy", "rich", "rosbags", "scipy", "textual"],
 }
 
-# Two of these libraries, which rosdep does not install in a suitable version. It would get rosbags
-# from pip, which Ubuntu 24.04 refuses, and textual in the distribution's version. The README says
-# how to install them.
+# rosdep does not install these two libraries in a suitable version. It would get rosbags from pip,
+# which Ubuntu 24.04 refuses, and textual in the distribution's version. The README says how to
+# install both.
 FROM_PIP = {"rosbags", "textual"}
 
 # Modules for values and arithmetic; none waits, reads a clock or has side effects.

@@ -121,6 +121,6 @@ def test_no_docstring_begins_with_a_conjunction() -> None:
     assert fragments == []
 
 
-def test_every_exception_is_needed() -> None:
+def test_every_file_with_an_exception_exists() -> None:
     """Every file in ``ALLOWED`` still exists."""
     assert set(ALLOWED) <= set(texts())

@@ -20,7 +20,7 @@ def quick_folders() -> list[str]:
 
 
 def nodes_of_files_with(text: str) -> Iterator[tuple[str, ast.AST]]:
-    """Yield every node of the quick tests' files that contain ``text``, with the file's name."""
+    """Yield each syntax node of each quick test file with ``text`` in it, and the file's name."""
     for folder in quick_folders():
         for path in sorted((ROOT / folder).rglob("*.py")):
             if text in (source := path.read_text()):

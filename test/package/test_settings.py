@@ -94,9 +94,9 @@ def test_ros_reads_each_parameter_file(path: Path) -> None:
 
 
 def test_the_filter_fuses_the_drivers_velocities_and_gyro() -> None:
-    """The filter fuses velocities from odom, and the yaw rate from odom and the IMU.
+    """The EKF fuses velocities from odom, and the yaw rate from odom and the IMU.
 
-    Only the filter publishes TF.
+    The EKF publishes TF.
     """
     ekf = parameters("ekf.yaml", "/**")
     states = [

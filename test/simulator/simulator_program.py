@@ -30,7 +30,7 @@ def simulator(
 def toy(
     name: str, *arguments: str, stdin: int | IO[str] = subprocess.PIPE
 ) -> AbstractContextManager[subprocess.Popen[str]]:
-    """Run the simulator with a toy board, which is a module of the tests with this name."""
+    """Run the simulator with the toy board of the test module ``name``."""
     return _running(["-c", RUN_MODULE, name, *arguments], stdin)
 
 

@@ -68,9 +68,9 @@ def _time(duration: Duration) -> QosTime:
 class Recorder:
     """Records all topics that a driver publishes. The topics are found at run time.
 
-    ``types``: message types, such as "nav_msgs/msg/Odometry".
+    ``types``: the message type of each topic, such as "nav_msgs/msg/Odometry".
 
-    ``offered``: the driver's quality of service.
+    ``offered``: the quality of service that the driver offers on each topic.
     """
 
     def __init__(self, probe: Probe) -> None:

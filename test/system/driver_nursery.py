@@ -115,7 +115,7 @@ def end(control: socket.socket, process: "subprocess.Popen[bytes]") -> None:
 def serve(descriptor: int) -> None:
     """Fork a driver for each request that arrives on the socket ``descriptor``.
 
-    A request contains two pipes: one for the driver's output, and one for its exit code.
+    Two pipes come with each request: one for the driver's output, and one for its exit code.
     """
     import omnibot_driver.node  # noqa: F401, which takes most of the time
     from omnibot_driver import boards

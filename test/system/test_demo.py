@@ -42,7 +42,7 @@ poses = st.builds(Pose, coordinates, coordinates, st.floats(-10.0, 10.0))
 def test_steering_never_exceeds_the_speeds_of_the_demo(pose: Pose, leg: int) -> None:
     """The robot may have any pose.
 
-    The demo always commands motion, at most at its maximum speed.
+    The demo always commands motion, at most at the demo's maximum speed.
     """
     _, twist = square.steer(pose, leg)
     assert 0.0 < math.hypot(twist.vx_mps, twist.vy_mps) <= square.SPEED_MPS + 1e-9
@@ -164,7 +164,7 @@ def marked(mark: str, name: str = "") -> list[int]:
 
 
 def wait_until_all_have_ended(mark: str) -> None:
-    """Wait until all processes with the mark have ended. A driver's guard ends after it."""
+    """Wait until all processes with the mark have ended. A guard ends after its driver."""
     for pid in marked(mark):
         try:
             process = os.pidfd_open(pid)

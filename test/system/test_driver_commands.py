@@ -131,9 +131,9 @@ def test_a_zero_twist_is_the_stop_frame(
 
 
 def test_wheel_cmd_turns_the_wheels(probe: Probe, board: PtyBoard) -> None:
-    """A user commands a wheel to turn at 10 rad/s.
+    """A user commands wheel rates of 10, -10 and 0 rad/s. The wheels have a radius of 29 mm.
 
-    The driver sends 20 LSB for a radius of 29 mm.
+    The driver sends 20, -20 and 0 LSB.
     """
     commands = probe.publisher(Float32MultiArray, "wheel_cmd")
     commands.publish(Float32MultiArray(data=[10.0, -10.0, 0.0]))

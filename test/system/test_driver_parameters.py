@@ -310,10 +310,10 @@ def test_every_parameter_is_described(
 def test_a_speed_that_odometry_takes_as_impossible_is_refused_while_running(
     start_board: Start, start_driver: Start, probe_of: Start
 ) -> None:
-    """A user sets ``max_linear_speed`` above ``fastest_linear_speed``, the limit of odometry.
+    """A user sets ``fastest_linear_speed``, a limit of odometry, below ``max_linear_speed``.
 
-    The driver refuses this. It also refuses the same for the angular speeds. A request that raises
-    both parameters together is accepted.
+    The driver refuses this. It also refuses a ``max_angular_speed`` above
+    ``fastest_angular_speed``. A request that raises both linear speeds together is accepted.
     """
     board = start_board()
     probe: Probe = probe_of(start_driver(board.path))

@@ -70,7 +70,7 @@ def test_no_call_of_a_hundred_at_once_is_lost(probe: Probe) -> None:
 def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
     probe: Probe, driver: Driver
 ) -> None:
-    """A button publishes true on ``estop``, then false. The driver gets both messages at once.
+    """A button publishes true on ``estop``, then 50 times false. All messages arrive at once.
 
     The e-stop is still latched.
     """

@@ -125,7 +125,7 @@ def test_the_space_bar_latches_the_estop_and_two_keys_release_it(
 def test_who_lets_go_of_the_key_stops_the_robot(
     probe: Probe, driver: Driver, board: PtyBoard, monitor_of: Callable[..., PseudoTerminal]
 ) -> None:
-    """The user presses a key once. The monitor sends a motion command, then some zero commands.
+    """The user presses a key once. The monitor sends motion commands, then some zero commands.
 
     It sends another zero command when it ends.
     """

@@ -34,7 +34,10 @@ BUSY_S = 3.0
 ATTEMPTS = 5
 STALLED = "driver stalled for"
 OVERLOADED = ("did not run for", "not overloaded")
-"""The driver and the tool report with these texts that the computer was too busy."""
+"""Parts of the messages in which the tool reports that the computer was too busy.
+
+``STALLED`` is part of such a message of the driver.
+"""
 
 
 def yes(_question: str) -> str:

@@ -99,7 +99,10 @@ def test_allan_deviation_tells_a_wandering_bias_from_noise() -> None:
 
 @pytest.mark.parametrize(("seconds", "fitted"), [(50, False), (60, True)])
 def test_a_minute_of_readings_is_enough_for_the_walk_of_a_bias(seconds: int, fitted: bool) -> None:
-    """The bias drifts fast. A rest of a minute, the default, shows it; two readings are missing."""
+    """The bias drifts fast, and two readings are missing.
+
+    A rest of a minute, the default, shows the drift. A rest of 50 s does not.
+    """
     random = np.random.default_rng(3)
     steps = 2e-3 * random.standard_normal(100 * seconds - 2)
     found = noise(allan(np.cumsum(steps), 0.01))

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what ``calibrate commission`` concludes from wheel patterns, IMU postures and drifts."""
+"""Tests of what ``calibrate commission`` concludes from wheel patterns, IMU postures and drifts.
+
+A drift is the mean velocity of the robot over a time span.
+"""
 
 import math
 from itertools import product
@@ -256,7 +259,7 @@ def test_what_is_not_held_still_or_not_gravity_is_said() -> None:
 
 
 def steady(vx: float, vy: float = 0.0, yaw_rate: float = 0.0) -> Drift:
-    """Return a drift with a constant speed."""
+    """Return a drift with the same speed in both halves of its time span."""
     return Drift(vx, vy, yaw_rate, math.hypot(vx, vy), math.hypot(vx, vy))
 
 

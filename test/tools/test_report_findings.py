@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a report's findings on the messages of a drive: a healthy one, and ones with a fault."""
+"""Tests of a report's findings on the messages of a healthy drive, and of drives with a fault."""
 
 from dataclasses import replace
 
@@ -228,7 +228,7 @@ def test_what_an_estop_refuses_is_not_trouble(drive: Drive) -> None:
 def test_what_diagnostics_said_is_repeated(drive: Drive) -> None:
     """For each status of the diagnostics, the report gives the worst level and the message.
 
-    It also gives the number of times that the driver reported this level.
+    It also gives how often the status was not OK.
     """
     drive.statuses.append((9.5, "omnibot_driver: Time", 1, "measurements wait", {}))
     drive.statuses.append((10.5, "omnibot_driver: Time", 1, "measurements wait", {}))

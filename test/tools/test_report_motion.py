@@ -32,9 +32,9 @@ def drive() -> Drive:
 def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
     drive: Drive, factor: float, advice: str
 ) -> None:
-    """The measured gravity is only half or a quarter of the true one.
+    """The measured gravity is too small. The report calls this BAD.
 
-    The report recommends another accelerometer range.
+    If it is half or a quarter of the true one, the advice gives a factor for ``accel_range``.
     """
     drive.imu.values[:, 3:] *= factor
     gravity = said(drive, "IMU", "Gravity")
@@ -148,7 +148,7 @@ def test_a_sensor_of_a_fejemis_that_hangs_upside_down_is_noted(drive: Drive) -> 
 
 
 def test_the_advice_for_a_fejemis_names_only_its_parameters(drive: Drive) -> None:
-    """A Fejemis has wrong turns, gravity and directions. All advice names parameters that it has.
+    """A Fejemis has wrong turns, gravity and directions. All advice names parameters of a Fejemis.
 
     ``imu_rpy`` is an argument of the robot's description.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the configuration of Nav2 and of the filter for a Fejemis, and of its description."""
+"""Tests of the configuration of Nav2 and of the EKF for a Fejemis, and of its description."""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_gyro() -> None:
-    """The filter fuses only the velocities from odometry and the yaw rate of the gyro.
+    """The EKF fuses only the velocities from odometry and the yaw rate of the gyro.
 
     The board computes its yaw from the same gyro, so this yaw is not fused.
     """

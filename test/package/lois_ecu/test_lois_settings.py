@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the configuration of Nav2 and of the filter for the LOIS ECU."""
+"""Tests of the configuration of Nav2 and of the EKF for the LOIS ECU."""
 
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ def load(name: str) -> Any:
 
 
 def test_the_filter_fuses_velocities_and_the_heading() -> None:
-    """The filter fuses the velocities, and the heading relative to its first value.
+    """The EKF fuses the velocities, and the heading relative to its first value.
 
     It does not fuse the pose from the wheels.
     """

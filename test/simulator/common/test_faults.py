@@ -29,9 +29,9 @@ def test_a_line_without_faults_changes_nothing() -> None:
 def test_the_fate_of_a_byte_does_not_depend_on_how_the_stream_is_cut(
     cuts: list[int], seed: int
 ) -> None:
-    """The same bytes are sent whole and in chunks.
+    """A stream is sent in one piece and in chunks.
 
-    Each time, the same bytes are lost or changed, also in bursts.
+    Both times, the same bytes are lost or changed, also in bursts.
     """
     faults, data = LineFaults(lose=0.01, burst=0.005, flip=0.01), SENT[:2000]
     line = FaultyLine(faults, seed)
@@ -49,7 +49,7 @@ def test_single_bytes_are_lost_at_the_given_rate() -> None:
 
 
 def test_bursts_of_1_to_200_bytes_are_lost() -> None:
-    """Bursts of 1 to 200 bytes are lost. A burst has 100.5 bytes on average."""
+    """The number of lost bytes fits bursts of 1 to 200 bytes, which have 100.5 on average."""
     line = FaultyLine(LineFaults(burst=0.0005))
     arrived = line.carry(SENT)
     assert len(arrived) == len(SENT) - line.lost

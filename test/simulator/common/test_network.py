@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the network with faults around a simulated board, in the board's time."""
+"""Tests of the simulated network between a host and a simulated board, with its faults."""
 
 import pytest
 from hypothesis import given

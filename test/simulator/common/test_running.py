@@ -16,7 +16,7 @@ LATE_S = 0.7
 class Motor:
     """A board that drives until it receives a stop.
 
-    ``driven``: how many ticks the board has driven.
+    ``driven``: number of ticks in which the board has driven.
     """
 
     channels, tick_s = (Channel(),), 0.01

@@ -9,9 +9,9 @@ from fejemis_rig import DRIVE, FRONT, Rig
 
 
 def test_brush_and_lift() -> None:
-    """The lift takes 12 s from end to end at 6 V.
+    """``brush`` switches the brush. At 6 V, the lift takes 12 s from end to end.
 
-    The lift stops after the given time, or at 0 V.
+    The lift stops after the time in ``motv``, or at 0 V.
     """
     rig = Rig().booted()
     rig.say(FRONT, "brush 1", "motv 6 6")

@@ -58,7 +58,7 @@ def test_a_turn_on_the_spot_is_five_times_as_fast_as_commanded() -> None:
 def test_from_straight_ahead_a_turn_on_the_spot_surges_forward() -> None:
     """``rc`` commands a turn on the spot while the front wheel is straight.
 
-    Until the front wheel has reached 90°, both drive wheels turn forward.
+    At first both drive wheels turn forward, so the robot leaves its place.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0 57.29578", 2.0)
@@ -115,9 +115,9 @@ def test_backward_mirrored_turns_as_commanded(w_dps: float) -> None:
 
 @pytest.mark.parametrize("w_dps", [0.0, 40.0, -40.0])
 def test_backward_clamped_spins_the_wrong_way(w_dps: float) -> None:
-    """The robot should drive in reverse, with firmware that limits the angle of the front wheel.
+    """``rc`` commands reverse motion. The firmware limits the angle of the front wheel.
 
-    The front wheel turns to 90°, so the robot spins.
+    The front wheel turns to 90°, so the robot spins, against the commanded turn.
     """
     rig = Rig(firmware=Firmware(sums=False, reverse="clamped")).booted()
     rig.drive(f"rc 2 -0.3 {w_dps}", 4.0)

@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the two halves of the simulated Fejemis: their functions besides driving, and faults.
+"""Tests of the two halves of the simulated Fejemis: all functions except driving, and faults.
 
-A *half* is each of the two Teensys (drive or front).
+A *half* is one of the two Teensys (drive or front).
 """
 
 import json
@@ -18,7 +18,7 @@ MODULE = "omnibot_driver.simulator.fejemis"
 
 
 def angle_line(rig: Rig) -> tuple[float, int, int]:
-    """Return the front angle in degrees, the error flags, and the diagnosis.
+    """Return the front angle in degrees, and the angle sensor's error flags and diagnosis.
 
     The diagnosis is without the frame counter.
     """
@@ -65,8 +65,7 @@ def test_some_firmware_goes_on_after_start() -> None:
 def test_drive_that_restarts_lets_its_motors_go_and_forgets() -> None:
     """The drive half restarts.
 
-    The motors stop, and its pose, subscriptions, source and time are reset. The front half
-    continues.
+    The motors stop, and the half resets its pose and its subscriptions. The front half continues.
     """
     rig = Rig().booted()
     rig.say(DRIVE, "sub pose 20")
@@ -138,9 +137,9 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 @pytest.mark.parametrize("half", ["drive", "front"])
 @pytest.mark.parametrize("what", ["silent", "hung", "unplugged"])
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
-    """One half is lost and later comes back.
+    """One half is silent, hung or unplugged for a time.
 
-    The other half sends as usual, and the robot drives on.
+    The other half sends as usual, and the robot drives on. Only a silent half obeys commands.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)
@@ -156,7 +155,7 @@ def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
 
 
 def test_sums_can_begin_and_end_in_each_half() -> None:
-    """While it runs, one half begins to send checksums, and later stops sending them.
+    """One half begins to send checksums while it runs, and later ceases to send them.
 
     The other half sends no checksums.
     """

@@ -2,7 +2,7 @@
 
 """Tests of the text lines that the two simulated Teensys send and obey.
 
-A *half* is each of the two Teensys (drive or front).
+A *half* is one of the two Teensys (drive or front).
 
 Checksums, comments, subscriptions and firmware variants are tested.
 """
@@ -158,7 +158,7 @@ KEYS = {
 def test_each_value_comes_once_when_asked_for_and_by_subscription(port: int, key: str) -> None:
     """Each value can be requested once, or subscribed to, by its key in the help text.
 
-    All replies but the infrared's begin with that key.
+    Each reply begins with its key. Only the reply to ``ir`` begins with ``irc``.
     """
     rig = Rig().booted()
     rig.say(port, "leave")
@@ -266,7 +266,7 @@ def test_the_two_clocks_run_apart() -> None:
 
 @pytest.mark.slow
 def test_each_half_runs_its_cycles_by_its_own_clock() -> None:
-    """The clocks run too fast and too slow. Both halves send a heartbeat every 0.4 s of their time.
+    """One clock is fast, the other slow. Each half sends a heartbeat every 0.4 s by its own clock.
 
     So the time in a heartbeat is right within a millisecond, the duration of a cycle.
     """

@@ -23,7 +23,7 @@ LOW_PASS = WriteSetting(Setting.RPM_LOW_PASS, 1.0)
 class Rig:
     """A simulated board and its host.
 
-    ``heard``: all reports of the board, each with the time at which its ``run`` ended.
+    ``heard``: all reports of the board, each with the time at the end of its call of ``run``.
     """
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
@@ -45,7 +45,7 @@ class Rig:
         return found
 
     def say(self, *commands: Command) -> None:
-        """Send each command repeatedly until the board obeys it, because it may miss a line."""
+        """Send each command repeatedly until the board obeys it. The board may miss a line."""
         for command in commands:
             data = encode_command(command, with_sum=self.board._reader.checks)
             for _ in range(50):

@@ -2,8 +2,8 @@
 
 """Detectors of quirks in motion: how a board counts ticks, and how it measures and controls speeds.
 
-A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
-the quirk of its name.
+A quirk is a deviation from the manual. Each function is named after a quirk, and returns
+whether a board with ``quirks`` shows this quirk.
 """
 
 import math
@@ -32,7 +32,7 @@ def ticks_of_forward_targets(quirks: Quirks) -> bool:
 
 
 def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
-    """Return whether message 0x20 reports less than 75 % of a straight drive.
+    """Return whether message 0x20 reports less than 75 % of the distance driven straight.
 
     The controllers of both wheels are equal here.
     """

@@ -2,8 +2,8 @@
 
 """Detectors of quirks in communication: what a board receives, sends and records.
 
-A quirk is a deviation from the manual. Each function returns whether a board with ``quirks`` shows
-the quirk of its name.
+A quirk is a deviation from the manual. Each function is named after a quirk, and returns
+whether a board with ``quirks`` shows this quirk.
 """
 
 from dataclasses import replace

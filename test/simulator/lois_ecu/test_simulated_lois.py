@@ -237,9 +237,9 @@ def test_the_gps_moves_with_the_robot() -> None:
 
 
 def test_a_reboot_is_two_silent_seconds_and_forgets_all_but_the_place() -> None:
-    """The board reboots and is silent for 2 s. Then its ticks are zero, and its filter is not set.
+    """The board reboots and is silent for 2 s. Then its tick counts are zero.
 
-    The robot's true pose stays.
+    Its low-pass filter is not set, so it obeys no speed command. The robot's true pose stays.
     """
     rig = Rig().booted()
     rig.drive(20, 20, 4.0)
@@ -273,7 +273,7 @@ def test_a_reboot_restarts_the_clock(quirks: Quirks, unit_s: float) -> None:
 def test_a_reboot_switches_the_led_off_and_another_ball_may_drop_at_once() -> None:
     """The board gives a ball and reboots. The LED is off, and another ball drops at once.
 
-    Otherwise a second ball is refused for 6 s.
+    Without a reboot, the board refuses a second ball for 6 s.
     """
     rig = Rig().booted()
     rig.say(SetLed(True), DistributeBall())
@@ -296,7 +296,7 @@ def test_input_while_booting_is_kept_up_to_600_characters() -> None:
 def test_planted_errors_are_in_the_truth_alone() -> None:
     """The true wheels are 5 % larger than the board assumes.
 
-    So the board's odometry is too short.
+    So the distance in the board's odometry is too short.
     """
     rig = Rig(DOCUMENTED, wheel_radius_scale=(1.05, 1.05))
     rig.drive(20, 20, 10.0)

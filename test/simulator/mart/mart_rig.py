@@ -22,7 +22,7 @@ class Rig:
 
     ``replies``: all replies of the controller, each with its time.
 
-    ``took_s``: how long the last reply took, in s.
+    ``took_s``: the time for which ``wait`` waited for the last reply, in s.
     """
 
     def __init__(self, quirks: Quirks = FIRMWARE, **settings: object) -> None:
@@ -49,7 +49,7 @@ class Rig:
         return [reply.data.decode("latin-1") for reply in found]
 
     def wait(self, limit_s: float = 20.0) -> str | None:
-        """Return the next reply, or None after ``limit_s``, and store its time in ``took_s``."""
+        """Return the next reply and set ``took_s``, or return None after ``limit_s``."""
         began_s, until_s = self.now, self.now + limit_s
         while self.now < until_s:
             found = self.run(max(0.0, min(self.server.wake_at, until_s) - self.now))

@@ -255,7 +255,7 @@ def test_rmra_works_at_any_time(start: str) -> None:
 
 
 def test_enc_counts_the_right_wheel_alone_and_has_a_sign() -> None:
-    """The query ENC returns the count of the right wheel, with its sign, within 5 ms."""
+    """The query ENC returns the count of the right wheel, with its sign, after 5 ms."""
     rig = Rig(metres_per_count=0.001)
     rig.drive("R")
     spun = rig.number("ENC")

@@ -25,7 +25,7 @@ TEXTS = (
 
 
 def walk(rig: Rig, seed: int, steps: int) -> None:
-    """Send random requests and stops, and at times switch the IMU or restart the server."""
+    """Send random requests and stops. Sometimes switch the IMU off or on, or restart the server."""
     dice = random.Random(seed)
     for _ in range(steps):
         rig.run(dice.choice((0.0, 0.01, 0.1, 0.5, 2.0)))
@@ -185,7 +185,7 @@ def test_it_answers_in_process() -> None:
 
 
 def test_its_facts_are_known() -> None:
-    """The facts of the simulated controller, which the console shows, are those of its state."""
+    """The facts of the simulated controller, which the console shows, agree with its state."""
     board = mart.SimulatedMart(mart.MartSettings(imu_dies_s=0.0))
     board.receive(b"R", 0.0)
     for _ in range(1000):

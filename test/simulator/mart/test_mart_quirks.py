@@ -3,8 +3,8 @@
 """Tests that each quirk of the simulated MART server can be observed, and can be switched off.
 
 A quirk is a deviation from the manual. A function named after a quirk returns whether a server
-shows it. F, B and RM are drives, R and L spins, TF and MCR controlled moves. SM and SRM are stops;
-SL and SS are stops on the stop port.
+shows this quirk. F, B and RM are drives, R and L spins, TF and MCR controlled moves. SM and SRM
+are stops; SL and SS are stops on the stop port.
 """
 
 from collections.abc import Callable

@@ -83,7 +83,7 @@ def test_what_is_not_a_command_is_refused(text: str) -> None:
 def test_rmcs_with_one_number_is_refused(text: str) -> None:
     """A change of speed (RMCS) comes with one number instead of two. The server refuses it.
 
-    For other commands, the server does not check how many numbers come.
+    For some other commands, such as CS, the server does not check how many numbers come.
     """
     rig = Rig()
     rig.drive("RM 30")

@@ -32,7 +32,7 @@ def run(board: SimulatedBoard, seconds: float) -> bytes:
 def mode_of(board: SimulatedBoard) -> BoardMode:
     """Return the board's mode.
 
-    With a function, a type checker does not assume that the mode is unchanged.
+    Tests call this function, because a type checker assumes that ``board.mode`` never changes.
     """
     return board.mode
 

@@ -86,7 +86,7 @@ def test_driving_off_to_the_left_is_felt_on_minus_y() -> None:
 def test_a_curve_is_felt_as_centripetal_acceleration(
     x: int, y: int, felt_mps2: tuple[float, float]
 ) -> None:
-    """In a left curve, the IMU measures 0.5 m/s² to the left.
+    """In a left curve, the IMU measures 0.5 m/s² to the left of the motion.
 
     The sensor is mounted upside down, so y is reversed.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the manual's state machine: the modes of a board, and which bytes each mode obeys."""
+"""Tests of the manual's state machine: the modes of a board, and which bytes it obeys in each."""
 
 import pytest
 from board_talk import (

@@ -126,7 +126,7 @@ def test_the_rhythm_of_deltas_and_poses_goes_on_through_a_pause() -> None:
 
 
 def drive_square(board: SimulatedBoard) -> None:
-    """Drive four sides of 1 m, two of them sideways, and turn by 90 degrees half-way."""
+    """Drive four sides of 1 m, two of them sideways. Turn by 90 degrees after the second side."""
     legs = [velocity(35, 0, 0), velocity(0, 35, 0)] * 2
     for leg, command in enumerate(legs):
         board.receive(command)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of errors that the simulator can have, so that a calibration can find them."""
+"""Tests of errors of the simulated robot, such as a reversed axis, for tests of calibrations."""
 
 import struct
 from math import pi, radians

@@ -32,7 +32,7 @@ def is_in(mode: BoardMode) -> Callable[[SimulatedBoard], bool]:
 
 
 def test_a_program_can_wake_start_and_stop_the_board_through_the_terminal() -> None:
-    """A program wakes and starts the board through the terminal.
+    """A program wakes, stops and starts the board through the terminal.
 
     Bytes such as FF pass unchanged.
     """

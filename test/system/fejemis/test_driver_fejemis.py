@@ -103,7 +103,9 @@ def test_a_range_is_published_with_an_integer_that_was_set_while_it_runs(probe: 
     probe.wait_for(lambda: ranges and ranges[-1].max_range == 2.0)
 
 
-def test_brush_lift_and_light_obey_and_end_with_the_estop(robot: TwoPorts, probe: Probe) -> None:
+def test_brush_lift_and_light_obey_and_the_estop_ends_brush_and_lift(
+    robot: TwoPorts, probe: Probe
+) -> None:
     """The user latches the e-stop while brush and lift work. The driver switches both off.
 
     Both stay off after the release.
@@ -183,7 +185,7 @@ def test_a_pause_is_seen_in_the_heartbeat(robot: TwoPorts, probe: Probe) -> None
 def test_whatever_ends_the_driver_stops_it(new: New, number: signal.Signals) -> None:
     """A signal ends or suspends the driver during a drive.
 
-    The robot, the brush and the lift stop.
+    The robot and the brush stop, and the lift stays off.
     """
     robot, driver, probe = new
     assert probe.call(SetBool, "brush", data=True).success

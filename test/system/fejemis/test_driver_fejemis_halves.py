@@ -2,7 +2,7 @@
 
 """Tests of the driver with a Fejemis whose halves are lost, swapped, broken or of another kind.
 
-A *half* is each of the two Teensys (drive or front).
+A *half* is one of the two Teensys (drive or front).
 """
 
 from collections.abc import Callable

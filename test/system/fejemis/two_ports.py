@@ -2,7 +2,7 @@
 
 """A simulated Fejemis on two pseudo-terminals, each of which can be unplugged alone.
 
-This module knows descriptors and bytes; it does not know the meaning of the bytes.
+This module passes the bytes on, and does not depend on their meaning.
 """
 
 import select
@@ -89,7 +89,7 @@ class TwoPorts(InBatches[SimulatedFejemis]):
     def stands_for_good(self) -> None:
         """Wait until both driving wheels have been at rest for 0.8 s.
 
-        This is longer than a command lasts.
+        A command expires in a shorter time.
         """
         since: list[int] = []
 

@@ -39,7 +39,7 @@ class Ecu:
     def stands_for_good(self) -> None:
         """Wait until the robot has been at rest for 0.8 s.
 
-        This is longer than a command lasts.
+        A command expires in a shorter time.
         """
         since: list[int] = []
 
