@@ -72,7 +72,7 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
 ) -> None:
     """A button publishes true on ``estop``, then 50 times false. All messages arrive at once.
 
-    The e-stop is still latched.
+    The e-stop is still latched after the driver has taken them all.
     """
     latched = probe.listen(Bool, "omnibot_driver/estop_active", latched=True)
     button = probe.publisher(Bool, "estop", 100)
@@ -82,6 +82,10 @@ def test_a_press_on_the_topic_is_not_wiped_out_by_what_comes_after_it(
         button.publish(Bool(data=False))
     driver.process.send_signal(signal.SIGCONT)
     probe.wait_for(lambda: latched and latched[-1].data)
+    pressed = len(latched)
+    for _ in range(60):  # the driver takes at least one message for each call
+        assert probe.call(Trigger, "reset_odometry").success
+    assert all(message.data for message in latched[pressed - 1 :])
 
 
 def test_pause_and_unpause_are_idempotent_although_p_toggles(probe: Probe, board: PtyBoard) -> None:

@@ -50,7 +50,10 @@ def test_a_loss_that_the_driver_counts_is_laid_to_the_line(drive: Drive) -> None
     drive.imu.drop(6.0, 6.1)
     for at_s, *_, values in drive.statuses:
         values["IMU frames lost"] = "7" if at_s < 7.0 else "17"
-    assert "has counted 10 messages that were lost on the line" in said(drive, "Gaps", "imu/data_raw").advice
+    assert (
+        "has counted 10 messages that were lost on the line"
+        in said(drive, "Gaps", "imu/data_raw").advice
+    )
 
 
 def test_a_long_gap_is_worse(drive: Drive) -> None:

@@ -62,8 +62,7 @@ def envelope(times_s: Array, values: Array) -> tuple[Array, Array]:
     if len(times_s) <= POINTS:
         return times_s, values
     size = -(-len(times_s) // (POINTS // 2))
-    whole = len(times_s) // size * size
-    rows = values[:whole].reshape(-1, size)
+    rows = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
     both = np.sort(np.stack([rows.argmin(axis=1), rows.argmax(axis=1)], axis=1), axis=1)
     picked = (both + np.arange(len(rows))[:, None] * size).ravel()
     return times_s[picked], values[picked]
