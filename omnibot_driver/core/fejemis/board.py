@@ -268,7 +268,7 @@ class FejemisBoard(Board):
         return self.stop() + self._all_off()
 
     def start_requested(self) -> None:
-        """Forget faults of the front wheel, and cancel a requested power-off.
+        """Forget that the front wheel did not reach its angle, and cancel a requested power-off.
 
         This happens whenever the user calls ~/start, even during an e-stop.
         """
@@ -317,7 +317,7 @@ class FejemisBoard(Board):
         return min(wake_at, self._inbound.watch.wake_at) if self.mode is Mode.NOMINAL else wake_at
 
     def due(self, now: float) -> Packets:
-        """Return the packets to send now: the relayed front angle, ``start``, and requests."""
+        """Return the packets to send now: the front angle, ``start``, and those of ``Upkeep``."""
         packets = NO_PACKETS
         if (angle_rad := self._inbound.take_relay()) is not None:
             text = self._relay.text(angle_rad, sums=self.with_sums)

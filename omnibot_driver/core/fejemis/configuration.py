@@ -92,7 +92,10 @@ class Configuration:
 
     @property
     def pending(self) -> bool:
-        """Whether the board is new and may lack the user's settings, so that it must not drive."""
+        """Whether the board is new and may lack the user's settings.
+
+        If so, the robot must not be driven.
+        """
         if self._new and (self._next_at == math.inf or not self._unwritten()):
             self._new = False
         return self._new

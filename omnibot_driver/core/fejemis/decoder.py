@@ -23,7 +23,7 @@ CHANGED_AFTER: Final = 2
 
 @dataclass(slots=True)
 class DecoderStatistics:
-    """Counts since construction.
+    """Counters of one board's lines, which continue over all connections.
 
     ``faults``: how many lines were damaged or of an unknown kind.
     """

@@ -108,10 +108,10 @@ class Encoder:
         return self.stop()
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the body twist that ``packets`` command at the present front angle.
+        """Return the body twist that ``packets`` command at the front angle used by ``encode``.
 
-        The caller passes packets that were sent. Packets other than the last result of ``encode``
-        are regarded as a stop.
+        The caller passes packets that were sent. Packets other than the last result of ``encode``,
+        or passed a second time, are regarded as a stop.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -105,7 +105,8 @@ class FrontWheel:
     def _reachable(self, angle_deg: float, now: float) -> bool:
         """Return whether the wheel can have reached the angle.
 
-        A larger jump is accepted if the next angle confirms it.
+        The first angle is always accepted. An angle after a jump that is too large for the wheel is
+        rejected, unless it confirms the angle that was rejected just before it.
         """
         doubted, self._doubted_deg = self._doubted_deg, None
         within_deg = LEAP_DEG + FASTEST_DEGPS * max(0.0, now - self.heard_at)

@@ -49,7 +49,7 @@ MANY: Final = 30
 """How many damaged or unknown lines per second are tolerated. The drive board sends about 400 lines
 per second, the front board about 85."""
 SILENT_S: Final = 1.5
-"""Silence in s after which a board is regarded as gone."""
+"""Time in s without a valid line, after which a board is regarded as silent."""
 _UNHANDLED: Final = re.compile(r"unhandled: '(.*)'")
 
 
@@ -158,7 +158,7 @@ class Half:
         return self._next_at if self._unsure_at is None else min(self._next_at, self._ask_at)
 
     def due(self, now: float) -> list[bytes]:
-        """Return the lines to send now: a request for the heartbeat, or missing subscriptions."""
+        """Return the lines to send now: missing subscriptions, and a request for the heartbeat."""
         texts = self._subscriptions(now)
         if self.unsure and now >= self._ask_at:
             self._ask_at = now + ASK_AGAIN_S
@@ -220,7 +220,7 @@ class Half:
         return True
 
     def _identify(self, identity: int) -> None:
-        """Accept the first identity at once, but another one only after two equal heartbeats."""
+        """Accept the first identity at once, but another one only from two heartbeats in a row."""
         told, self._told = self._told, identity
         if self.heartbeat is None or identity == told:
             if identity != self.identity:
@@ -251,7 +251,10 @@ class Half:
 
 
 def keyword_of(message: Message) -> str:
-    """Return the keyword of the message's stream; empty if the message belongs to no stream."""
+    """Return the keyword of the message's stream.
+
+    The result is empty for a heartbeat, and for a message that belongs to no stream.
+    """
     if isinstance(message, Distance):
         return message.keyword
     return _KEYWORDS.get(type(message).__name__, "")

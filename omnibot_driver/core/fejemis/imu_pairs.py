@@ -27,14 +27,14 @@ PAIR_WITHIN_S: Final = 0.005
 """If the second line of a pair arrives this time in s or more after the first line, the pair may be
 false. It must then wait for the next pose."""
 SILENT_S: Final = 0.1
-"""Silence in s after which a pair must wait for the next pose, although it is not false.
+"""Silence in s after which a pair must wait for the next pose, even if its lines come together.
 
-The pose shows whether the board was silent, or the host only read late. After a silence, the
-sampling time of the pair is unknown, so the pair is rejected.
+The pose shows whether the board was silent, or the host only read late. If the board was silent,
+the sampling time of the pair is unknown, so the pair is rejected.
 """
 WARY_S: Final = 1.0
-"""Time in s after a stall of the driver in which every pair must wait for the next pose. Lines were
-lost if the kernel's buffer was full, although no silence shows it."""
+"""Time in s after a stall of the driver in which every pair must wait for the next pose. In the
+stall, the kernel's buffer may have overflowed. Lines were then lost without a silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
 """``KNOWN_S``: difference in s that shows which line of a sample comes first. It is the sum of the
@@ -50,8 +50,8 @@ MOST: Final = 10
 """Largest magnitude of a counter that shows whether lines of another kind usually come between
 pairs (positive) or within pairs (negative). Each kind has its own counter."""
 UNPOSED: Final = 20
-"""How many gyro or acceleration lines may come while a pair that may be false waits for a pose. If
-more come, the pair is rejected."""
+"""How many gyro lines, or how many acceleration lines, may come after the last pose while a pair
+waits for the next pose. If more come, the pair is rejected."""
 
 
 @dataclass(slots=True)
@@ -150,8 +150,8 @@ class ImuPairs:
         """Receive the board's time of a pose, and accept or reject all pairs that still wait.
 
         The time since the previous pose shows how many gyro and acceleration lines were sent. If
-        lines of both kinds are missing, or this is the first pose, any of the pairs may be false,
-        so all are rejected.
+        lines of both kinds are missing, any of the pairs may be false, so all are rejected. The
+        same holds for the first pose, and for a pose with an earlier time than the previous one.
         """
         self.other("pose")
         periods = (time_s - self._pose_s) / PERIOD_S

@@ -28,7 +28,7 @@ UNSEEN: Final = ({"0", "3"}, {"1", "2"})
 """Pairs of digits whose codes add up to 99: a checksum does not detect the loss of both."""
 CALIBRATED_WITHIN_S: Final = 8.0
 ANSWERED_WITHIN_S: Final = 4.5
-"""``CALIBRATED_WITHIN_S``: time in s after which a calibration ends as failed.
+"""``CALIBRATED_WITHIN_S``: time in s from the request, after which a calibration ends as failed.
 ``ANSWERED_WITHIN_S``: the same for any other job."""
 CALIBRATION_S: Final = 1.2
 """Duration of a calibration in s; the board averages its readings for about a second."""
@@ -36,7 +36,8 @@ AGAIN_S: Final = 0.4
 SAID: Final = 3
 """How many times the line of a job is sent, except for a calibration."""
 UNCHANGED_S: Final = 2.4
-"""Time in s after which unchanged offsets show that the command to calibrate was lost."""
+"""Time in s since a command to calibrate. If the offsets are still unchanged after this time, the
+command was probably lost."""
 CALIBRATIONS: Final = 2
 """How often a calibration is commanded at most, if the offsets stay unchanged."""
 
@@ -61,9 +62,9 @@ def whole_seconds(delay_s: float) -> int:
 
 
 class Jobs:
-    """The running job.
+    """Runner of jobs, at most one at a time.
 
-    ``done``: results that the caller has to take.
+    ``done``: results of ended jobs, which the caller has to take.
 
     ``powering_off``: whether the drive board will soon cut the power.
 

@@ -20,8 +20,8 @@ BRUSH_AGAIN_S: Final = 1.0
 """Period in s at which ``brush 1`` is repeated while the brush is on, because a line may be lost.
 """
 PACE_S: Final = 0.05
-"""Shortest time in s between two lift lines, or two light lines. Only the newest command is
-sent."""
+"""Shortest time in s between two lift lines, or two light lines. Of the commands in this time, only
+the newest is sent. A stop of the lift is sent at once."""
 MOST_VOLTS: Final = 12.0
 LEAST_VOLTS: Final = 0.1
 LEAST_PART: Final = 0.45
@@ -159,8 +159,9 @@ class Machine:
 def lift_line(volts: float, longest_s: float) -> tuple[bytes, float]:
     """Return the line that moves the lift (``motv``), and its run time in s.
 
-    The numbers are chosen so that the checksum detects damage to the line. For each voltage from
-    ``LEAST_VOLTS`` to ``MOST_VOLTS`` there is such a number from ``LEAST_PART`` of it on.
+    The numbers are chosen so that the checksum detects damage to the line. So the sent voltage may
+    be lower than ``volts``, but it is at least ``LEAST_PART * volts``. Such a voltage exists for
+    all ``volts`` from ``LEAST_VOLTS`` to ``MOST_VOLTS``.
     """
     if not volts:
         return OFF[0], 0.0

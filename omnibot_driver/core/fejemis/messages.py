@@ -2,7 +2,7 @@
 
 """The messages that the two boards send: one class for each kind of line.
 
-Units are the boards': degrees, m/s², µT, V, A, m, s.
+Units are the boards': m, m/s, m/s², s, µT, V, A, and degrees or rad as each class says.
 """
 
 from dataclasses import dataclass

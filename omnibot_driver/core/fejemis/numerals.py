@@ -6,8 +6,8 @@ The checksum is the sum of a line's character codes, modulo 99. So it does not c
 characters are lost whose codes add up to 99: ``1`` and ``2``, ``0`` and ``3``, ``.`` and ``5``,
 ``-`` and ``6``. A line should not contain both characters of such a pair.
 
-Each motion line begins with ``rc 2``, so its numbers must not contain ``1``. Values between .0999
-and .200 therefore cannot be sent.
+Each motion line begins with ``rc 2``, so its numbers must not contain ``1``. Therefore, values
+between .0999 and .200, for example, cannot be sent.
 """
 
 from bisect import bisect_left, bisect_right

@@ -20,7 +20,9 @@ START_AGAIN_S: Final = 0.2
 
 
 class Obedience:
-    """Whether the drive board obeys, and why not.
+    """State that shows whether the drive board obeys motion commands, and why not.
+
+    ``estopped``: whether the driver's e-stop is latched.
 
     ``source``: the last rcSource, the source of the commands that the board obeys; None before the
     first heartbeat.

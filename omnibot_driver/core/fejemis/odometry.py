@@ -23,7 +23,7 @@ poses can be wrong by half a unit, and the robot's rotation mixes both axes."""
 SLACK_M: Final = 0.02
 SLACK_RAD: Final = 0.06
 """``SLACK_M``, ``SLACK_RAD``: largest accepted deviation of a pose from the wheels' motion, in m
-and rad. The motion that an acceleration of ``SPEED_UP_MPS2`` can cause is added to it."""
+and rad. The motion that an acceleration of ``SPEED_UP_MPS2`` can cause is added to these limits."""
 SPEED_UP_MPS2: Final = 3.0
 FASTEST_MPS: Final = 4.0
 FASTEST_RADPS: Final = 12.0
@@ -34,8 +34,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""If this number of poses in a row are rejected, but each agrees with the pose before it, the board
-has begun a new coordinate frame."""
+"""If this number of poses in a row are rejected, but each agrees with the rejected pose before it,
+the board has begun a new coordinate frame."""
 
 
 class PoseOdometry:
@@ -55,7 +55,10 @@ class PoseOdometry:
         self.begin()
 
     def begin(self) -> None:
-        """Begin a new connection. Keep the last pose, because the board may have kept its frame."""
+        """Begin a new connection, but keep the last pose.
+
+        The board may still use the same coordinate frame.
+        """
         self._doubted: BoardPose | None = None
         self._agreed = 0
         """How many rejected poses in a row agreed with the rejected pose before them."""
@@ -70,7 +73,7 @@ class PoseOdometry:
         return speeds is not None and max(map(abs, (speeds.left_mps, speeds.right_mps))) > STILL_MPS
 
     def forget(self) -> None:
-        """Forget the last pose, because the board has restarted and begun a new frame."""
+        """Forget the last pose, because the board has restarted in a new coordinate frame."""
         self._restarted |= self._pose is not None
         self._settled_s = -math.inf
         self._pose = None
@@ -131,8 +134,8 @@ class PoseOdometry:
         if seconds < LEAST_S or not _possible(way, seconds):
             self._agreed = 0
             return None
-        # Two rejected poses agree. If the robot cannot have reached the second, the board may have
-        # begun a new frame (command ``enc0``).
+        # Two rejected poses agree. If the robot can have reached the second, it is accepted.
+        # Otherwise, the board may have begun a new coordinate frame (command ``enc0``).
         since_s = pose.time_s - self._pose.time_s
         whole = log_of(self._told.way_to(_place(pose)))
         self._agreed += 1

@@ -18,8 +18,8 @@ def line(text: bytes, *, sums: bool) -> bytes:
     """Return the bytes of one line with its line end; ``sums``: whether to add the checksum."""
     if not sums:
         return text + b"\n"
-    # The boards ignore empty lines. The line itself stays as it is: a board may compare it with
-    # ``stop``.
+    # If damage to the line could be undetected, an empty line comes before it. The boards ignore
+    # empty lines. The text itself is not changed: a board may compare it with ``stop``.
     before = b"" if robust(text) else b"\n"
     return before + with_sum(text) + b"\n"
 
@@ -30,9 +30,9 @@ def lines(*texts: bytes, sums: bool) -> bytes:
 
 
 def robust(text: bytes) -> bool:
-    """Return whether the checksum of this text detects the loss of two characters of these kinds.
+    """Return whether the checksum of ``text`` detects that two particular characters are lost.
 
-    One character is a line end or a digit of the checksum. The other is ``;`` or part of a number.
+    One is a line end or a digit of the checksum. The other is ``;`` or part of a number.
     """
     # A lost line end joins two lines. The joined line is accepted if the character whose code is
     # the sum of the second line with its prefix is lost too. So this sum must not be the code of

@@ -2,8 +2,8 @@
 
 """Writes motion lines (``rc``) without a checksum. Their form limits the effect of damage.
 
-If a decimal point, a digit after it or a minus sign is lost, the board obeys a wrong number until
-the next line.
+Some damage still has an effect: if a decimal point, a digit after it or a minus sign is lost, the
+board obeys a wrong number until the next line.
 """
 
 import math

@@ -26,8 +26,8 @@ turn on the spot may begin. Other motion has full speed up to the same deviation
 ``STILL_ALIGNED_RAD``: largest deviation at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad, at which full speed is allowed. At a
-larger deviation, the speed is limited, so that the error of the body's velocity does not grow."""
+"""Deviation of the front wheel from its target angle, in rad. At a larger deviation, the speed is
+limited: the error of the body's velocity must not exceed that at full speed and ``GIVEN_RAD``."""
 
 
 @value(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def outer_mps(twist: BodyTwist, track_m: float) -> float:
 def steer(
     wanted: BodyTwist, geometry: Geometry, angle_rad: float | None, *, turning: bool
 ) -> Steered:
-    """Return the command for both boards.
+    """Return the command for both boards that gives the body the twist ``wanted``.
 
     ``angle_rad``: the front wheel's measured angle; None while unknown.
 

@@ -2,8 +2,8 @@
 
 """Converts a Teensy's time to the host's time, and gives all readings their timestamps.
 
-Input: times of the board, and when the lines with them arrived. Lines arrive late, never early. So
-the conversion is a straight line just below all arrival times, fitted by
+Input: times of the board, and when the text lines with these times arrived. Text lines arrive late,
+never early. So the conversion is a straight line just below all arrival times, fitted by
 ``core/timing/clock_fit.py``. docs/internals/time.md explains why.
 """
 
@@ -26,8 +26,8 @@ AGAIN: Final = 3
 AGAIN_AFTER_S: Final = 0.05
 AGREE_S: Final = 0.1
 """``AGAIN``, ``AGAIN_AFTER_S``, ``AGREE_S``: a new clock begins after ``AGAIN`` implausible board
-times in a row. They must arrive over at least ``AGAIN_AFTER_S``, in s. Since the first of them,
-board time and arrival time must have advanced equally, within ``AGREE_S``, in s."""
+times in a row. The last must arrive at least ``AGAIN_AFTER_S`` s after the first. Between the first
+and each later one, board time and arrival time must advance equally, within ``AGREE_S`` s."""
 EARLIES_WITHIN_S: Final = 1.0
 """Time in s. If three lines (``AGAIN``) within this time seem to arrive early, the clock began with
 a late line, and must begin again. The three lines need not come in a row: a line between them may
@@ -54,7 +54,7 @@ class TeensyClock:
         self._fit: ClockFit | None = None
         self._odd: tuple[float, float] | None = None
         self._odds = 0
-        """``_odds``: how many implausible times came in a row.
+        """``_odds``: how many implausible times in a row agree with each other.
 
         ``_odd``: the first of these times, and when it arrived.
         """
@@ -121,7 +121,8 @@ class TeensyClock:
         # Lines that arrive in a shorter time may only have waited for a stalled host.
         if self._odds < AGAIN or now - self._odd[1] < AGAIN_AFTER_S:
             return False
-        self.restarted = board_s < self._last_s  # a later time: earlier lines were late
+        # A later board time does not show a restart: the earlier lines arrived late.
+        self.restarted = board_s < self._last_s
         self._begin_at(board_s, now)
         return True
 

@@ -69,7 +69,10 @@ class Translation:
         self._imu.unit = settings.acceleration_unit
 
     def connect(self) -> None:
-        """Forget the state of earlier connections, except the last pose."""
+        """Begin a new connection: forget the front angle, wheel speeds and IMU lines.
+
+        The last pose and the state of the battery are kept.
+        """
         self.front.begin()
         self.odometry.begin()
         self._begin_imu()
@@ -139,7 +142,10 @@ class Translation:
                 self.extra(RangeReading("sonar", _seen(message.distance_m)), now)
 
     def settle(self, clock: TeensyClock, now: float) -> None:
-        """Add all complete IMU samples; call this after a pose and at the end of a read."""
+        """Add the IMU samples and orientations up to the first sample that must wait for a pose.
+
+        The caller calls this method after a pose and at the end of a read.
+        """
         for item in self._pairs.take():
             if isinstance(item, Pair):
                 self._sample(item, clock)

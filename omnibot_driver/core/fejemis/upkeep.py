@@ -112,7 +112,7 @@ class Upkeep:
 
     @property
     def pending(self) -> str:
-        """Why a newly connected board must not drive the robot yet; empty once it is configured."""
+        """Why the robot must not be driven while a new board is being configured; else empty."""
         for configuration in self.configurations.values():
             if configuration.pending:
                 return (

@@ -61,7 +61,7 @@ class Watch:
     def look(self, now: float, *, driving: bool) -> bool:
         """Check all timeouts, and add notices of the new ones.
 
-        Return whether a board no longer sends the data stream that driving requires.
+        Return whether this call finds the loss of a data stream that driving requires.
         """
         self._look_at_reads(now)
         if self._stalled:
@@ -105,7 +105,7 @@ class Watch:
         if unheard_s < FLOWS_S:
             if half.unsure:
                 half.ready = False
-            elif unheard_s <= 0.0:  # needs the stream itself, not only a heartbeat
+            elif unheard_s <= 0.0:  # a line of this stream has just arrived
                 half.ready = True
         elif half.ready and unheard_s > SILENT_S and now >= self._patient_until:
             what = "is silent" if silent else f"no longer sends `{NEEDED[role]}`"

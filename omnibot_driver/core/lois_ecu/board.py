@@ -251,7 +251,10 @@ class LoisEcuBoard(Board):
             self._say_reset_again(now)
 
     def encode(self, order: Order) -> Packets:
-        """Return the lines that command ``order``. Raises CommandRefused for a goal pose."""
+        """Return the lines that command ``order``. Raises CommandRefused for a goal pose.
+
+        It is raised for any motion while a mode or its change forbids motion.
+        """
         match order:
             case Drive(twist):
                 return packed(self._ecu.velocity(twist))

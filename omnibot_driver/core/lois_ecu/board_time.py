@@ -68,7 +68,7 @@ class BoardTime:
         self.stddev_s = UNKNOWN_S
 
     def sent(self, lines: int) -> None:
-        """Record that the board has sent ``lines`` more lines. Its clock may stop meanwhile."""
+        """Record that the board has sent ``lines`` lines. Its clock may have stopped meanwhile."""
         self._lines += lines
 
     def late_s(self, counts: int, unit: ClockUnit | None, now: float) -> float:

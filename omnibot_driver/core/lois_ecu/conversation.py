@@ -180,7 +180,8 @@ class LoisConversation:
     def stands(self, now: float) -> bool | None:
         """Return whether the robot is at rest after a Stop. None if the ticks cannot show it.
 
-        The ticks show nothing if they are old, and after a backward command or RPM 0/0.
+        The ticks show nothing if they are old. Those of the public firmware also show nothing after
+        a backward command or RPM 0/0.
         """
         points, translation = self._points, self._translation
         if points.stood:
@@ -225,8 +226,8 @@ class LoisConversation:
         """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
 
         Called at the time ``wake_at``. ``proved``: whether displacements have proved that the
-        robot stands still. A terminal mode begins after this proof, because no displacements
-        arrive in a terminal mode.
+        robot stands still. A terminal mode begins after this proof, or after 2 s of Stop, because
+        no displacements arrive in a terminal mode.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal
@@ -300,7 +301,7 @@ class LoisConversation:
         self._upkeep.writer.begin(now)
 
     def say(self, command: Command, now: float) -> None:
-        """Send ``command`` several times, because lines may be lost.
+        """Queue ``command``, to be sent several times, because lines may be lost.
 
         A repetition must be harmless.
         """

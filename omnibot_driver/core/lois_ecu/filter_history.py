@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""History of a filter's states, to which the filter returns if a restart is noticed late.
+"""Stored states of a filter, to which it returns if a restart of the board is noticed late.
 
 This module works on states and times. It does not know what a state means.
 """

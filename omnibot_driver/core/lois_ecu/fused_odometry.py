@@ -11,7 +11,7 @@ from omnibot_driver.core.odometry.covariance import Covariance
 
 Source = Literal["standing", "ticks", "ticks and heading", "commands and heading", "commands"]
 """Data from which the motion since the last estimate was computed. "standing" means that the robot
-is at rest."""
+is at rest. The heading is that of the board's odometry, not that of the compass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class FusedOdometry:
     ``displacement``: motion since the previous estimate, in the robot's axes at that estimate.
 
     ``wheel_ways_m``: distances of the board's left and right wheel since the previous estimate, at
-    nominal wheel size.
+    the wheel radius in the settings.
     """
 
     stamp_s: float

@@ -43,8 +43,8 @@ group, and that of the previous group with the same command byte.
 The longest pause is at least ``QUIET_S`` and at most ``LATE_S``.
 """
 
-# Lines after the marker. The public firmware sends odometry (6 lines) with the command byte of the
-# ticks (3 lines).
+# Numbers of lines after the marker line. The public firmware sends odometry (6 lines) with the
+# command byte of the ticks (3 lines).
 _LENGTHS: Final = {
     Code.GPS_POSITION: (2,),
     Code.TICKS: (3, 6),
@@ -113,7 +113,7 @@ class Assembler:
         code, payload = line.command, line.payload
         if code in _LENGTHS:
             self._record.cut_off()
-            # After such a pause, the line may belong to the next group.
+            # After a long pause, the line may belong to the next group.
             late = now - self._at > self._late_s.get(code, LATE_S)
             found: list[Timed] = self._end(now) if late else []
             if payload == MARKER and not self._may_be_minus_one(code):
@@ -208,7 +208,7 @@ class Assembler:
         if self._done:
             return []
         payloads = self._payloads
-        if MARKER in payloads and len(payloads) != 3:  # the marker was not a count
+        if MARKER in payloads and len(payloads) != 3:  # it was a marker, not a count of -1
             self.statistics.damaged_groups += 1
             payloads = payloads[payloads.index(MARKER) + 1 :]
         group = _group(code, payloads)

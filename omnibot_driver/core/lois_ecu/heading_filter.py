@@ -53,9 +53,9 @@ class HeadingFilter:
 
         ``yaw_rad``: yaw of the odometry when the heading arrived.
         """
-        # A heading is accepted if it turned like the odometry, or when ``SURE_AFTER`` further
-        # headings agree. If the robot should face north, headings of about ±120 degrees are
-        # rejected even then.
+        # A heading is accepted if it changed by about as much as the odometry's yaw, or when
+        # ``SURE_AFTER`` further headings agree. If a heading near north is expected, headings of
+        # about ±120 degrees are rejected even then.
         if self._last is not None and _goes_on(self._last, heading_deg, yaw_rad):
             self._last, self._other, self._agreed = (heading_deg, yaw_rad), None, 0
             return True

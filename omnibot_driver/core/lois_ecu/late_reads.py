@@ -18,7 +18,7 @@ from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
 """Shortest time in s without a report after which the times of several tick reports that arrive
-together are corrected. The odometry expects shorter delays."""
+together are corrected. Shorter delays are left to ``BoardTime``."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
 """Factor by which the times between reports are increased. The rate of the clock is not known
@@ -28,7 +28,7 @@ factor, they drift towards the arrival times."""
 
 @value(frozen=True, slots=True)
 class Heard:
-    """A tick report, its arrival in s, and its time in s."""
+    """A tick report, when it arrived, and its corrected time, both in s."""
 
     ticks: Ticks
     arrived_s: float
@@ -74,7 +74,7 @@ class LateReads:
             at_s = self._time(ticks, arrived[place], late=late, shown=shown)
             if self._waited:
                 found[place:after] = [at_s] * (after - place)
-                if number == 1 and before:  # the ticks of these reports were lost
+                if number == 1 and before:  # the tick report before these reports was lost
                     leading_s = (before.at_s + at_s) / 2
         first = told[0][0] if told else len(reports)
         found[:first] = [min(at_s, leading_s) for at_s in arrived[:first]]

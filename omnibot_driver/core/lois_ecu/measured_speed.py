@@ -3,7 +3,7 @@
 """Prediction of the board's own odometry (0x20).
 
 The firmware measures a wheel's speed at each tick of the wheel, and computes its odometry from the
-last measured speeds. The motion filter calls this module in each of its steps.
+last measured speeds. The motion filter calls this module in each step in which a wheel rolls.
 
 This module works on the states of the filter, without reports.
 """

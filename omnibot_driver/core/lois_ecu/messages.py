@@ -274,9 +274,9 @@ class Ticks:
 
 @dataclass(frozen=True, slots=True)
 class BoardOdometry:
-    """The robot's pose and velocity in the earth frame, as the board computes them.
+    """The robot's pose and velocity, as the board computes them.
 
-    Velocities may be NaN or infinite.
+    Both are in a coordinate frame that is fixed to the floor. Velocities may be NaN or infinite.
 
     ``appended``: whether the report has the command byte of ticks (0x12), as in the public
     firmware.

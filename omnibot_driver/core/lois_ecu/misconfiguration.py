@@ -41,6 +41,8 @@ class Suspicion:
     """Detection of a misconfiguration from the received bytes.
 
     Call ``look`` with all received bytes, and ``understood`` when a report was decoded from them.
+
+    ``advice``: what the user should check; None while no misconfiguration is suspected.
     """
 
     def __init__(self) -> None:
@@ -64,7 +66,10 @@ class Suspicion:
 
 
 def own_gains(settings: LoisEcuSettings) -> str:
-    """Return the names of the gains that the user has not set, or "" if not in RPM mode."""
+    """Return the names of the gains that the user has not set.
+
+    The result is empty if all are set, and in duty mode.
+    """
     if settings.drive_mode != "rpm":
         return ""
     return ", ".join(gain.name.lower() for gain in GAINS if gain not in settings.written)

@@ -2,7 +2,7 @@
 
 """Kalman filter of both wheels' motion, and of the values that the board reports about it.
 
-The wheels have their nominal size. Left and right are those of the board.
+The wheels are assumed to have the radius in the settings. Left and right are those of the board.
 
 Input: commands to the board, and values that the firmware counts or measures; it does not read
 reports.

@@ -204,7 +204,7 @@ class LoisOdometry:
     def stalled(self, wheels: tuple[bool, bool]) -> None:
         """Record which wheels have stalled.
 
-        A stalled wheel has been at rest since its reported speed last changed.
+        A stalled wheel is assumed to be at rest since its reported speed last changed.
         """
         for index, stalled in enumerate(wheels):
             if stalled and self._motion.wheels[index].blind and not self._motion.signed:

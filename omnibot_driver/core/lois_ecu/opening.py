@@ -2,7 +2,7 @@
 
 """Writing of settings to a board that acknowledges nothing and loses single lines.
 
-All settings are written again and again (in rounds). They are confirmed when a requested date has
+All settings are written several times (in rounds). They are confirmed when a requested date has
 arrived, and ticks arrive with the requested period.
 """
 
@@ -143,7 +143,10 @@ class SettingsWriter:
         self._queue_other(at_s, SetPeriod(Stream.GPS_DATE, PERIOD_ONCE))
 
     def ticks_came(self, now: float) -> None:
-        """Record the arrival of ticks, and check whether they arrive with the requested period."""
+        """Record the arrival of ticks, and check whether they arrive with the requested period.
+
+        While the settings are unconfirmed, this method also plans the next round.
+        """
         self._arrivals.append(now)
         wanted = self.settings.periods_ms.get(Stream.TICKS)
         if len(self._arrivals) < 4:

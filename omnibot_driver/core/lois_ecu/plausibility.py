@@ -103,7 +103,8 @@ class Gate(Generic[Group]):
 class TicksGate(Gate[Ticks]):
     """Check of the reports of encoder ticks. ``ticks_per_revolution`` may be replaced at any time.
 
-    Their times show whether the board's clock counts ms or ns. Later reports must agree.
+    The times in the reports show whether the board's clock counts ms or ns. Later reports must
+    agree.
     """
 
     def __init__(self, ticks_per_revolution: int) -> None:

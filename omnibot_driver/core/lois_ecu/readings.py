@@ -1,7 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Readings of a LOIS ECU other than odometry, in SI units and REP-103 axes: values only.
+"""Readings of a LOIS ECU other than odometry.
 
+Units and axes follow REP-103, except for GPS positions, which are in degrees.
 The messages EStopButton, Record and TerminalLine serve as readings too.
 """
 

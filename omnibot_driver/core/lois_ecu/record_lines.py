@@ -56,7 +56,7 @@ class RecordAssembler:
 
     @property
     def begun(self) -> bool:
-        """Whether lines of a record have arrived."""
+        """Whether lines of an unfinished record have arrived."""
         return self._code is not None
 
     def expect(self, kind: RecordKind, left: int, right: int) -> None:
@@ -65,7 +65,7 @@ class RecordAssembler:
         self._begin(None)
 
     def damage(self) -> None:
-        """Record that a line of the present record may have been lost."""
+        """Mark the unfinished record as damaged: one of its lines may have been lost."""
         self._damaged = self.begun
 
     def cut_off(self) -> None:

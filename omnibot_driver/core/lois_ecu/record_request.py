@@ -69,7 +69,8 @@ class RecordRequest:
     def begin(self, kind: RecordKind, samples: int, decoder: LoisDecoder) -> None:
         """Make the next ``due`` return the request for a record.
 
-        An earlier request is abandoned.
+        An earlier request is abandoned. Raises RequestRefused if the board cannot complete the
+        record.
         """
         self._command, self.kind = command_of(kind, samples), kind
         self._begun_s, self._said = math.inf, 0

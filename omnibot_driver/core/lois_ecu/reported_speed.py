@@ -68,7 +68,10 @@ class ReportedSpeed:
         self.resting = RestingWheel()
 
     def note(self, duration_s: float) -> None:
-        """Use the estimated speed, because no speed was reported in the last ``duration_s``."""
+        """Pass the wheel's estimated speed to ``resting``.
+
+        The caller calls this when the board reported no speed in the last ``duration_s``.
+        """
         if not self._wheel.rests:
             rpm = abs(self._motion.speed_mps(self._index)) / self._motion.rpm_mps
             self.resting.note(rpm, duration_s)

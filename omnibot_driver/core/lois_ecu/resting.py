@@ -82,8 +82,8 @@ class RestingWheel:
         self._lone = False
         self._repeats = 0
         self._gaps = False
-        """Whether reports were being lost when the reported speed last changed; False for a robot
-        with gains of its user."""
+        """Whether reports were being lost when the reported speed last changed. It stays False if
+        the user set the gains."""
         self._intervals_s: deque[float] = deque(maxlen=LOST_REPORTS)
         self._clock_s = 0.0
         self.chance = 0.0

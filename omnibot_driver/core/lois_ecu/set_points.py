@@ -27,7 +27,8 @@ class SetPoints:
 
     ``saturated``: number of commands that were slowed, because a value was above its limit.
 
-    ``stopped_at_s``: time since which only zeros were sent, or infinity.
+    ``stopped_at_s``: time since which only zeros were sent, or infinity. ``clears`` moves it later,
+    to plan the next RPM 0/0.
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 
@@ -74,7 +75,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` return RPM 0/0 before the next set-points, as it does after a Stop."""
+        """Make ``wheels`` put RPM 0/0 before the next set-points, as it does after a Stop."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property
@@ -83,7 +84,7 @@ class SetPoints:
         return self.stopped_at_s + CLEAR_AFTER_S if self._clears_left else math.inf
 
     def clears(self, now: float) -> bool:
-        """Return whether to send RPM 0/0 now. If it is due, also record it as sent."""
+        """Return whether to send RPM 0/0 now. If it is due, also plan its repetition."""
         if now < self.clears_at:
             return False
         self.stopped_at_s = now - CLEAR_AFTER_S + CLEAR_AGAIN_S

@@ -2,8 +2,8 @@
 
 """Covariance of a pose from errors of the wheels' sizes, and from a slip common to both wheels.
 
-Copies of the drive are computed with each error, once positive and once negative. The spread of
-their final poses is the covariance.
+Copies of the robot's path are computed with each error, once positive and once negative. The spread
+of their final poses is the covariance.
 
 Input: distances of the wheels; output: covariance of x, y and yaw.
 """
@@ -24,11 +24,11 @@ standard deviation of the fraction of the distance that is lost because both whe
 
 
 class SizeErrors:
-    """Copies of one drive, each with an assumed error: of one wheel's size, or of a slip."""
+    """Copies of the robot's path, each with an assumed error: of one wheel's size, or of a slip."""
 
     def __init__(self) -> None:
         spread = math.sqrt(KINDS)
-        # Each error is constant during a drive, so the pose error soon is not proportional to its
+        # Each error is constant along the path, so the pose error soon is not proportional to its
         # cause.
         self._factors = [
             (1 + sign * spread * left, 1 + sign * spread * right)
@@ -43,7 +43,7 @@ class SizeErrors:
         self._believed = 0.0, 0.0, 0.0
 
     def move(self, left_m: float, right_m: float, track_m: float) -> None:
-        """Continue all copies of the drive by the given distances of the wheels.
+        """Continue all copies of the path by the given distances of the wheels.
 
         ``track_m``: track width; negative if the wheels are swapped.
         """
@@ -56,7 +56,7 @@ class SizeErrors:
     def covariance(self, yaw_rad: float) -> Covariance:
         """Return the covariance for a pose with the yaw ``yaw_rad``.
 
-        The pose may be in another frame than the drives, rotated by a constant angle.
+        The pose may be in another coordinate frame than the copies, rotated by a constant angle.
         """
         x_m, y_m, yaw = self._believed
         turn = yaw_rad - yaw

@@ -107,6 +107,7 @@ class StallWatch:
     def stalled(self, now: float) -> tuple[bool, bool]:
         """Return which commanded wheels have not turned for ``STALLED_S``.
 
+        At least ``AT_LEAST`` reports (backward: ``AT_LEAST_BACKWARD``) must show this.
         If a wheel is reported, the timing of both wheels begins again.
         """
         left, right = (

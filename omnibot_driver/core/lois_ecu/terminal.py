@@ -34,7 +34,7 @@ class ModeChange:
         since then."""
         self._said_at_s = self._again_at_s = -math.inf
         self._stopping: dict[str, str] = {}
-        """Changes that begin when the robot is at rest: new values of parameters, by name."""
+        """Changes that wait until the robot was stopped: new values of parameters, by name."""
         self._stopping_since_s: float | None = None
         self.left = False
         """Whether a terminal mode has ended. The code that reads this attribute clears it."""
@@ -44,7 +44,7 @@ class ModeChange:
         self._told = None
 
     def want(self, mode: TerminalMode) -> None:
-        """Request a terminal mode. The mode of a sensor begins only when the robot is at rest."""
+        """Request a terminal mode. The mode of a sensor begins only after the robot was stopped."""
         if mode not in SENSORS:
             self._stopping.pop("terminal_mode", None)
         elif mode is not self.wanted:
@@ -53,12 +53,15 @@ class ModeChange:
         self._again_at_s = -math.inf
 
     def stop_first(self, parameter: str, value: str) -> None:
-        """Stop the robot, and refuse motion until it is at rest: ``parameter`` has a new value."""
+        """Stop the robot, because ``parameter`` gets a new ``value``.
+
+        Motion is refused until the robot is seen at rest, or for ``UNPROVED_S``.
+        """
         self._stopping[parameter], self._stopping_since_s = value, None
 
     @property
     def terminal(self) -> bool:
-        """Whether the board is expected to send the lines of a sensor."""
+        """Whether a terminal mode was written, so that the board may send the lines of a sensor."""
         return self._told is not None
 
     @property
@@ -95,7 +98,9 @@ class ModeChange:
         return self._again_at_s if waits else math.inf
 
     def stops(self, now: float, *, stands: bool) -> bool:
-        """Return whether to send Stop now. The robot must be at rest before a mode is changed.
+        """Return whether to send Stop now, because a mode is changed only after a standstill.
+
+        If the standstill cannot be seen, Stop is sent for ``UNPROVED_S``.
 
         ``stands``: whether the robot is seen at rest.
         """

@@ -45,8 +45,8 @@ RESTARTED_TURNS_PER_S: Final = 1.0
 fall of a count that wheels can cause by rolling back. If a count falls further, the board has
 restarted."""
 SILENT_S: Final = 1.0
-"""Pause in s without tick reports. After a longer pause, counts near zero show a restart even if
-the wheels may have rolled back to them."""
+"""Pause in s without tick reports. After a longer pause, counts near zero and an irregular clock
+show a restart, even if the wheels may have rolled back to these counts."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
@@ -206,7 +206,8 @@ class Translation:
 
         A clock in ns begins at zero every 4.3 s, so a small clock value alone proves nothing. The
         board has restarted if the clock does not fit the last reports, and rolling wheels do not
-        explain the counts. Otherwise, the odometry gets an error for a possible restart.
+        explain the counts. After ``SILENT_S`` without ticks, the clock alone decides. If no restart
+        is shown, the odometry gets an error for a possible one.
         """
         odometry, silent = self.odometry, duration_s > SILENT_S
         deviation_s, certain = self._time.deviation_s(ticks.time_counts, self._unit, now)

@@ -95,8 +95,8 @@ class WheelModel:
     def carry_out(self, now: float) -> tuple[bool, bool]:
         """Apply all effects of commands that are due at ``now``.
 
-        Return two values: whether the firmware has cleared its measured speed, and whether the
-        motor follows another command.
+        Return two values: whether the firmware has cleared the speed that it measured last, and
+        whether the motor now follows another command.
         """
         cleared = False
         before = self.kind, self.target_mps

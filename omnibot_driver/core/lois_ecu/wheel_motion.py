@@ -16,8 +16,8 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
 tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""Indices of the body's states: position (``X``, ``Y``), and the turn and the distance that the
-board's odometry (0x20) should show (``TURN``, ``ALONG``).
+"""Indices of the body's states: position in m (``X``, ``Y``), and what the board's odometry (0x20)
+should show. ``TURN``: how much farther the right wheel rolled, in m. ``ALONG``: distance in m.
 
 ``BIAS``: first of two states, the error of each wheel's speed.
 
