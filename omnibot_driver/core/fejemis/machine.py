@@ -139,7 +139,8 @@ class Machine:
         texts: list[bytes] = []
         if self._off_left:
             self._off_left -= 1
-            texts += OFF
+            commanded = self.volts, self.brush  # since it was switched off
+            texts += [text for text, on in zip(OFF, commanded, strict=True) if not on]
         elif self.brush or self._brush_left:
             self._brush_left = max(0, self._brush_left - 1)
             texts.append(b"brush 1" if self.brush else b"brush 0")

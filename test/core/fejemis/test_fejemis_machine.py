@@ -87,6 +87,22 @@ def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
     machine.lift(6.0, 1.01, 0.5)
     machine.off()
     assert machine.due(1.02) == [b"motv 0 0", b"brush 0"]
+
+
+def test_a_new_lift_voltage_is_not_cancelled_by_the_repeated_switching_off() -> None:
+    """Lift and brush are switched off, which is sent three times. Meanwhile the lift is commanded.
+
+    The brush is still switched off three times. The lift is not switched off again.
+    """
+    machine = Machine()
+    machine.off()
+    said = machine.due(0.0)
+    machine.lift(6.0, 0.05, 0.5)
+    for step in range(1, 9):
+        said += machine.due(0.05 * step)
+    assert said.count(b"brush 0") == 3
+    assert said.count(b"motv 0 0") == 1
+    assert said.index(b"motv 0 0") < said.index(b"motv 6.00 .499")
     assert not any(text.startswith(b"motv 6") for text in machine.due(1.06))
 
 
