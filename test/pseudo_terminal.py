@@ -17,7 +17,7 @@ PATIENCE_S = 60.0
 
 
 class PseudoTerminal:
-    """Runs a program on a terminal, and kills the program at the end of the context."""
+    """A terminal on which a program runs. The program is killed at the end of the context."""
 
     def __init__(self, command: Sequence[str]) -> None:
         self._far, near = os.openpty()

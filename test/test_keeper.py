@@ -157,7 +157,7 @@ def test_guards_that_do_not_die_do_not_pile_up(line: Line, monkeypatch: pytest.M
 def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
     """The guard process is suspended when the driver ends, so it cannot read the end message.
 
-    The driver does not wait for it.
+    The driver waits for it only for a short time, then kills it.
     """
     keeper = Keeper([line.near], packed(LAST_WORDS), packed(LATCHED_WORDS))
     (pid,) = line.children()
@@ -169,7 +169,7 @@ def test_a_guard_that_is_stopped_does_not_hold_up_the_end(line: Line) -> None:
 def test_a_guard_that_cannot_even_be_killed_does_not_hold_up_the_end(
     line: Line, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard process cannot be killed when the driver ends. The driver does not wait for it.
+    """The guard cannot be killed when the driver ends. The driver waits only for a short time.
 
     A suspended process takes the place of such a guard.
     """

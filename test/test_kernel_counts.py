@@ -37,7 +37,10 @@ def test_overruns_of_the_chip_and_of_the_buffer_are_added(monkeypatch: pytest.Mo
 
 
 def test_a_thread_has_waited_and_one_that_is_none_is_not_known() -> None:
-    """The waiting time of a thread is a number of seconds. For an unknown thread it is None."""
+    """The waiting time of a thread is in s, if the kernel measures it.
+
+    For an unknown thread, the waiting time is None.
+    """
     waited = waited_s(threading.get_native_id())
     assert waited is None or waited >= 0.0
     assert waited_s(0) is None

@@ -64,7 +64,7 @@ def test_a_repeated_command_and_its_timeout_need_nobody_elses_thread(board: PtyB
 def test_the_guard_hears_a_beat_ten_times_a_second_however_often_the_pacer_passes(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The guard process gets ten heartbeats per second, although the pacer thread runs more often.
+    """The guard gets at most ten heartbeats per second, although the pacer thread runs more often.
 
     The driver counts unread heartbeats to notice a guard that hangs. At a higher rate, it would
     conclude this too early.

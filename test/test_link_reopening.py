@@ -65,7 +65,7 @@ def test_attempts_are_made_less_and_less_often_up_to_a_limit(
 def test_a_board_plugged_in_under_another_name_is_found_and_stands_still(tmp_path: Path) -> None:
     """A board is unplugged during a drive and comes back under another device name.
 
-    udev's link leads to it. The old command is not repeated.
+    udev's symbolic link points to this name. The old command is not repeated.
     """
     name = tmp_path / "omnibot"
     listener, ours = Listener(), session()

@@ -33,7 +33,7 @@ def obeyed(command: Callable[[], None]) -> bool:
     return True
 
 
-def test_a_command_that_waited_while_the_watchdog_stood_still_is_refused(
+def test_a_command_that_waited_while_the_pacer_stood_still_is_refused(
     board: PtyBoard, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A thread holds the session's lock, so the pacer cannot run, and a command waits.
@@ -139,7 +139,7 @@ def test_a_stall_is_noticed_before_the_bytes_that_waited_are_decoded(
         assert board.wait_for(lambda b: b.tick >= end, PATIENCE_S)
 
     drive = partial(link.command, Session.command_twist, BodyTwist(0.2, 0.0, 0.0))
-    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))  # no other stall is on
+    listener.wait_for(lambda: obeyed(lambda: drive([time.time_ns()])))  # no stall is left
     link.call(hang)
     listener.wait_for(lambda: any("stalled" in str(event) for event in listener.events))
     link.close("stop")

@@ -92,7 +92,10 @@ def test_every_promised_parameter_is_there_with_its_default(name: str, default: 
 
 @pytest.mark.parametrize("parameter", EVERY_ROW)
 def test_every_default_passes_its_own_check_and_is_explained(parameter: Parameter) -> None:
-    """Each parameter has a description that is a sentence, and a unit if it is a quantity."""
+    """Each parameter has a valid default, and a description that is a sentence.
+
+    A quantity has a unit, and a number has limits or choices.
+    """
     value = parameter.check(parameter.default)
     assert value == parameter.default
     assert type(value) is type(parameter.default)

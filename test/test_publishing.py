@@ -107,7 +107,7 @@ def test_stamps_follow_simulated_time_while_there_is_any(
         assert published_at_s() == pytest.approx(5.0, abs=1.0)
         simulate(False)
         assert published_at_s() == pytest.approx(time.time(), abs=1.0)
-        publishing._time_watch.unregister()  # otherwise rcl calls it after it was destroyed
+        publishing._time_watch.unregister()  # otherwise rcl calls the destroyed watch
 
 
 def test_a_simulated_time_that_no_stamp_can_express_publishes_nothing(
@@ -126,7 +126,7 @@ def test_a_simulated_time_that_no_stamp_can_express_publishes_nothing(
         clock.set_ros_time_override(Time(nanoseconds=nanoseconds))  # type: ignore[attr-defined]
         publishing.deliver([ImuEstimate(time.monotonic(), (0.0, 0.0, 9.8), (0.0, 0.0, 0.0))])
         assert len(published) == count
-    publishing._time_watch.unregister()  # otherwise rcl calls it after it was destroyed
+    publishing._time_watch.unregister()  # otherwise rcl calls the destroyed watch
 
 
 def test_simulated_time_gives_no_stamp_before_it_begins_and_none_twice(

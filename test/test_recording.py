@@ -30,7 +30,8 @@ PACKETS = [(at_ns, (0, data)) for at_ns, data in CHUNKS]
 
 
 def cdr(data: bytes) -> bytes:
-    # CDR typed by hand: little endian; without a dimension, offset 0, the count, the bytes.
+    # CDR by hand: the header for little endian, no dimensions, offset 0, the number of bytes,
+    # and the bytes.
     header = bytes.fromhex("00 01 00 00")
     return header + bytes(8) + len(data).to_bytes(4, "little") + data
 

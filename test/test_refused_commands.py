@@ -2,7 +2,7 @@
 
 """Tests of refused commands after the motion monitor has stopped the robot.
 
-After such a stop, the robot moves again only when the sender has paused.
+After such a stop, motion is refused until the sender has paused or sent a zero command.
 """
 
 import math

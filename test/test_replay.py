@@ -148,7 +148,7 @@ def test_the_pace_makes_no_difference() -> None:
 
 
 def test_time_passes_as_it_did() -> None:
-    """A recording has a silence of 2 s. In the replay, the silence also has 2 s of recorded time.
+    """A recording has a silence of 2 s. In the replay, the silence lasts 2 s by recorded time.
 
     The state of the replay is ``connecting`` during the silence, and ``disconnected`` at the end of
     the recording.

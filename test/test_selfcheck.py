@@ -174,7 +174,7 @@ def test_a_parameter_file_for_another_node_is_told_of(
 ) -> None:
     """A parameter file may name other nodes only. ROS then ignores it without a message.
 
-    The message has the names of the file and of the node.
+    The driver's message names the file and the node.
     """
     file = tmp_path / "robot.yaml"
     file.write_text(content)

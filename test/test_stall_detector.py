@@ -2,8 +2,8 @@
 
 """Tests of the stall detector.
 
-It finds stalls of the watchdog's thread, and commands that waited in a stall. A command is
-*refused* if ``outlived_by`` returns False for it.
+It finds stalls of the pacer, the thread that repeats commands, and commands that waited in a stall.
+A command is *refused* if ``outlived_by`` returns False for it.
 """
 
 import pytest
@@ -30,7 +30,7 @@ def resumed(length_s: float) -> StallDetector:
 
 
 def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
-    """A small delay of the watchdog's thread, as on a busy machine, is not a stall."""
+    """A small delay of the pacer's thread, as on a busy machine, is not a stall."""
     standstill = StallDetector()
     assert standstill.begun(5.0) == 0.0  # also before its first run
     for now in (10.0, 10.1, 10.45):
@@ -53,8 +53,8 @@ def test_a_standstill_is_told_once_with_its_length() -> None:
     assert standstill.begun(110.0) == pytest.approx(6.8)
 
 
-def test_nothing_is_fresh_until_the_watchdog_runs_again() -> None:
-    """After a stall, every command is refused until the watchdog's own thread has run."""
+def test_nothing_is_fresh_until_the_pacer_runs_again() -> None:
+    """After a stall, every command is refused until the pacer's own thread has run."""
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))
     assert not standstill.outlived_by(wall_ns(100.0 + STANDSTILL_S), 100.0 + STANDSTILL_S)
@@ -86,7 +86,7 @@ def test_a_command_that_waited_through_two_standstills_is_not_fresh() -> None:
 
 
 def test_a_standstill_long_ago_is_forgotten() -> None:
-    """A command seems to come from a stall of 98 s ago. It is not refused.
+    """A command seems to come from a stall that ended 98 s ago. The command is not refused.
 
     A command cannot be in transit for that time, so the sender's clock must be wrong.
     """

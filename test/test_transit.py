@@ -27,7 +27,7 @@ NS = 1_000_000_000
 
 @dataclass
 class Sender:
-    """Publishes on one topic. Its clock is ahead of the true time by ``ahead_s``."""
+    """A sender on one topic. Its clock is ahead of the true time by ``ahead_s``."""
 
     ahead_s: float = 0.0
     numbered: bool = True

@@ -47,7 +47,7 @@ def calls(work: Callable[[], object]) -> int:
         count += event == "call"
 
     before = sys.getprofile()
-    gc.disable()  # Hypothesis has a callback for it, which is not part of the work
+    gc.disable()  # Hypothesis has a callback at each collection, which does not count
     sys.setprofile(see)
     try:
         work()

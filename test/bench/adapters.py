@@ -2,7 +2,7 @@
 
 """How a USB adapter delivers a line's bytes: by ticks, in pieces, or in packets with a timer.
 
-This module knows the baud rate of the line; it does not know the frames. All times are in s.
+This module depends on the line's baud rate, but not on the frames. All times are in s.
 """
 
 from collections.abc import Callable, Iterator
@@ -14,9 +14,9 @@ LARGEST_PIECE: Final = 16
 PACKET: Final = 62
 """Size of an FTDI packet in bytes."""
 DRIFT: Final = 1.0002
-"""Period of the adapter's timer, relative to its nominal period by the board's clock.
+"""Real period of the adapter's timer by the board's clock, divided by its nominal period.
 
-Within 8 s, this difference makes the packets end at all phases of the board's tick.
+Within 10 s, the difference makes the packets end at all phases of the board's tick.
 """
 
 Handed = tuple[float, bytes]

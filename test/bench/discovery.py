@@ -54,7 +54,10 @@ def processor_s(pids: list[int]) -> float:
 
 
 def measure(number: int, *, served: bool) -> str:
-    """Measure traffic and processor time of ``number`` drivers, and return a row of the table."""
+    """Measure traffic and processor time of ``number`` drivers, and return a row of the table.
+
+    ``served``: whether the drivers use the discovery server.
+    """
     environment = {
         **os.environ,
         "PYTHONPATH": str(ROOT),

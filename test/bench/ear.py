@@ -1,6 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A subscriber in its own process. It records the time of each message until stdin is closed.
+"""A subscriber in its own process.
+
+It records the time of each Imu and Odometry until stdin is closed.
 
 The arguments are namespaces. The output is a JSON object with two arrays for each namespace:
 

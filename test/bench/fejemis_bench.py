@@ -111,7 +111,10 @@ def drive_for(seconds: float, ports: Sequence[str]) -> None:
 
 
 def relayed_ms(seconds: float, busy: int) -> list[float]:
-    """Return the delays of all angles in ms, sorted, while ``busy`` other processes compute."""
+    """Return the sorted delays of the angles in ms, while ``busy`` other processes compute.
+
+    Angles of the first 3 s are left out.
+    """
     pairs = [os.openpty() for _ in range(2)]
     for _, near in pairs:
         tty.setraw(near)

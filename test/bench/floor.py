@@ -9,7 +9,7 @@ for every delta.
 
 ``bare PORT NAMESPACE``: only have the driver's topics and services, to show the memory of ROS.
 
-The benchmark recognizes each message or frame by a number.
+The benchmark recognizes each Imu and each command by a number in it.
 """
 
 import os

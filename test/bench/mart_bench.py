@@ -29,7 +29,7 @@ No event reports that they are ready.
 LATEST_S: Final = 0.9
 """Longest latency in s that is expected. A later datagram belongs to the next command."""
 LARGE: Final = 3
-"""Smallest change of a speed, in register units, that shows a new command.
+"""Smallest change of a motor's speed, in MART's units, that shows a new command.
 
 The driver makes smaller changes by itself, to hold the heading.
 """
@@ -38,7 +38,7 @@ The driver makes smaller changes by itself, to hold the heading.
 class Heard(SimulatedMart):
     """A simulated controller that records what it receives on its command port.
 
-    ``heard``: the datagrams, each with its time, without the regular queries.
+    ``heard``: the datagrams except the regular queries, each with its time in s.
     """
 
     def __init__(self) -> None:

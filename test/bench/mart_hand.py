@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Command several MART robots in turn, with another speed every second, sometimes zero.
+"""Command several MART robots in turn, with another speed every 1 to 3 s, sometimes zero.
 
 Arguments: seconds and namespaces. Output: a JSON list with an array for each namespace. Each speed
 has the steady clock's time in s of its first publication, and its value in m/s.

@@ -15,7 +15,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # users have their bytecode, too
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # Python stores bytecode, as for users
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 sys.path.insert(0, str(Path(__file__).parents[1] / "integrity"))  # for the generator of streams
 

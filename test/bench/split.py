@@ -3,8 +3,8 @@
 """Timers that measure the processor time of each stage of the driver's reader.
 
 The driver's process imports this module first. When the process ends, the module writes a JSON
-object to the file in the environment variable SPLIT. The object contains the seconds of each stage,
-and the reader's whole time as ``passed``.
+object to the file in the environment variable SPLIT. The object contains the processor
+time of each stage, and as ``passed`` the time for which the reader ran, all in s.
 """
 
 import atexit
@@ -28,7 +28,7 @@ within: list[float] = []
 
 
 def timed(owner: type, name: str, stage: str) -> None:
-    """Replace a method by one that adds its processor time to ``stage``.
+    """Replace a method by one that adds its processor time in the reader's thread to ``stage``.
 
     The time of other stages that the method calls is not included.
     """

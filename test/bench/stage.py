@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Simulated boards on pseudo-terminals that send the nominal stream and record commands.
+"""Simulated boards on pseudo-terminals that send the stream of nominal mode and record commands.
 
 Within each tick of 10 ms, the boards send one after the other. Every IMU frame has a number in its
 first word.

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Relays between the floor and the driver, in steps: each step adds one task of the driver.
+"""Relays with more tasks than the floor and fewer than the driver: each step adds one task.
 
 The floor is the smallest program with the same output as the driver, without any checks.
 

@@ -261,7 +261,10 @@ def split(seconds: float) -> list[str]:
 def latencies(
     said: Sequence[float], heard: Sequence[tuple[float, float]], unit: float
 ) -> list[tuple[float, float]]:
-    """Return for each message the time of its frame's delivery, in s, and its latency, in µs."""
+    """Return for each message the time of its frame's delivery, in s, and its latency, in µs.
+
+    ``unit``: value in the message for the number 1 in the frame.
+    """
     found = []
     for at, value in heard:
         number = round(value / unit)

@@ -23,7 +23,7 @@ DRIVEN = BoardPose(3000.0, -2000.0, 700.0)
 
 
 def line(seed: int, settings_: OdometrySettings | None = None, frame: str = "earth") -> Line:
-    """Return a line after two seconds of driving, on a board whose first pose was not zero."""
+    """Return a ``Line`` after about 2 s of driving, with a board whose first pose was not zero."""
     board = BoardSettings(seed=seed, frame=frame, running=True, initial_pose=DRIVEN)
     found = Line(board, settings_, seed=seed)
     found.run(2.0 + seed % 5 * PERIOD_S)

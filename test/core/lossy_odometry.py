@@ -105,7 +105,10 @@ class Line:
 
     @property
     def error(self) -> Pose:
-        """Difference between the newest odom pose and the board's own pose."""
+        """Error of the newest odom pose.
+
+        The truth is the board's own pose at the last delta that arrived.
+        """
         wanted = self.attached.way_to(self.told)
         got = self.estimates[-1].pose
         off = got - wanted

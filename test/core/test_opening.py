@@ -97,7 +97,7 @@ def test_a_silent_board_is_told_once() -> None:
 
 
 def test_a_board_that_restarts_is_started_again_and_stands_still(bench: Bench) -> None:
-    """The board restarts during a drive, by a brown-out. The old command is not sent again."""
+    """The board restarts during a drive because of a brown-out. The command is not sent again."""
     bench.drive(0.5)
     bench.run(0.2)
     bench.board.reboot()

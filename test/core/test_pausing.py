@@ -1,6 +1,10 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Pausing with P, which also resumes: the board never resumes by mistake; a pause needs proof."""
+"""Tests of pausing with the letter P, which also resumes a paused board.
+
+The driver sends P only when new data shows that the board runs. Only a new «Paused» text confirms
+a pause.
+"""
 
 import pytest
 from robots import drive_on, paused, standing

@@ -30,6 +30,8 @@ class Bound:
 
     ``delivered``: least share of the intact frames that must be decoded. 1.0 means all after the
     first two.
+
+    ``chunkers``: names of the chunkings that have these limits.
     """
 
     one_wrong_in_visible: int | None

@@ -2,7 +2,7 @@
 
 """What a line does to a byte stream: bytes are lost or added, and they arrive in chunks.
 
-This module knows bytes and times; it does not know the format of frames.
+This module depends on bytes and times, not on the format of frames.
 """
 
 from collections.abc import Callable

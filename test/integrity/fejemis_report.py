@@ -55,7 +55,7 @@ class Score:
 
     ``odometry``: number of compared odometry messages.
 
-    ``astray_m``: greatest error of the odometry.
+    ``astray_m``: greatest error of the odometry, in m.
     """
 
     sent: int = 0

@@ -42,7 +42,7 @@ class Bound:
 
     ``long_in``: N of "at most one uncommanded set-point of over 2 ms in N control frames".
 
-    ``overdue``: whether a robot that still drives is an error.
+    ``overdue``: whether a robot that drives when it must be at rest is an error.
     """
 
     share: float = 1.0

@@ -40,6 +40,8 @@ class Score:
     ``long``: number of the ``uncommanded`` set-points of over 2 ms.
 
     ``longest_s``: duration of the longest ``uncommanded`` set-point.
+
+    ``false_estops``: number of e-stops that the board understood, but the driver did not send.
     """
 
     trials: int = 0

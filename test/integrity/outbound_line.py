@@ -2,7 +2,7 @@
 
 """The line from the driver to the board, with its faults.
 
-This module knows bytes; it does not know frames.
+This module depends on bytes, not on frames.
 """
 
 import math

@@ -61,7 +61,7 @@ class Teller:
         elif mode == 0x01:
             scale = self._linear_scale
             self._twist = (a / scale, b / scale, c / ANGULAR_SCALE)
-        else:  # the manual's inverse, from rim speeds
+        else:  # the manual's conversion from rim speeds
             va, vb, vc = (word / self._linear_scale for word in words)
             self._twist = (
                 (vb - va) / (2 * math.cos(math.radians(30))),

@@ -2,7 +2,8 @@
 
 """Common parts of the integrity reports: damage to a stream in pieces, and sums of scores.
 
-This module knows bytes, and scores with the operator ``+=``; it does not know the format of frames.
+This module depends on bytes, and on scores with the operator ``+=``, but not on the format of
+frames.
 """
 
 import os

@@ -63,7 +63,7 @@ class Outcome:
 
 
 def some_robot(seed: int, delta_period_s: float) -> BoardSettings:
-    """Draw the settings of a robot. Its motors, controllers and scales vary as usual."""
+    """Draw the settings of a robot. Its motors, controllers and scales vary as in real robots."""
     random = Random(f"robot {seed}")
     motors = [
         MotorConstants(
@@ -222,7 +222,7 @@ class RoughDrive(Bench):
         self._hands_at = self.now + 1.0 + random.expovariate(1 / SECONDS_BETWEEN_HANDS)
         what = "carry" if self._to_be_carried else random.choice(HANDS)
         self._to_be_carried = what == "carry" and not self._to_be_carried
-        if self._to_be_carried:  # carried once it is at rest
+        if self._to_be_carried:  # people wait until the robot is at rest
             self._manner, self._manner_until = random.choice(("silence", "zeros")), math.inf
             self._hands_at = self.now + 1.5
             return

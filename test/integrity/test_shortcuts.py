@@ -83,7 +83,7 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
     """Return one in ``number`` combinations of the choices.
 
-    They contain each pair of choices if every list has at least ``number`` choices.
+    The result contains each pair of choices if every list has at least ``number`` choices.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [
@@ -135,7 +135,7 @@ def test_pieces_of_streams_and_noise_come_out_alike(arrivals: list[tuple[bytes, 
 def test_readings_come_out_alike(
     scenario: str, fault: str, chunker: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The session receives requests, such as a pause, while a stream arrives.
+    """The board's code gets requests, such as a pause, while a stream arrives.
 
     The decoder's shortcuts change neither the board's readings nor its mode.
     """

@@ -119,7 +119,7 @@ class Solid:
 
 
 def close(centre: Array, reach: Any, origins: Array, directions: Array) -> NDArray[np.intp]:
-    """Return the indices of the rays that pass through a sphere, or begin in it."""
+    """Return the indices of all rays that can meet a sphere, and of some that just miss it."""
     to = centre - origins
     along = np.einsum("ij,ij->i", to, directions)
     passing = np.einsum("ij,ij->i", to, to) - along**2 < reach**2

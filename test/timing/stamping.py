@@ -35,7 +35,7 @@ EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stal
 """For each event in the middle of a stream, the time in s for which the host then reads nothing."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
-"""What the board sends. All lines carry the same streams, and change nothing in them."""
+"""The cached generator of streams. All lines carry the same streams and must not change them."""
 BOOT_S = 0.7123
 
 
@@ -63,7 +63,10 @@ LINES: dict[str, Callable[[Received, Random], Chunks]] = {
     "FTDI, timer restarted by data": ftdi_restarted,
 }
 BUSY = dict(READERS)
-"""Ways in which a busy computer reads a line. They include its delays, so ``stamp`` adds none."""
+"""Ways in which a busy computer reads a line.
+
+They include the delays of the computer, so ``stamp`` adds no delay.
+"""
 
 
 @dataclass(slots=True)

@@ -2,8 +2,9 @@
 
 """The timing report, which writes the accuracy of stamps into docs/internals/time.md.
 
-``--seconds``: length of each stream. ``--seeds``: number of streams for each row of a table. These
-use the clock skews of ``SKEWS`` in turn. ``--readers``: measure only how a busy computer reads.
+``--seconds``: length of each stream. ``--seeds``: number of streams for each row of a table. The
+streams use the clock skews of ``SKEWS`` in turn. ``--readers``: measure only the stamps on
+a busy computer.
 """
 
 import argparse

@@ -68,8 +68,8 @@ def test_a_timer_that_may_never_cut_a_frame_hides_half_of_what_it_could_at_the_m
     of a frame, within 0.5 ms.
     """
     # The adapter's timer keeps its phase relative to the ticks. A frame that the timer cuts in two
-    # would show this phase. If no frame is cut, the driver knows it only to within 2 ms minus the
-    # duration of 13 bytes.
+    # would show this phase. If no frame is cut, the driver can determine the phase only to within
+    # 2 ms minus the duration of 13 bytes.
     for seed in range(5):
         stamped = stamp("FTDI", "IMU only, noisy gyro", 0.0, 0.0, seed, 4.0)
         assert max(abs(error - FRAME_S) for error in stamped.errors()) < 0.5e-3

@@ -45,7 +45,7 @@ def test_a_name_that_is_no_address_is_refused(url: str) -> None:
     "url",
     [
         "/dev/no-such-device",
-        "/dev/null",  # to know this, the driver would have to open the device
+        "/dev/null",  # only opening it shows that it is not a serial port
         "/dev/ptmx",
         "socket://localhost:1",
         "socket://no-such-host.invalid:5000",
@@ -57,9 +57,9 @@ def test_a_name_that_is_no_address_is_refused(url: str) -> None:
     ],
 )
 def test_what_may_appear_later_is_not_refused(url: str) -> None:
-    """The device is missing, or the host is unknown. The port is accepted.
+    """The device is missing, the host is unknown, or only opening the port can show if it works.
 
-    Both may appear later.
+    The port is accepted, because a later attempt to open it may succeed.
     """
     check_address(url)
 
@@ -82,7 +82,7 @@ def test_a_link_whose_device_is_unplugged_is_not_refused(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("url", ["loop://", "rfc2217://localhost:5000"])
 def test_a_port_without_descriptor_is_refused_for_a_board_with_several(url: str) -> None:
-    """A board has several lines, and one port has no file descriptor. It is refused.
+    """A board has several lines, and one port has no file descriptor. This port is refused.
 
     The driver polls all lines together, and needs a descriptor for this.
     """

@@ -74,7 +74,7 @@ def test_a_second_user_of_a_port_is_told_who_has_it(terminal: Terminal) -> None:
 
 
 def test_the_name_of_a_user_of_a_port_may_be_cut_within_a_character(terminal: Terminal) -> None:
-    """The kernel keeps only 15 bytes of a process's name. They end within a two-byte letter here.
+    """The kernel keeps only 15 bytes of a process's name. Here, a two-byte letter is cut.
 
     The error still names the process that has locked the port.
     """

@@ -48,7 +48,7 @@ EVENTS: dict[str, Callable[[Bench], object]] = {
 def test_the_robot_moves_again_only_on_a_command_that_arrived_afterwards(
     bench: Bench, event: Callable[[Bench], object]
 ) -> None:
-    """After a pause, a reset or an e-stop, the robot needs a new command."""
+    """After an event such as a pause, a restart or an e-stop, the robot needs a new command."""
     bench.drive(0.4)
     event(bench)
     bench.run(3.0)

@@ -99,7 +99,7 @@ def test_what_may_have_been_measured_before_stop_counts_for_nothing(proof: StopP
 
 
 def test_a_proof_is_owed_from_the_first_motion_to_the_next_proof(proof: StopProof) -> None:
-    """A robot was driven, so a proof of rest is owed.
+    """A robot was driven, so ``owed`` is true: a proof of rest is still needed.
 
     Only displacements of zero give this proof; a new connection or a Stop does not.
     """

@@ -27,7 +27,7 @@ def triple(twist: BodyTwist) -> tuple[float, float, float]:
     [
         ((1.0, 0.0, 0.0), 0.0),
         ((-1.0, 0.0, 0.0), 0.0),
-        ((0.5, 0.0, 1.0), 45.0),  # centre 0.5 m to the left, the same distance as the wheel's
+        ((0.5, 0.0, 1.0), 45.0),  # centre 0.5 m to the left; the wheel is 0.5 m ahead
         ((0.5, 0.0, -1.0), -45.0),
         ((-0.5, 0.0, 1.0), -45.0),  # backwards, centre 0.5 m to the right
         ((0.0, 0.0, 1.0), 90.0),

@@ -48,11 +48,11 @@ def stand(
 ) -> None:
     """Give readings at 100 Hz to the calibration, and a displacement after every fourth reading.
 
-    ``rates``: the readings of the gyro.
+    ``rates``: the readings of the gyro, in rad/s.
 
-    ``force``: the specific force in every reading of the accelerometer.
+    ``force``: the specific force in every reading of the accelerometer, in m/s².
 
-    ``rolling``: the motion in every displacement, or None if there are no displacements.
+    ``rolling``: every displacement's x and y in m and turn in rad. None: no displacements.
     """
     count = round(seconds / TICK_S)
     for number, rate in enumerate(itertools.islice(rates, count)):

@@ -180,7 +180,7 @@ def test_a_robot_that_shakes_loses_nothing(g_rms: float) -> None:
 def test_a_displacement_that_is_too_fast_counts_as_lost(fast: DisplacementReading) -> None:
     """A displacement is faster than 2 m/s or 8 rad/s, so it is rejected.
 
-    It counts as lost: the next displacement contains one more lost displacement.
+    The next displacement reports it as lost, in addition to all other losses.
     """
     through = gate()
     came = admitted([ahead(), replace(fast, lost=2), ahead(lost=1), ahead()], through)
@@ -341,7 +341,8 @@ def test_an_odometry_that_is_not_a_number_is_refused_and_counted(broken: str) ->
 def test_an_estimate_that_is_put_right_may_leap() -> None:
     """A board's own odometry jumps, because the board corrects an earlier error.
 
-    A filter for such odometry (``corrected=True``) releases the jump. A usual filter rejects it.
+    A filter for such odometry (``corrected=True``) releases the jump. A filter without this
+    setting rejects the jump.
     """
     steps = [ahead(0.01), ahead(0.05), ahead(0.01)]
     assert admitted(steps, gate())[1] == []

@@ -238,7 +238,10 @@ def test_without_the_motion_monitor_such_a_goal_is_discarded_and_the_next_one_ac
 
 
 def test_the_motion_in_a_recording_discards_no_goal() -> None:
-    """The driver plays a recording, in which the robot drives. It cannot follow the goal."""
+    """The driver plays a recording in which the robot drives away from the goal.
+
+    A recorded robot cannot obey, so the driver neither discards the goal nor gives a notice.
+    """
     bench = started(BoardSettings(running=True), control="position", obeys=False)
     bench.hears = False
     bench.go_to(-0.5, 0.0, 0.0)

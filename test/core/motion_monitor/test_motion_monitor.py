@@ -121,7 +121,7 @@ def test_a_robot_that_stood_and_moves_without_a_command_is_found_out_within_0_3_
 @pytest.mark.parametrize("scale", [0.0, 0.5, 0.85, 1.15, 1.25])
 @pytest.mark.parametrize("commanded", [(0.05, 0.0, 0.0), (0.3, -0.4, 0.5), (0.0, 0.0, 0.15)])
 def test_scales_that_are_off_by_a_quarter_do_not_trip(commanded: Triple, scale: float) -> None:
-    """A robot is 25 % too fast or too slow. If it is too fast, the monitor finds no fault.
+    """A robot is up to 25 % too fast, or too slow. If it is too fast, the monitor finds no fault.
 
     If it is too slow, the only possible fault is "blocked".
     """
@@ -205,7 +205,8 @@ def test_on_the_way_to_a_goal_nothing_is_judged() -> None:
 def test_a_robot_that_is_commanded_and_does_not_move_is_told_of_after_a_second() -> None:
     """A commanded robot does not move. The monitor returns a fault each second.
 
-    The caller must filter the repetitions.
+    The caller must filter the repetitions. After a release of the e-stop, the fault is that the
+    board may still hold the e-stop.
     """
     drive = Drive()
     drive.command(0.06, 0.0, 0.0)
@@ -327,7 +328,7 @@ def test_a_robot_that_obeys_late_and_with_slip_never_trips(
 ) -> None:
     """Commands are random. The robot obeys up to 0.1 s late, with a time constant of up to 0.2 s.
 
-    The monitor finds no fault.
+    The only possible fault is "blocked", after which the robot is not stopped.
     """
     drive, tick_s = Drive(), 0.01
     x = y = yaw = 0.0

@@ -147,7 +147,7 @@ def drive(board: SimulatedBoard, seed: int) -> tuple[list[OdometryEstimate], Odo
 def test_the_odometry_is_the_truth_of_the_simulated_robot(
     frame: str, initial: BoardPose, seed: int
 ) -> None:
-    """The robot drives metres of curves from any initial pose of the board.
+    """The robot drives more than 2 m in curves, from any initial pose of the board.
 
     Odom ends within 5 mm and 3 mrad of the truth.
     """

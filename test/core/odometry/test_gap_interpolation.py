@@ -40,7 +40,7 @@ def test_a_bridge_stands_for_two_seconds_of_motion_at_the_most() -> None:
 
 @pytest.mark.parametrize("missing", [0, 1, 7])
 def test_in_an_even_curve_a_gap_held_the_way_itself(missing: int) -> None:
-    """The robot drives an even curve, and displacements in the earth's axes are missing.
+    """The robot drives a curve with a constant twist. Displacements in earth axes are missing.
 
     The estimated motion of the gap is exact.
     """

@@ -44,7 +44,7 @@ def drive(on: Bench) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("frame", ["earth", "body"])
 def test_the_odometry_is_the_truth_of_a_robot_with_other_wheels(frame: str) -> None:
-    """The board assumes wrong sizes of its wheels and its base, and drives metres of curves.
+    """The board assumes wrong sizes of its wheels and its base, and drives in curves for 10 s.
 
     With the right odometry scales, odom ends within 5 mm and 3 mrad of the true pose.
     """

@@ -23,7 +23,7 @@ SETTLED = 300
 """Number of readings after which the decoder has learned in which pieces the adapter sends."""
 IMU_LENGTH = 14
 DRIFT = 1.0002
-"""Period of the adapter's timer, relative to its nominal period by the board's clock.
+"""Real period of the adapter's timer by the board's clock, divided by its nominal period.
 
 Because of the difference, the adapter's packets end in turn at all phases of a tick.
 """
@@ -76,7 +76,7 @@ def test_hardly_a_frame_waits_for_the_next_packet(
 ) -> None:
     """Hardly any IMU frame waits for the next packet of an adapter.
 
-    It waits only if a delta may follow it, or if the adapter splits the frame.
+    A frame waits only if a delta may follow it, or if the adapter splits the frame.
     """
     board = OmniBot(OmniBotSettings())
     ends: list[int] = []

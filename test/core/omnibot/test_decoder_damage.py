@@ -74,8 +74,8 @@ def test_a_frame_that_lost_a_byte_does_not_come_out(name: str) -> None:
     stream = b"".join(ticks_of(name)[:48])
     sent = frames_of(stream)
     for place, number in damage_places(sent):
-        # If two neighbours are equal, losing either gives the same stream. So the damage may be in
-        # either frame.
+        # If two neighbouring bytes are equal, losing either of them gives the same stream. So it is
+        # unknown in which frame a byte is missing.
         hurt = set() if stream[place] in (stream[place - 1], stream[place + 1]) else {number}
         found = decoded([stream[:place] + stream[place + 1 :]])
         if hurt:
@@ -108,7 +108,7 @@ def test_a_gained_byte_never_makes_more_than_one_false_frame(name: str, extra: i
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNNING_STREAMS)
 def test_a_gained_byte_hardly_ever_makes_a_false_frame(name: str) -> None:
-    """A byte is inserted into a stream in which some gyro values look like headers.
+    """A random byte is inserted into a stream. In some streams, gyro values look like headers.
 
     At most 1 in 30 inserted bytes makes a false frame.
     """

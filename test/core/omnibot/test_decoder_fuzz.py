@@ -132,7 +132,7 @@ ADVERSARIES = {
 def work(
     monkeypatch: pytest.MonkeyPatch, stream: bytes, chunk_length: int, pause_s: float = 0.0
 ) -> tuple[list[int], int]:
-    """Return how much work the decoder has done after each chunk, and the most bytes held.
+    """Return the decoder's work after each chunk, and the largest number of bytes that it held.
 
     The list of work begins with 0. A unit of work is one byte or one edge of the search graph that
     the decoder examines.

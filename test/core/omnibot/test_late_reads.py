@@ -66,7 +66,7 @@ def stopped(
 def heard(reads: Iterable[Read], begun: FrameDecoder | None = None) -> list[Frame]:
     """Return the frames of all reads.
 
-    ``begun``: a decoder that has the reads before these.
+    ``begun``: a decoder that has already received the earlier reads.
     """
     made, found, last_s = begun or FrameDecoder(), [], 0.0
     for data, now in reads:
@@ -79,7 +79,7 @@ def heard(reads: Iterable[Read], begun: FrameDecoder | None = None) -> list[Fram
 def heard_each(readers: Sequence[Iterable[Read]]) -> list[list[Frame]]:
     """Return the frames of each reader.
 
-    The reads with which all of them begin are decoded once.
+    The first reads, which are the same for all readers, are decoded only once.
     """
     lists = [list(reads) for reads in readers]
     made, found, common = FrameDecoder(), [], 0
@@ -133,7 +133,10 @@ def test_nor_does_one_that_catches_up_a_few_bytes_at_a_time(piece: int, most: in
 def test_any_content_comes_through_a_reader_that_is_always_late(
     content: list[tuple[tuple[int, int, int], tuple[int, int, int], bool]], late_s: list[float]
 ) -> None:
-    """A reader is late at every read, and the frames have any content. No frame is lost."""
+    """After 24 equal frames, a reader is late at every read. No frame is lost.
+
+    The later frames have any content, at an acceleration of at least 1 g.
+    """
     sent: list[Frame] = [REST] * 24
     ticks = [encode(REST)] * 24
     for seq, (accel, gyro, delta) in enumerate(content):

@@ -174,7 +174,7 @@ def test_the_twist_is_that_of_the_last_displacement_whatever_is_put_right() -> N
 def test_the_covariance_jumps_with_a_gap_and_shrinks_when_it_is_settled(lost: int) -> None:
     """Frames are lost, so the covariance grows. The next pose of the board reduces it again.
 
-    It is then the covariance of a drive without losses.
+    The covariance is then that of a drive without losses.
     """
     whole, torn = line(2), line(2)
     whole.run(lost * PERIOD_S)
@@ -290,7 +290,7 @@ def test_after_any_losses_and_one_good_second_odom_is_the_boards_pose(
 ) -> None:
     """Deltas and poses are lost in any pattern.
 
-    One good second later, odometry is the board's pose. No step before that exceeds 2 m/s.
+    After a second without losses, odom is the board's pose. No step of odom exceeds 2 m/s.
     """
     on = line(seed, frame=frame)
     fate = iter([lost for come, gone in pattern for lost in [False] * come + [True] * gone])

@@ -61,7 +61,10 @@ def test_a_wrong_byte_order_of_poses_is_noticed(sent: str, read: str) -> None:
 @pytest.mark.parametrize(("sent", "read"), [("earth", "body"), ("body", "earth")])
 @pytest.mark.parametrize("period_s", DELTA_PERIODS_S)
 def test_a_wrong_frame_of_deltas_is_noticed(sent: str, read: str, period_s: float) -> None:
-    """The setting ``delta_frame`` is wrong. The driver notices it once the robot has turned."""
+    """The setting ``delta_frame`` is wrong, and the robot's heading is not zero.
+
+    The driver advises the right value.
+    """
     turned = BoardPose(0.0, 0.0, 1500.0)
     board = BoardSettings(running=True, frame=sent, initial_pose=turned, delta_period_s=period_s)
     told = advice(board, OmniBotSettings(delta_frame=read, delta_period_s=period_s))

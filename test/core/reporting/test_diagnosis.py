@@ -26,7 +26,7 @@ Change = Callable[["Robot"], None]
 
 
 class Robot:
-    """The figures of a healthy robot. The method ``seconds`` makes a diagnosis each second."""
+    """The figures of a healthy robot. The method ``seconds`` makes one diagnosis per second."""
 
     def __init__(self) -> None:
         self.diagnosis = Diagnosis("its power, cable and baudrate")

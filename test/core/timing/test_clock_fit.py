@@ -17,7 +17,7 @@ def followed(
 ) -> tuple[ClockFit, float]:
     """Fit a clock to the ticks. Return it, and its error in s at the last tick.
 
-    ``above``, ``below``: distance of a tick's bounds from its true time, in s.
+    ``above``, ``below``: the upper and the lower bound of a tick, minus its true time, in s.
     """
     period_s = PERIOD_S * (1.0 + skew)
     line = ClockFit(PERIOD_S, (0, 1.0))

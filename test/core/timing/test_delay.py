@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the delay of measurements, which readings of other kinds must not change."""
+"""Tests of the figure for the delay from sampling to reading. Only measurements may change it."""
 
 import pytest
 from session_bench import TICK_S, Bench

@@ -129,7 +129,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 ) -> None:
     """An adapter sends every 16 ms, while the board's tick is 10 ms. The stamps are right.
 
-    From the arrival times alone, a delay of 0.8 ms may stay hidden for seconds.
+    The arrival times alone may hide a delay of 0.8 ms for seconds.
     """
     stamped = run(Board(seconds=90, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
