@@ -164,7 +164,7 @@ class Bench:
 
 
 def ask(bench: Bench, job: Job, limit_s: float = 10.0) -> JobDone:
-    """Ask the boards for a job, and return its answer."""
+    """Request a job from the boards, wait for its result and return it."""
     token = object()
     seen = len(bench.events)
     bench.board.services.ask(job, token, bench.now)

@@ -59,7 +59,7 @@ def test_without_angles_a_command_is_refused_because_of_the_front_board() -> Non
 
 
 def test_a_late_read_is_not_blamed_on_the_front_board() -> None:
-    """The driver reads nothing for 0.1 s, because the computer is busy. Its timers still run.
+    """The computer is busy. The driver reads nothing for 0.1 s, but its timers still run.
 
     The refusal of a command names the computer, and not the front board.
     """

@@ -34,8 +34,8 @@ def has_a_six_to_the_right(angle_deg: float) -> bool:
 def test_every_angle_is_told_within_half_a_degree() -> None:
     """Every relayed angle is right within 0.5°.
 
-    Usually, an angle is rounded to 0.1°. It is rounded more where the checksum would not detect
-    damage.
+    Usually, an angle is rounded to 0.1°. An angle is rounded more if the checksum would
+    not detect damage.
     """
     told = [float(relayed(angle_deg)[4:]) for angle_deg in EVERY]
     assert max(map(abs, told)) == 90.0
@@ -80,8 +80,8 @@ def test_whichever_two_characters_are_lost_of_an_angle_no_other_angle_is_heard(
 def test_no_other_form_of_an_angle_between_60_and_69_degrees_to_the_right_is_better() -> None:
     """However an angle from −60° to −69° is written, its text contains ``-`` and ``6``.
 
-    Their codes add up to 99, and the checksum is a sum modulo 99. So it does not change if both
-    characters are lost, and another text for the same angle would not help.
+    Their codes add up to 99, and the checksum is a sum modulo 99. So the checksum does not
+    change if both characters are lost, and another text for the same angle would not help.
     """
     assert (ord("-") + ord("6")) % 99 == 0
     for angle_deg in range(-69, -59):

@@ -21,7 +21,10 @@ from omnibot_driver.core.fejemis.messages import Acceleration, Attitude, Gyro
 
 LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
-"""Time in s after which the order of the two lines is known, if reads are at most 100 ms apart."""
+"""Time in s after which the order of gyro and acceleration line is known.
+
+This is true if reads are at most 100 ms apart.
+"""
 
 
 @dataclass(frozen=True)
@@ -287,7 +290,8 @@ def test_no_pair_has_lines_of_two_samples(
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
     """The drive board is silent. It speaks again before or after a pose.
 
-    A sample that comes before the first pose has no known time, so the driver leaves it out.
+    Before the first pose after the silence, the time of a sample is unknown. The driver leaves such
+    a sample out.
     """
     for phase_s in (0.0, 0.005, 0.01, 0.015):
         bench = nominal()

@@ -89,7 +89,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
     """Random motions are commanded. In each line, the checksum detects the loss of two characters.
 
-    The driver avoids pairs of digits and checksums that would hide the loss.
+    The driver avoids pairs of characters that would hide the loss, and certain checksums.
     """
     chance = random.Random(7)
     for _ in range(150):
@@ -201,7 +201,7 @@ def test_no_loss_of_one_or_two_characters_drives_the_lift_longer_or_harder(volts
 def test_every_lift_voltage_has_a_robust_line(
     volts: float, longest_s: float, *, forward: bool
 ) -> None:
-    """No voltage and no run time is without a line whose damage the checksum detects."""
+    """For each voltage and run time, there is a line whose damage the checksum detects."""
     text, seconds = lift_line(volts if forward else -volts, longest_s)
     assert robust(text)
     assert seconds <= longest_s

@@ -36,8 +36,8 @@ def test_all_sensors_are_told_in_si_units() -> None:
     assert bench.extras(SteeringReading)[-1].angle_rad == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_low_battery_is_told_once_a_minute() -> None:
-    """The voltage per cell is low. The driver reports it once within a minute."""
+def test_a_low_battery_is_not_told_with_each_message() -> None:
+    """The voltage per cell is low for 4 s. In this time, one notice reports the low battery."""
     bench = nominal(Simulated(volts=20.4))
     bench.run(4.0)
     assert bench.extras(BatteryReading)[-1].low

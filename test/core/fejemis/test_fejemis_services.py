@@ -224,7 +224,7 @@ def test_a_configuration_is_saved_and_loaded() -> None:
     ],
 )
 def test_a_refusal_during_a_job_names_the_job_without_an_article(job: Job, name: str) -> None:
-    """During a job, another job is refused. The text is English for the name of every job."""
+    """During a job, another job is refused. The refusal begins with the name of the running job."""
     jobs = Jobs()
     jobs.ask(job, None, 0.0)
     with pytest.raises(RequestRefused) as refused:

@@ -304,9 +304,9 @@ def numbered() -> Bench:
 
 
 def cycles_of(bench: Bench) -> list[tuple[float, float]]:
-    """Return for each published sample the cycle numbers of its gyro and its acceleration line.
+    """Return for each published sample the cycles of its gyro and its acceleration line.
 
-    The bench ``numbered`` sends the number of the cycle, divided by 1000, as the reading x.
+    A cycle is given as the bench ``numbered`` sends it: its number, divided by 1000.
     """
     return [
         (round(math.degrees(e.angular_velocity[0]), 3), round(e.specific_force[0], 3))

@@ -24,7 +24,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", ["documented", "firmware"])
 
 
 class Bench(AnyBench):
-    """A session with a simulated LOIS ECU. It begins 1.5 s after the session has become nominal.
+    """A session with a simulated LOIS ECU. A new bench has been in state nominal for 1.5 s.
 
     ``steps``: encoder ticks of one turn of a wheel.
     """

@@ -75,12 +75,12 @@ VARIED = (
 )
 """Names of motions in ``test/integrity/lois_odometry.py``: drives of 5 m, and turns of 80° to 400°.
 
-The seed of a drive determines its speed.
+The seed of a drive determines its speed, and its curve or angle.
 """
 
 
 def varied(name: str, seed: int) -> Program:
-    """Return the program of one of the motions ``VARIED``. Its speed is random, from the seed."""
+    """Return the program of one of the motions ``VARIED``. The seed sets its random values."""
     random = Random(f"varied {name} {seed}")
     if name.startswith("place"):
         rpm, angle_rad = random.uniform(7, 20), math.radians(random.uniform(80, 400))
@@ -96,7 +96,7 @@ def varied(name: str, seed: int) -> Program:
 
 
 def jerky(seed: int, seconds: float = 20.0) -> Program:
-    """Return random set-points of either sign, each for 0.2 to 1.2 s.
+    """Return random set-points of up to 25 RPM in either direction, each for 0.2 to 1.2 s.
 
     About 15 % of them are Stop.
     """
@@ -114,6 +114,8 @@ class Drive:
     """The outcome of a drive.
 
     ``true``: true pose at the time of the last estimate.
+
+    ``way_m``: true length of the driven path.
 
     ``turned_rad``: sum of the absolute values of all true turns.
     """

@@ -110,9 +110,10 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 
 @pytest.mark.parametrize("leap_s", [-0.2, -0.05, 0.05, 0.2])
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
-    """All reads are in time. Then the board's clock jumps by up to 0.2 s. A read may be as late.
+    """All reads are in time. Then the board's clock jumps by 0.05 s or 0.2 s, ahead or back.
 
-    The delay of the next tick report is irregular. It would not be irregular without the jump.
+    The delay of the next tick report differs by as much, and is irregular. Without the jump, it is
+    not irregular.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

@@ -117,7 +117,8 @@ def test_a_board_that_was_left_in_another_mode_is_fetched_back(
 def test_a_board_without_checksum_is_driven_without() -> None:
     """The user wants lines without checksums, which value 4 of command 0x11 selects.
 
-    This command also overwrites the left wheel's "short correction". The driver restores the value.
+    This command also overwrites the left wheel's "short correction", another setting of the board.
+    The driver restores its value.
     """
     rig = Rig(nominal("firmware"), LoisEcuSettings(with_sum=False))
     while not rig.driver.confirmed:

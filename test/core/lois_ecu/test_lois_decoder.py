@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the LOIS decoder on undamaged and damaged streams."""
+"""Tests of the LOIS decoder on undamaged and damaged streams.
+
+A *group* is the lines of one report.
+"""
 
 import itertools
 from random import Random
@@ -278,9 +281,9 @@ def test_a_line_that_lost_its_end_costs_no_other() -> None:
 
 
 def test_a_wrong_checksum_is_refused_and_a_missing_one_only_where_it_is_required() -> None:
-    """A line with a wrong checksum is always refused.
+    """A line with a wrong checksum is always discarded.
 
-    A line without a checksum is refused only where a checksum is required.
+    A line without a checksum is discarded only if the decoder requires checksums.
     """
     heading = encode_report(Heading(5))
     for sum_required in (True, False):

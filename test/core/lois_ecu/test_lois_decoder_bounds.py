@@ -86,8 +86,8 @@ def test_any_lines_are_taken_in_any_chunks_with_equal_results(
 def test_motors_without_current_are_no_end_of_a_torque_record(code: bytes) -> None:
     """A torque sample of 0/0 looks like the end of the record, but more samples follow.
 
-    The decoder continues to read after it. The command byte of a torque record differs between
-    firmware and manual; both are tested.
+    The decoder continues to read after this sample. The command byte of a torque record differs
+    between firmware and manual; both are tested.
     """
     decoder = LoisDecoder()
     decoder.expect_record(RecordKind.TORQUE, 3, 3)

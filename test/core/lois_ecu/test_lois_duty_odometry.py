@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Odometry of a LOIS robot that is driven by duty. The public firmware measures little of it."""
+"""Odometry of a LOIS robot driven by duty. The public firmware measures little of its motion."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ USUAL, SLOW = MotorSettings(), MotorSettings(time_constant_s=0.2)
 
 
 def by_duty(program: Program, seed: int, motor: MotorSettings = USUAL) -> Drive:
-    """Drive a program on the public firmware. The driver commands its speeds as duties."""
+    """Drive a program on the public firmware. The driver commands its wheels by duties."""
     settings = replace(nominal("firmware", seed), motors=(motor, motor))
     return Rig(settings, LoisEcuSettings(drive_mode="duty")).drive(program)
 
@@ -40,7 +40,7 @@ def test_a_forward_drive_that_the_firmware_does_not_count_is_in_the_odometry(see
 def test_a_duty_of_the_other_sign_brakes_the_wheels(seed: int) -> None:
     """The duty changes from backward to forward. The motors are slower than the driver assumes.
 
-    The wheels are braked by the new duty. They do not coast, and do not stop at once.
+    The new duty brakes the wheels: they neither coast nor stop at once. The odometry includes this.
     """
     one = by_duty([(3.0, BACK), (3.0, PUSH)], seed, SLOW)
     assert one.way_m > 1.4

@@ -29,7 +29,7 @@ def ticks(*clocks_ms: int) -> list[Report]:
 
 
 def listening(unit: ClockUnit = "ms") -> LateReads:
-    """Return a ``LateReads`` that has received ticks of 1000 to 1800 ms at 1.0 to 1.8 s."""
+    """Return a ``LateReads`` that has received clock counts of 1000 to 1800 at 1.0 to 1.8 s."""
     late_reads = LateReads()
     for clock_ms in range(1000, 2000, PERIOD_MS):
         at_s = clock_ms / 1e3
@@ -72,7 +72,7 @@ def test_a_backlog_may_come_in_several_reads() -> None:
 
 
 def test_a_report_between_ticks_has_the_time_of_the_ticks_before_it() -> None:
-    """Other reports have no clock. They follow the ticks directly."""
+    """Only tick reports have a clock. The board sends other reports directly after them."""
     found = read(listening(), 2.4, *ticks(2000), GpsTime(1, 2, 3), *ticks(2200, 2400))
     assert found == about(2.0, 2.0, 2.2, 2.4)
 
@@ -87,7 +87,7 @@ def test_a_report_whose_ticks_were_discarded_came_between_the_ticks() -> None:
 
 
 def test_if_every_read_is_late_the_times_do_not_drift() -> None:
-    """An adapter returns three reports every 0.6 s, and the rate of the clock is known within 1 %.
+    """An adapter returns three reports every 0.6 s. The board's clock is slow by 0.5 %.
 
     After 20 min, the last report of each read still has the time of its arrival.
     """
@@ -100,13 +100,19 @@ def test_if_every_read_is_late_the_times_do_not_drift() -> None:
 
 
 def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
-    """The board restarts during a late read, so its clock begins at zero."""
+    """The board restarts during a late read, so its clock begins at zero.
+
+    Each later report has the time of the last report before the restart, plus its own clock.
+    """
     found = read(listening(), 4.0, *ticks(2000, 100, 300, 500))
     assert found == about(2.0, 2.1, 2.3, 2.5)
 
 
 def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
-    """A clock in ns wraps every 4.3 s, so a low clock and fewer ticks may be a restart or not."""
+    """A clock in ns wraps every 4.3 s, so a low clock and fewer ticks may be a restart or not.
+
+    The reports then have the time of the read.
+    """
     late_reads = listening("ns")
     found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))
     assert found == (4.0, 4.0, 4.0)

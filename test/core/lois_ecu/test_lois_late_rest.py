@@ -22,7 +22,7 @@ FIRMWARE = pytest.mark.parametrize("firmware", [True, False], ids=["firmware", "
 
 
 def heard(given: list[Piece]) -> tuple[list[Report], LoisDecoder]:
-    """Decode the pieces. Return all reports, also those that only a silence completes."""
+    """Decode the pieces. Return all reports, even those completed by a silence, and the decoder."""
     decoder, found = LoisDecoder(), list[Report]()
     for at, data in given:
         if decoder.resolves_at <= at:

@@ -226,7 +226,7 @@ def test_a_record_of_headings_is_padded_with_362_degrees() -> None:
     ids=str,
 )
 def test_a_command_that_does_not_fit_is_refused(command: Command) -> None:
-    """The encoder refuses values out of range.
+    """The encoder rejects values out of range.
 
     An example is a period of 0: the board would send all the time, and so could not receive.
     """

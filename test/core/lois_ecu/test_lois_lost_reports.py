@@ -91,7 +91,7 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
     """Most reports are lost. The few others show one speed of the right wheel, which may rest.
 
-    The standard deviation of the heading is at least half of its error in this case.
+    The standard deviation of the heading is at least half of the error if the wheel rests.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):
@@ -131,8 +131,8 @@ def test_a_large_correction_by_the_heading_of_0x20_is_not_exact(
 ) -> None:
     """Reports are lost while the wheels start. The next one shows a turn that was not expected.
 
-    The odometry corrects the heading by 0x20. The filter is linear and the start is not, so the
-    error of this correction is part of the covariance.
+    The odometry corrects its heading by the board's odometry (0x20). The filter is linear, but the
+    motion of starting wheels is not. So the covariance includes an error of this correction.
     """
 
     def stddev_deg() -> float:

@@ -68,7 +68,7 @@ def test_whatever_happens_the_pose_stays_a_number(events: list[tuple[float, obje
 
 
 def test_the_first_group_behind_a_new_connection_lasts_as_long_as_it_took() -> None:
-    """After a reconnect, the robot starts backward between the first two groups.
+    """After a reconnect, the robot starts backward between the first two odometry reports.
 
     The covariance stays finite.
     """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Encoders with few and with many ticks per turn: the limits of counts have the size of motions.
+"""Encoders with few and many ticks per turn: the limits of tick counts depend on the resolution.
 
 The checks of the counts accept each motion of a wheel, and still notice errors and restarts.
 """
@@ -140,7 +140,7 @@ def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
 def test_a_wheel_that_rolls_back_proves_no_reset(
     per_turn: int, before_turns: float, after_turns: float
 ) -> None:
-    """A wheel rolls back by up to a turn, to a count near zero. This does not prove a reset."""
+    """A wheel rolls from a count of up to a turn to a count near zero. This proves no reset."""
     before, after = math.floor(before_turns * per_turn), math.floor(after_turns * per_turn)
     proof = ResetProof(Ticks(1000, before, before), per_turn, steady=False)
     assert not proof.look(Ticks(1200, after, after), 1.2)
@@ -148,7 +148,10 @@ def test_a_wheel_that_rolls_back_proves_no_reset(
 
 @RESOLUTIONS
 def test_a_jolt_of_one_tick_at_rest_proves_no_reset(per_turn: int) -> None:
-    """A wheel at rest is near an edge of its encoder, so its count changes by one tick."""
+    """A wheel rests near an edge of its encoder. Its count falls from 1 to 0.
+
+    This does not prove a reset.
+    """
     proof = ResetProof(Ticks(1000, 1, 0), per_turn, steady=True)
     assert not proof.look(Ticks(1200, 0, 0), 1.2)
 
@@ -174,7 +177,7 @@ def test_a_late_read_may_contain_a_restart(per_turn: int) -> None:
 
 @pytest.mark.parametrize(("per_turn", "rpm"), [(1, 20), (2, 10), (6, 3), (10, 2), (60, 2)])
 def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: int) -> None:
-    """A wheel rolls at its set-point, but an encoder with few ticks per turn seldom shows it."""
+    """A wheel rolls at its set-point, but its ticks are rare. No stall is reported."""
     watch = StallWatch(LoisEcuSettings(ticks_per_revolution=per_turn))
     for now, ticks in reports([(0.2, float(rpm), float(rpm))] * 60, per_turn, "ms"):
         watch.wrote(SetRpm(rpm, rpm), now - 0.2)
@@ -185,7 +188,8 @@ def test_a_wheel_whose_ticks_are_rare_does_not_look_stalled(per_turn: int, rpm: 
 def test_a_new_resolution_applies_to_a_reset_in_progress() -> None:
     """The user sets the resolution while the driver waits for the result of a reset.
 
-    A wheel rolls on by a quarter turn. Only with the new resolution, its count is near zero.
+    A wheel rolls on by a quarter turn. Only with the new resolution, its count is near zero and
+    proves the reset.
     """
     board = LoisEcuBoard(LoisEcuSettings(ticks_per_revolution=60))
     heading = encode_report(Heading(5))

@@ -99,7 +99,10 @@ def test_a_new_resolution_applies_while_the_driver_runs() -> None:
 @pytest.mark.parametrize("wrapped_for_s", [-0.25, 0.15])
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: float) -> None:
-    """The board restarts while its clock in ns is near zero in any case. The driver notices it."""
+    """The board's clock in ns is near zero because it wraps, and the board restarts at that time.
+
+    The driver notices the restart.
+    """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, wrapped_for_s)
     bench.board.reboot()
@@ -111,7 +114,10 @@ def test_a_restart_shows_although_the_clock_wraps(per_turn: int, wrapped_for_s: 
 @pytest.mark.slow
 @pytest.mark.parametrize("per_turn", [25, 1000])
 def test_a_drive_back_while_the_clock_wraps_is_no_restart(per_turn: int) -> None:
-    """The robot drives out and back. Clock and counts are near zero then, and a read is late."""
+    """The robot drives out and back. Clock and counts are near zero then, and a read is late.
+
+    No restart is assumed.
+    """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=per_turn), steps=per_turn)
     begin_drive(bench, -2.6)
     bench.drive_on(-0.3, 2.6)

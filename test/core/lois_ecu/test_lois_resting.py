@@ -8,7 +8,7 @@ from omnibot_driver.core.lois_ecu.resting import RestingWheel
 
 GROUP_S = 0.1
 GAP_S = 0.5
-"""Time from one report to the next if most reports are lost."""
+"""Time in s from one report to the next if most reports are lost."""
 
 
 def told(*speeds_rpm: float, tuned: bool = False, every_s: float = GROUP_S) -> RestingWheel:
@@ -91,7 +91,7 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """While both wheels have the same speed, the board reports none. The driver estimates 28 RPM.
+    """Both wheels have the same speed, which the board cannot report. The driver estimates 28 RPM.
 
     Then the board reports 14 RPM several times. Compared with the estimate, the speed has fallen,
     so the wheel is at rest.

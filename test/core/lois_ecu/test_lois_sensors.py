@@ -24,7 +24,7 @@ from omnibot_driver.simulator.lois_ecu import DOCUMENTED, LoisSettings
 def test_gps_and_compass_come_in_si_units_and_enu() -> None:
     """The readings are in SI units, and a yaw of 0 points east.
 
-    The time of the GPS is unknown without a date. A position of 0/0 is not a fix.
+    The time is in UTC. A position of 0/0 is not a fix.
     """
     rig = Rig(
         LoisSettings(quirks=DOCUMENTED),
@@ -92,7 +92,7 @@ def test_declination_turns_the_heading() -> None:
 def test_false_headings_at_north_are_refused() -> None:
     """The public firmware averages headings around north wrongly: 359°, 1° and 1° give 120°.
 
-    The driver refuses such headings.
+    The driver rejects such headings.
     """
     rig = Rig(nominal("firmware"))
     rig.run(4.0)

@@ -73,7 +73,10 @@ def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
 @pytest.mark.slow
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_the_covariance_grows_while_the_board_is_silent(firmware: str) -> None:
-    """The board is silent and the robot may still be driving. The covariance grows meanwhile."""
+    """The board is silent, and the robot drives on. The covariance grows meanwhile.
+
+    So the error of the position stays within 3 sigma.
+    """
     bench = nominal(firmware)
     bench.drive_on(0.3, 4.0)
     bench.speaks = bench.hears = False

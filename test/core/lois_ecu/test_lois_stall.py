@@ -78,7 +78,8 @@ def looks_stalled(
 ) -> bool:
     """Return whether a wheel looks stalled.
 
-    ``rpm``: reported speeds, one pair every ``every_s``.
+    ``rpm``: reported speeds of left and right wheel, one pair every ``every_s``. ``targets``:
+    set-points in RPM. ``resting``: whether the odometry assumes the left and right wheel at rest.
     """
     watch, unit = StallWatch(settings or LoisEcuSettings()), UNIT_MPS
     watch.wrote(SetRpm(*targets), 0.0)
@@ -175,9 +176,9 @@ def test_a_wheel_at_rest_with_a_speed_below_its_set_point_is_left_alone() -> Non
 
 
 def heading(left: float, right: float, yaw_rad: float) -> tuple[float, float]:
-    """Return the velocity of the robot in the earth frame in m/s, at its present yaw.
+    """Return the robot's velocity in m/s along the x and y axes of the odometry frame.
 
-    ``left``, ``right``: speeds of the rims in m/s.
+    ``left``, ``right``: speeds of the wheels' rims in m/s. ``yaw_rad``: present heading.
     """
     speed = (left + right) / 2
     return speed * math.cos(yaw_rad), speed * math.sin(yaw_rad)

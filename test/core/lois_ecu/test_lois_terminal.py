@@ -141,7 +141,7 @@ def test_odometry_stops_in_a_terminal_mode_and_continues_after_it(
 
 @FIRMWARE
 def test_an_estop_is_obeyed_in_a_terminal_mode(firmware: str) -> None:
-    """The e-stop is latched and released in a terminal mode. Motion is still refused."""
+    """In a terminal mode, the board obeys an e-stop. After its release, motion is still refused."""
     bench = Bench(firmware)
     configure(bench, GPS)
     bench.run_until(lambda: bench.board.terminal_mode == 1)
@@ -266,7 +266,8 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
     """The robot is at rest, but the driver still writes its settings, and then the mode.
 
-    Later the board sends its own messages, so it is not in the mode any more.
+    Later the board sends its own messages, so it is not in the mode any more. Both times, the
+    reason for a refusal is that the mode is changing.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)

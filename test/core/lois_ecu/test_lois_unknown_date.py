@@ -30,7 +30,9 @@ WORKS = pytest.mark.parametrize(
 
 
 class GpsRig(Rig):
-    """A robot whose GPS has no date at first.
+    """A robot whose GPS may have no date.
+
+    ``dated``: whether the GPS has a date.
 
     ``unknown``: date that the GPS sends while it has none.
 
@@ -84,7 +86,7 @@ def test_a_position_without_a_date_is_not_a_fix(
 ) -> None:
     """A position is a fix only if the GPS also reports a date.
 
-    Without a date, it sends zeros, or the first day of a GPS epoch (1024 weeks).
+    Without a date, the GPS sends zeros, or the first day of a GPS epoch (1024 weeks).
     """
     rig = GpsRig(quirks, unknown=unknown)
     rig.run(6.0)

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A driver session and a simulated MART, in simulated time, with a bad network between them."""
+"""A driver session and a simulated MART, in simulated time. The network between them may be bad."""
 
 import math
 from collections.abc import Callable
@@ -75,7 +75,7 @@ class NetworkRobot(MartRobot):
 
 
 def sleeps(board: SimulatedMart) -> bool:
-    """Skip the next five ticks if nothing is due in them. Return whether they were skipped."""
+    """Skip five ticks of the board if nothing is due in them. Return whether they were skipped."""
     if board.server.wake_at <= (board.ticks + 5) * TICK_S:
         return False
     board.ticks += 5

@@ -39,6 +39,8 @@ class Outcome(NamedTuple):
     ``ended``: whether the robot rests at the end, and the server answers.
 
     ``stop_s``: the longest time from a stop to standstill.
+
+    ``way_m``: the driven distance.
     """
 
     ended: bool

@@ -43,7 +43,7 @@ def on(network: NetworkFaults, firmware: Firmware, seed: int = 0) -> MartBench:
 
 
 def reach(bench: MartBench, goal: Pose) -> str:
-    """Command the goal, and wait for its end. Return the driver's messages."""
+    """Command the goal, and wait until it is over or discarded. Return the notices as one text."""
     seen, texts = len(bench.events), list[str]()
 
     def ended() -> bool:

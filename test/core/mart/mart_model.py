@@ -39,13 +39,14 @@ class Driver(NamedTuple):
 
     ``unanswered``: the number of stops without an answer.
 
-    ``moved``: whether the last motion was a controlled move.
+    ``moved``: whether the last motion was a controlled move (``MOVES``).
 
-    ``counted``: whether the encoder was read after the stop, when no late command could do harm.
+    ``counted``: whether the encoder was read after the last stop, at a time when no late command
+    could do harm.
 
     ``greeted``: whether the driver has stopped the server once.
 
-    ``underway``: whether MCS may be in progress, as far as the driver knows.
+    ``underway``: whether the motors may be under direct control (MCS), as far as the driver knows.
     """
 
     state: State = State.UNKNOWN
@@ -74,7 +75,7 @@ class World(NamedTuple):
 
 
 Rules = Callable[[State, str, Motion], bool]
-"""Table of the commands allowed in each state and motion."""
+"""The table of commands, as a function: whether a command is allowed in a state and motion."""
 Allowed = Callable[[State, Motion], tuple[str, ...]]
 """The same table, as a function that returns all commands allowed in a state and motion."""
 Step = tuple[str, World]
@@ -280,8 +281,8 @@ def _replied(what: str, world: World, reply: Reply) -> Iterator[Step]:
 def _heard(what: str, world: World, reply: str, late: bool) -> Iterator[Step]:
     """Yield the conclusions that the driver may draw from a reply that it receives.
 
-    ``late``: whether the reply is late. The driver does not accept a late reply to a check or a
-    controlled move, because these take longer than a reply can be late.
+    ``late``: whether the reply is late. The driver does not accept a late reply to a check, a
+    controlled move or MSM. A check and a move take longer than a reply can be late.
     """
     driver = world.driver
     state = driver.state

@@ -43,10 +43,11 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
 MOST_DATAGRAMS: Final = 7
 """Largest number of disturbed datagrams in each direction, divided by the number of wishes.
 
-Each of these datagrams is disturbed in a trial of its own. Regular queries are not counted.
+Each of these datagrams is disturbed in a trial of its own. Regular queries, and all replies that
+are numbers, are not counted.
 """
 PROOF_S: Final = 0.25
-"""Longest time in s from the failure of the IMU to the start of a motion.
+"""Longest allowed time in s from the failure of the IMU to the start of a motion.
 
 In this time, the check before the motion may have been made while the IMU still worked. A later
 motion is a fault of the driver.
@@ -60,7 +61,7 @@ AWAY_S: Final = tuple(n / 5 for n in range(0, 41))
 BACK_S: Final = (0.2, 0.7, 30.0)
 """Times in s for which the network works after the first interruption.
 
-After this time, the network is interrupted again, for 1 s.
+After this time, the network is interrupted again, for 1 s. A trial with 30 s ends before that.
 """
 ENDS_S, SETTLED_S = 16.0, 1.5
 
@@ -73,15 +74,16 @@ class Trial(NamedTuple):
 
     ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
 
-    ``number``: the disturbed datagram's number in that direction, from 0, without regular queries.
+    ``number``: the disturbed datagram's number in that direction, from 0. Regular queries, and
+    replies that are numbers, are not counted.
 
     ``fate``: what happens to this datagram.
 
     ``met``: command that the server is executing when the driver starts; empty for none.
 
-    ``away_s``: duration of a first interruption of the network, from the start on.
+    ``away_s``: duration in s of a first interruption of the network, from the start on.
 
-    ``back_s``: time from the end of the first interruption to a second one, which lasts 1 s.
+    ``back_s``: time in s from the end of the first interruption to a second one, which lasts 1 s.
 
     ``ways``: the directions that are interrupted.
     """

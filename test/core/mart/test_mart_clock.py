@@ -65,7 +65,7 @@ def test_a_clock_that_may_be_set_back_is_set_at_once() -> None:
 
 
 def test_a_clock_that_is_set_back_between_two_drives_costs_one_start() -> None:
-    """The server's clock is set back. So the next forward drive (RM) reports about 1e15 degrees.
+    """The server's clock is set back. The next forward drive (RM) reports a heading of about 1e15°.
 
     The driver repeats the start once.
     """

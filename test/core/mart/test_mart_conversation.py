@@ -296,9 +296,9 @@ def test_a_late_count_of_a_motion_moves_nothing_back(stale: int) -> None:
 
 
 def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
-    """After a turn, a late encoder count of 3 is read as a turn of 3°.
+    """After a turn, a late encoder count of 3 is taken for the angle of the turn, 3°.
 
-    The wheel has turned farther, so the odometry uses the wheel.
+    The wheel has turned farther, so the odometry uses the count of the wheel.
     """
     odometry = MartOdometry(MartSettings())
     odometry.counted(0, at(0.5))

@@ -13,7 +13,7 @@ from omnibot_driver.simulator.mart import Firmware
 
 
 def test_a_missing_reply_to_a_cancelled_job_does_not_end_the_next_one() -> None:
-    """The request of a download is lost, and a command cancels this download.
+    """The request for a download is lost, and a motion command cancels this download.
 
     The next download succeeds.
     """

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 
 def seconds_to_move(bench: MartBench, vx: float, limit_s: float = 9.0) -> float:
-    """Command the speed until the robot moves, and return how long that takes, in s."""
+    """Command the speed until the robot moves, or for ``limit_s``. Return the duration in s."""
     began_s: float = bench.now
     while bench.robot.stands and bench.now < began_s + limit_s:
         bench.command(vx, 0.0, 0.1)

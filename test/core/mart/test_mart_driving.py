@@ -70,7 +70,7 @@ def test_no_motion_begins_without_a_proof_of_the_imu_that_is_younger_than_a_fift
 ):
     """On a slow network with losses, the driver checks the IMU before each start.
 
-    The start follows within 0.2 s.
+    The start follows within 0.2 s, apart from the delays of the network.
     """
     bench = MartBench(faults=NetworkFaults(lose=0.05, delay_s=0.05), seed=3).ready()
     for vx, yaw_rate in ((0.3, 0.0), (0.0, 0.5), (-0.2, 0.0)) * 2:
@@ -211,7 +211,7 @@ def test_odometry_is_told_twenty_times_a_second_and_sonars_only_while_still() ->
     assert len(bench.extras(SonarReading)) == before
 
 
-def test_inverted_encoder_and_gyro_are_parameters() -> None:
+def test_a_negative_scale_corrects_an_inverted_encoder() -> None:
     """The encoder of the robot counts down in forward motion.
 
     With a negative ``metres_per_count``, the pose is right.

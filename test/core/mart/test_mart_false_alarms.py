@@ -23,7 +23,7 @@ Its wheels still turn when the server no longer waits for the end of a stop.
 
 
 def test_one_heading_does_not_show_that_the_heading_is_constant() -> None:
-    """One heading cannot show that the heading is constant. The first one of a drive comes late.
+    """One heading cannot show that the heading is constant. A drive's first heading comes late.
 
     So the time without a change of the heading begins with this first heading.
     """

@@ -302,7 +302,7 @@ def test_a_copy_of_a_move_that_was_stopped_teaches_no_length_and_is_added_to_the
 def test_a_goal_that_no_command_can_express_is_refused(x_m: float) -> None:
     """A goal is more than 1000 m away, and its command could be too long for a request.
 
-    The driver refuses the goal. A later goal still moves the robot.
+    The driver rejects the goal. A later goal still moves the robot.
     """
     bench = MartBench().ready()
     with pytest.raises(CommandRefused, match="the limit is 1000 m"):

@@ -55,7 +55,7 @@ def test_a_job_ends_with_the_reason_that_ended_it() -> None:
         assert reason in done.message
 
 
-def test_docking_ends_at_the_dock_or_with_a_sentence() -> None:
+def test_docking_ends_at_the_dock_or_by_an_estop() -> None:
     """A docking job sends a move that ends at the dock (TF DOCK). At the dock, the job succeeds.
 
     An e-stop cancels a second docking job.

@@ -61,7 +61,7 @@ def test_a_count_that_follows_the_stop_of_a_turn_is_not_its_angle() -> None:
     """At the end of a turn, the stop overtakes an encoder query.
 
     So the angle in the reply to the stop comes before the count. The count is far from the expected
-    angle. The driver does not use it as the angle, nor learn the motors' speed from it.
+    angle. The driver neither uses the count as the angle nor learns the motors' speed from it.
     """
     bench = on(NetworkFaults(), "source")
     path = bench.robot.network[0].to_board
@@ -202,7 +202,7 @@ def test_a_late_reply_to_a_start_does_not_prove_the_stop() -> None:
 
 
 def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
-    """A lost server answers none of the many HELLOs. The driver remembers only the last ones."""
+    """A lost server answers none of many HELLOs. The driver remembers only the last HELLOs."""
     bench = on(NetworkFaults(lose=1.0), "firmware")
     bench.run(120.0)
     greetings = sum(data == b"HELLO" for _, data in bench.written)
@@ -214,7 +214,8 @@ def test_a_server_that_stays_silent_for_long_costs_no_memory() -> None:
 def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: bytes) -> None:
     """Every reply to the heading query (RMRA) is unusable, in a drive and at rest.
 
-    The driver reports it. The encoder is still read, and the next drive begins.
+    The driver reports that the server does not report the heading. It still reads the encoder, and
+    begins the next drive.
     """
     bench = on(NetworkFaults(), "source")
     network = bench.robot.network[0].from_board
@@ -241,9 +242,9 @@ def test_a_heading_that_never_comes_does_not_block_the_other_queries(reply: byte
 def test_a_drive_whose_last_heading_is_unread_leaves_an_uncertain_heading(
     firmware: Firmware,
 ) -> None:
-    """The robot drives a curve. From 0.5 s before the stop on, each RMRA is lost.
+    """The robot drives a curve. From 0.5 s before the stop on, each heading query (RMRA) is lost.
 
-    The driver ends the drive by the encoder. The covariance includes the turn that is missing.
+    The encoder shows the driver that the drive is over. The covariance includes the missing turn.
     """
     bench = on(NetworkFaults(), firmware)
     bench.command(0.3, 0.5, 2.5)

@@ -31,8 +31,8 @@ def at(at_s: float, *, doubtful: bool = False) -> Moment:
 def after_equal_motions(twist: tuple[float, float], quiet_s: float) -> MartBench:
     """Let the robot make two motions that end with equal encoder counts, and return the bench.
 
-    The replies during both motions are lost, until ``quiet_s`` after the driver begins to stop
-    them. Check that the covariance always covers the error.
+    During each motion, all replies are lost, until ``quiet_s`` after the driver begins to stop the
+    motion. Check that the covariance always covers the error.
     """
     bench = MartBench("source", gyro_noise_dps=0.0).ready()
     pilot, counts = bench.board._pilot, []
@@ -229,9 +229,9 @@ def test_two_queries_that_are_answered_alike_each_time_are_both_answered() -> No
 
 
 def test_a_change_that_is_answered_by_the_angle_of_just_now_is_answered() -> None:
-    """The reply to a change of speed (RMCS) has the angle that RMRA has just reported.
+    """The reply to a change of speed (RMCS) has the same angle as the last reply with a heading.
 
-    The reply is not taken for a copy of the earlier one.
+    The reply to RMCS is not taken for a copy of that reply to the heading query (RMRA).
     """
     talk = Conversation(0.3)
     asked(talk, words.RMCS, b"ok 1.00", 0.5, 0.01)

@@ -144,9 +144,9 @@ def test_a_server_that_is_restarted_while_it_checks_the_imu_gets_no_motion_too_s
 def test_a_server_that_is_restarted_in_a_controlled_move_is_noticed_before_the_move_would_end(
     boot_s: float, x_m: float, y_m: float, firmware: Firmware
 ) -> None:
-    """The server restarts in a move of 3 m. The motors keep their last command.
+    """The server restarts on the way to a goal, 3 m away. The motors keep their last command.
 
-    The driver stops the robot within 5 s.
+    The driver stops the robot within 5 s after the server has started up.
     """
     bench = MartBench(firmware).ready()
     bench.go_to(x_m, y_m, 0.0)

@@ -152,7 +152,8 @@ def compared(server: Server) -> Server:
 def test_the_simulated_firmware_does_what_the_model_does(word: str) -> None:
     """The model and the simulated firmware agree in every state in which the server answers.
 
-    A busy server executes only the commands on its stop port, so only these are compared.
+    A busy server executes only the commands on its stop port, so only these are compared. ``L`` is
+    not compared after the stop port has stopped a motion (``released``).
     """
     for server, way in servers().items():
         if server.port in ("hung", "waits") or (server.released and word == "L"):

@@ -41,7 +41,7 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
     """A motor turns from the first unit on, but its speed at 26 units is measured too low.
 
     A straight line through these speeds would show motion at zero units, which is impossible. The
-    speed at 14 units is then higher than expected. This does not lower the expected speed.
+    measured speed at 14 units is then higher than expected. It must not lower the expected speed.
     """
     line = MotorLine()
     for _ in range(8):
@@ -94,9 +94,9 @@ def test_whatever_is_measured_the_units_rise_with_the_speed(
 def test_a_long_straight_drive_leaves_the_other_speeds_of_the_line_as_they_were(
     slope: float, dead: float, seed: int
 ) -> None:
-    """The robot drives for a long time at one speed, with noise.
+    """The robot drives for a long time at one speed, which is measured with noise.
 
-    The units for other speeds do not change.
+    The units for another speed change by at most 3.
     """
     random, line = Random(seed), MotorLine()
     for units in (40.0, 12.0, 40.0, 12.0):
@@ -123,9 +123,9 @@ def test_a_wheel_that_stands_although_it_should_turn_gets_more_units() -> None:
 
 
 def test_a_start_that_moved_nothing_is_followed_by_one_with_three_times_the_units() -> None:
-    """A start does not move the robot.
+    """A start does not move the robot. The next starts use three times its units, but at most 20.
 
-    The next starts use three times the units, but at most 20.
+    A start with 30 units that fails does not raise the units of the next starts.
     """
     loop = SpeedLoop(MartSettings())
     assert loop.first_units(0.1, 0.45) == 4

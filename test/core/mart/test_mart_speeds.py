@@ -72,7 +72,7 @@ def test_a_curve_with_a_slow_inner_wheel_is_as_fast_as_commanded(dead_units: flo
 def test_a_first_turn_on_the_spot_that_is_far_too_slow_is_begun_anew_once(
     dead_units: float, firmware: Firmware
 ) -> None:
-    """The motors are unknown, so the first turn is 25 % to 40 % too slow.
+    """The driver has not measured the motors yet, so the first turn is 25 % to 40 % too slow.
 
     The driver begins the turn again, once.
     """
@@ -110,9 +110,9 @@ def test_a_small_error_late_in_the_first_turn_does_not_interrupt_it() -> None:
 
 @pytest.mark.parametrize("learned", [False, True])
 def test_a_turn_that_was_held_back_is_not_followed_by_a_far_faster_one(learned: bool) -> None:
-    """Something, such as a door sill, slows a turn for a second.
+    """Something, such as a door sill, slows a turn for about a second.
 
-    The next turn is not much too fast.
+    Afterwards, the robot does not turn much too fast.
     """
     bench = MartBench("source").ready()
     if learned:

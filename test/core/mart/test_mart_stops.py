@@ -261,7 +261,7 @@ def test_the_estop_is_repeated_while_it_is_latched(firmware: Firmware) -> None:
 def test_the_stop_port_is_used_a_network_delay_after_the_last_stop(
     motion: tuple[float, float],
 ) -> None:
-    """A command on the stop port directly after a usual stop (SM or SRM) could hang a port.
+    """A command on the stop port directly after a usual stop (SM or SRM) could hang the server.
 
     So the driver waits for more than the network delay.
     """

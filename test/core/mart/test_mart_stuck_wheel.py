@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A wheel that is stuck in a turn on the spot, or in a drive backward.
+"""Tests of a wheel that is stuck in a turn, in a drive or in a controlled move.
 
 The controller reports the count of the right wheel only. It measures turns by the gyro.
 """
@@ -65,8 +65,8 @@ def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
 ) -> None:
     """The right wheel is stuck, so each start turns the robot by the left wheel until it fails.
 
-    After three starts the driver refuses this motion until the command ends. A new command then
-    moves the robot again.
+    After three starts the driver refuses this motion until the command ends. When the wheel is
+    free, a new command moves the robot again.
     """
     bench = MartBench("source").ready()
     bench.server.chassis.change(stuck="right")

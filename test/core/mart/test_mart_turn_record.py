@@ -35,7 +35,7 @@ GOALS = [(1.0, 1.0, 3.0), (-1.0, 0.5, -2.0), (0.5, -1.0, 1.5), (0.0, 0.0, 0.0)]
 
 
 def go(bench: MartBench, goal: Pose) -> None:
-    """Command the goal and wait until the driver has ended it."""
+    """Command the goal, and wait until the diagnostics show that it is over."""
     bench.go_to(goal.x_m, goal.y_m, goal.yaw_rad)
     bench.run_until(lambda: bench.board.figures.own["Goal"].startswith("over"), 120.0)
 
@@ -169,9 +169,10 @@ def test_records_are_read_only_until_they_have_shown_the_ratio_of_the_motors() -
 
 
 def test_the_record_of_an_earlier_turn_is_not_used() -> None:
-    """The server's file system is full. LAST TURN sends an earlier turn with the same angle.
+    """The server's file system is full, so a new turn is not recorded.
 
-    That record is not used.
+    LAST TURN sends the record of an earlier turn with the same target angle. The driver does not
+    use this record.
     """
     bench = MartBench("source").ready()
     for yaw_rad in (math.pi / 2, math.pi, -math.pi / 2, 0.0):
