@@ -17,9 +17,10 @@ from omnibot_driver.core.packets import NO_PACKETS, Packets
 from omnibot_driver.core.readings import DisplacementReading
 
 WAG_S, WAG_UNITS = 0.2, 2
-"""A small turn that the driver makes when the heading is constant.
+"""A small turn that the driver makes in a drive if the reported heading is constant.
 
-A working IMU shows the turn. Without it, a straight drive and a dead IMU would look the same.
+A working IMU shows this turn. Without the turn, a straight drive and a dead IMU would look the
+same.
 
 ``WAG_S``: time in s for which the heading is constant before the driver makes this turn.
 
@@ -27,7 +28,7 @@ A working IMU shows the turn. Without it, a straight drive and a dead IMU would 
 """
 
 STARTED_M: Final = 0.01
-"""Least distance in m that shows that the units of a motion are enough for the motors to turn."""
+"""If the robot has moved this distance in m, the present units are enough to turn the motors."""
 
 
 class Adjusting(Moves):
@@ -50,7 +51,7 @@ class Adjusting(Moves):
         change = self.loop.change(abs(twist.vx_mps), twist.yaw_rate_radps, now)
         self.commanded = twist
         if change is None and self._heading_is_told and self._frozen_s > WAG_S:
-            change = (-WAG_UNITS, WAG_UNITS)  # a working IMU shows this; the next change undoes it
+            change = (-WAG_UNITS, WAG_UNITS)  # the next change undoes this small turn
         if change is None:
             return NO_PACKETS
         right, left = change
@@ -73,7 +74,8 @@ class Adjusting(Moves):
     def _predict_turn(self) -> None:
         """Pass the expected ratio of wheel speeds (left / right) to the odometry.
 
-        The odometry computes the turn from this ratio while the server does not report the heading.
+        In turns on the spot, the odometry computes the turn from this ratio. In backward drives
+        (B), it does so while the server does not report the heading. Otherwise the ratio is None.
         """
         told = self.motion is Motion.REFERENCE or self.motion in self.health.heading_told
         if self.motion is Motion.REVERSE and not told:
@@ -87,9 +89,9 @@ class Adjusting(Moves):
             self.odometry.left_over_right = None
 
     def _doubt_the_left_wheel(self, seconds: float) -> None:
-        """Add uncertainty to the odometry: the left wheel may have turned for ``seconds``.
+        """Add uncertainty to the odometry: the left wheel may have turned unseen for ``seconds``.
 
-        The left wheel has no encoder.
+        The left wheel has no encoder, and the right wheel may be stuck.
         """
         units = self._turns.units if self.motion is Motion.SPIN else self.loop.units
         most_m = units * self.loop.per_unit_mps * seconds

@@ -50,9 +50,9 @@ TRAITS: Final = Traits(
     },
 )
 ANSWERED: Final = NoticeReading("", halt=False)
-"""A reading without effect. It only shows that the server answers.
+"""A reading without effect, which only shows that the server answers.
 
-NOTHING_MEASURED would make the motion monitor forget the motion before it.
+The reading NOTHING_MEASURED would also make the motion monitor forget its earlier measurements.
 """
 EXPECTED_EVERY_S: Final = 0.2
 SILENT: Final = "the server no longer answers; check its power and the network, then call again"
@@ -87,8 +87,8 @@ class MartBoard(Board):
     def mode(self) -> Mode:
         """The mode of the board.
 
-        The mode is nominal as soon as the server has answered the first stop, unless HELLO
-        has shown that it is another kind of server.
+        The mode becomes nominal when the server has answered the first stop, unless the server is
+        lost, or HELLO has shown that it is another kind of server.
         """
         return self._mode
 
@@ -128,7 +128,7 @@ class MartBoard(Board):
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:
         """Return the readings that a datagram from this channel yields.
 
-        A reply without a value yields ANSWERED.
+        Once the mode is nominal, a reply that yields nothing else yields ANSWERED.
         """
         if channel == words.COMMAND:
             self._pilot.hear(data, now)
@@ -140,13 +140,13 @@ class MartBoard(Board):
         return readings
 
     def silence(self) -> None:
-        """Set the mode to unknown, because the silent server may have been restarted."""
+        """Set the mode to unknown and cancel the job: the silent server may have been restarted."""
         self._mode = Mode.UNKNOWN
         self._pilot.jobs.cancel(SILENT)
         self._pilot.fell_silent()
 
     def flush(self, now: float) -> list[Reading]:
-        """End the present job (a request besides motion), because the port has closed.
+        """End the present job, such as a download, because the port has closed.
 
         Return the readings that are left. The job's result is one of them.
         """
@@ -229,10 +229,11 @@ class MartBoard(Board):
 
     @property
     def is_fresh(self) -> bool:
-        """Whether the server has not yet driven forward (RM) since it was started.
+        """Whether the server reports a heading of exactly zero, as it does until its first RM.
 
-        Only then may its clock be set back. Later, the next RM would report a wrong heading,
-        because it integrates the turn rate over the time since the previous RM.
+        RM is the forward drive. Only before the first RM may the server's clock be set back. Later,
+        the next RM would report a wrong heading, because RM integrates the turn rate over the time
+        since the previous RM.
         """
         return self._pilot.odometry.heading.is_zero
 
@@ -261,8 +262,8 @@ class Conductor:
     def is_zero(self, order: Order) -> bool:
         """Return whether the order is so slow that the driver regards it as a standstill.
 
-        A goal (GoTo) is never regarded as a standstill. Raises CommandRefused if it is too far away
-        for the server's commands.
+        A goal (GoTo) is never regarded as a standstill. Raises CommandRefused if the goal is more
+        than FARTHEST_M (m) away from the robot.
         """
         if isinstance(order, GoTo):
             way_m = self._pilot.odometry.pose.way_to(order.place).way_m

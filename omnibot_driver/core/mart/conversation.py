@@ -28,20 +28,20 @@ from omnibot_driver.core.mart.words import (
 from omnibot_driver.core.packets import Packets
 
 QUICKEST_S: Final = 0.1
-"""Shortest time in s to wait for the reply to a query, in addition to the time the server needs."""
+"""Least time in s to wait for the reply to a query or change, besides the time the server needs."""
 SMOOTHING: Final = 0.2
 LOSS, LOSS_S = 1.5, 0.02
 """Increase of ``trip_s``, the average duration of a query, after an unanswered query.
 
-The new value is ``LOSS * trip_s + LOSS_S`` (s). The driver then waits longer for the next reply,
-because the missing reply may only be late.
+The new value is ``LOSS * trip_s + LOSS_S`` (s), at most ``delay_s``. The driver then waits longer
+for the next reply, because the missing reply may only be late.
 """
 SLOW_S, DISTURBED_S = 0.06, 5.0
 """Times in s that determine whether the network is regarded as disturbed.
 
 In a disturbed network, a reply may answer an earlier query instead of the last one.
 
-``SLOW_S``: a query whose reply takes longer is a sign of a disturbance.
+``SLOW_S``: an urgent query (PRESSING) whose reply takes longer is a sign of a disturbance.
 
 ``DISTURBED_S``: the network is regarded as disturbed for this time after the last sign.
 """
@@ -274,7 +274,7 @@ class Conversation:
         last reply to ``word`` was different.
         """
         if word.kind is not Kind.QUERY:
-            return False  # RMCS reports the same angle as RMRA
+            return False  # equal replies are usual: RMCS reports the same angle as RMRA
         before, _ = self._answers.get(word, (reply, now))
         return reply != before and self._has_come(reply, now, but=word, kinds=NUMBERS)
 

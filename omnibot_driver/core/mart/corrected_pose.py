@@ -16,22 +16,24 @@ from omnibot_driver.core.mart.settings import MartSettings
 from omnibot_driver.core.mart.turn_angle import TurnAngle
 
 UNHEARD_M, UNHEARD_RAD = 0.4, 0.3
-"""Standard deviations, in m and rad, of a motion that is not measured while a connection is
-lost."""
+"""Standard deviations of a motion that is not measured while the connection is lost.
+
+``UNHEARD_M``: position, in m. ``UNHEARD_RAD``: heading, in rad.
+"""
 ANY_RAD: Final = 1.8
 """Standard deviation of an unknown heading, in rad."""
 RUN, END_RUN_M, END_RUN_RAD = 0.1, 0.04, math.radians(3.0)
-"""Standard deviations of the distance or turn of a controlled move that was not counted.
+"""Standard deviations of the distance or turn of a controlled move that was not measured.
 
-Such a distance or turn is estimated. ``RUN``: its relative error. ``END_RUN_M``, ``END_RUN_RAD``:
-additional errors of a distance in m, and of a turn in rad.
+The driver estimates this distance or turn. ``RUN``: relative error of the estimate.
+``END_RUN_M``, ``END_RUN_RAD``: additional errors of a distance in m, and of a turn in rad.
 """
 
 
 class CorrectedPose:
     """The pose of the robot, and its covariance.
 
-    ``pose``: pose at the last count.
+    ``pose``: pose at the last encoder count, in the odometry frame.
 
     ``turn``: angle of the present or last turn on the spot.
     """
@@ -75,7 +77,7 @@ class CorrectedPose:
         return True
 
     def run_before(self, is_straight: bool, amount: float) -> None:
-        """Add the first of two runs of the last move to the pose. Only the second run was counted.
+        """Add the first of two runs of the last move to the pose. Only the second was measured.
 
         A duplicate of the request has started the second run. ``amount``: the expected distance of
         a complete run in m, or its turn in rad.
@@ -90,7 +92,7 @@ class CorrectedPose:
             self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def lose_turn(self) -> None:
-        """Add the error of the turn since a restart of the server in a motion.
+        """Add the error of a motion whose turn is unknown, because the server was restarted in it.
 
         The motors keep their last command, and the server's relative heading begins at zero.
         """

@@ -39,7 +39,8 @@ TOLD_TURN_RAD, TOLD_TURN = math.radians(0.7), 0.006
 PIVOT: Final = 0.01
 """Standard deviation of the distance between the robot's centre and the point about which it turns.
 
-It is a fraction of the track width, and applies to turns on the spot.
+It is a fraction of the track width, and applies to turns on the spot by 1 rad or more. For smaller
+turns, it is multiplied by the angle in rad.
 """
 STRAIGHT_STDDEV_RAD: Final = math.radians(1.5)
 """Standard deviation in rad of the heading after a straight controlled move."""
@@ -91,6 +92,8 @@ class Doubt:
     ) -> None:
         """Add the errors of a displacement by ``way_m`` and ``turn_rad`` within ``seconds``.
 
+        ``heading_rad``: heading before the displacement, in the odometry frame.
+
         ``bend``: standard deviation of the wheel speed ratio; 0 for a measured turn.
 
         ``aside_m``: standard deviation of the position across the motion, in m.
@@ -126,16 +129,17 @@ class Doubt:
         ]
 
     def begin(self) -> None:
-        """Store the present heading error, because a motion begins.
+        """Store the present constant heading error of computed turns, because a motion begins.
 
-        ``heading_told`` later removes the error that has been added in this motion.
+        ``heading_told`` later removes the constant error that this motion has added.
         """
         self._bend_before_rad = self._levers[2][2]
 
     def heading_told(self) -> None:
-        """Remove the heading error of this motion, because the server now reports the heading.
+        """Remove a part of this motion's heading error, because the server now reports the heading.
 
-        Until then, the turn was computed from the commands. The resulting position error remains.
+        Until now, the turn was computed from the commands. Its constant heading error is removed.
+        Its random heading error and the resulting position error remain.
         """
         x_m, y_m, _ = self._levers[2]
         self._levers[2] = x_m, y_m, self._bend_before_rad
@@ -187,7 +191,7 @@ class Doubt:
     def total(self, more: Errors) -> Covariance:
         """Return the covariance of the pose.
 
-        ``more``: further errors, from the time since the last count.
+        ``more``: further errors, from the time since the last encoder count.
         """
         scale, drift = self.settings.wheel_scale**2, self.settings.gyro_drift_radps**2
         size, bias, *others = self._levers

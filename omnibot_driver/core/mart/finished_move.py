@@ -13,7 +13,10 @@ from omnibot_driver.core.mart.goal import INCH_M
 from omnibot_driver.core.mart.words import TB, TF, Request
 
 LEAST_LIKE: Final = 0.65
-"""A move is regarded as incomplete if its measured part is below this fraction of the request."""
+"""A move is regarded as incomplete if its measured distance or turn is below this fraction.
+
+It is a fraction of the requested or of the expected distance or turn, whichever is smaller.
+"""
 SETTLES_S, S_PER_DEG, S_PER_IN = 0.7, 1 / 70, 1 / 8
 """Usual duration of a move in s: SETTLES_S, plus S_PER_DEG per degree or S_PER_IN per inch.
 
@@ -98,7 +101,7 @@ class Done:
 
     @property
     def contradicts_the_server(self) -> bool:
-        """Whether the right wheel has turned much less or much more in a completed turn.
+        """Whether the right wheel has turned much less or much more than a completed turn requires.
 
         The server ends a turn by the gyro, so one of the wheels may be stuck or slip.
         """

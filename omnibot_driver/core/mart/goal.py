@@ -41,8 +41,8 @@ WORTH_DEG: Final = 1.0
 WIDER: Final = 0.5
 """How much each turn since the last straight move increases the allowed heading error.
 
-It is a fraction of the initial allowed error. Without it, the robot could turn back and forth,
-because turns overshoot.
+It is a fraction of the initial allowed error. Without the increase, the robot could turn back and
+forth, because turns overshoot.
 """
 MOST_MOVES: Final = 9
 """Largest number of moves to one goal. After them, the driver gives the goal up."""
@@ -76,7 +76,7 @@ class Surplus:
     def degrees(self, wanted: float, *, slow: bool) -> int:
         """Return the degrees to request for a turn by ``wanted`` degrees.
 
-        0 if the turn would reduce the heading error by less than WORTH_DEG.
+        The result is 0 if the turn would reduce the heading error by WORTH_DEG or less.
         """
         surplus = self._degrees[slow]
         asked = max(1, round(wanted - surplus))
@@ -91,7 +91,7 @@ class Surplus:
         return request.word in (MCR, MCL) or (b"SLOW" in request.data.split()) in self._learned
 
     def expected(self, request: Request) -> float:
-        """Return the distance in m, or the turn in rad to the left, of a complete move."""
+        """Return the distance forward in m, or the turn to the left in rad, of a complete move."""
         parts = request.data.split()
         slow, asked = b"SLOW" in parts, float(parts[-1])
         sign = -1.0 if request.word in (TB, MCR) else 1.0

@@ -58,7 +58,10 @@ NO_HEADING: Final = (
     " the odometry is uncertain: check the network and the server"
 )
 PRESENT_S: Final = 0.35
-"""Silence in s up to which a server has certainly not been restarted."""
+"""A server whose silence was at most this long has certainly not been restarted.
+
+The limit is PRESENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
+"""
 ABSENT_BUSY_S: Final = 2.5
 """Silence in s after which a server that may be busy is regarded as absent.
 
@@ -179,7 +182,7 @@ class Ground:
     def blind_since_s(self) -> float | None:
         """The start time of a controlled move that is in progress or may run again, or None.
 
-        During this time the server reports no measurements.
+        During such a move, the server reports no measurements.
         """
         moves = self.motion in (Motion.STRAIGHT, Motion.TURN)
         again = self._last_move is not None and self._copies_stopped_s >= self._rested_s

@@ -137,7 +137,8 @@ class Health:
     def _status(self, bits: int) -> None:
         """Record the status of the motor board.
 
-        A status other than 0 must come twice, because a late encoder count can look like one.
+        A status other than 0 must come twice in a row, because a late encoder count can look like a
+        status.
         """
         if not 0 <= bits <= NO_READ:
             return
@@ -178,8 +179,8 @@ class Health:
     def strays(self, now: float) -> None:
         """Record that the robot moves although no motion is commanded.
 
-        If RM (forward drive) has failed shortly before, the server has started the motors and
-        reported a failure. It is defective.
+        If RM (forward drive) has failed shortly before, the server has started the motors although
+        it reported a failure. Such a server is defective.
         """
         self._defective |= now < self._reference_failed_s + STRAYS_S
 

@@ -124,7 +124,10 @@ class Hearing(Measuring):
         return max(self.conversation.answered_trip_s, self.imu.transit_s)
 
     def _greeted_of_name(self, now: float) -> float:
-        """Return the earliest time at which the driver may have sent the HELLO just answered."""
+        """Return the earliest time at which the HELLO that was just answered may have been sent.
+
+        The result is minus infinity if this time is unknown.
+        """
         longest_s = min(2 * self._delay_s, QUICKEST_S + 3 * self._trip_s)
         recent = [each for each in self._greetings if each >= now - longest_s]
         self._greetings = recent[1:]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Jobs: requests to the controller besides motion, one at a time.
+"""Jobs: requests that do not come from motion topics, such as a download. One runs at a time.
 
 A file arrives in unnumbered pieces of 512 bytes. This module knows commands and replies; it does
 not know when the command port is free. The caller passes the time.
@@ -19,13 +19,16 @@ from omnibot_driver.core.mart.words import Form, Request, Word
 
 PIECE: Final = 512
 QUIET_S: Final = 1.0
-"""Time in s without a piece after which the driver does not expect further pieces of a file."""
+"""Time in s without a piece after which the driver does not expect further pieces of a file.
+
+If all bytes of the file have come, a third of this time is enough.
+"""
 RECORD_S, RECORD_QUIET_S = 0.25, 0.15
 """Times in s to wait for the record of a turn. The robot is at rest while the driver waits.
 
 ``RECORD_S``: for the reply to the request, plus the duration of three average queries.
 
-``RECORD_QUIET_S``: for each piece of the file.
+``RECORD_QUIET_S``: for each piece of the file after the first one.
 """
 TIMES: Final = 3
 """Largest number of times that the driver sends the request of a repeatable job (REPEATED)."""
@@ -63,7 +66,7 @@ WORD_OF: Final[dict[Job, Word]] = {
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
 OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
-"""Jobs that the driver begins by itself, and that give way to a job of the user."""
+"""Jobs that the driver begins by itself. Until it sends one, a job of the user can replace it."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs whose request may be sent again if the reply is missing."""
 
@@ -91,7 +94,7 @@ class Jobs:
         self._clear()
 
     def forget_log(self) -> None:
-        """Record that the server has no log, because it was restarted."""
+        """Assume that the server keeps no log: it was restarted, or the connection is new."""
         self.logging = self.log_may_be_lost = self.ended = False
 
     def _clear(self) -> None:

@@ -13,7 +13,7 @@ from omnibot_driver.core.mart.doubt import CLOCK_S
 WINDOW_S, SPREADS = 0.35, 4
 """Averaging time of speeds: WINDOW_S (s), or SPREADS times a reply's time uncertainty if longer."""
 LEAST_S: Final = 0.05
-"""Shortest time in s between two counts that is used to compute a speed."""
+"""Least time in s that is assumed between two counts, when a speed is computed from them."""
 
 
 class MeanSpeeds:

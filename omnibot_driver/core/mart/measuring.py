@@ -100,7 +100,7 @@ class Measuring(Starts):
             rested = when.from_s >= self._rested_s and self.odometry.wheel.certain
             if rested and self.odometry.motion is not Motion.NONE:
                 self._end_move(now)
-                before = None  # it belongs to the motion
+                before = None  # this change of the count belongs to the ended motion
             self._watch_stray(before, count, now)
         elif self.state is State.TURNING:
             self._turns.seen_radps = rate
@@ -125,7 +125,8 @@ class Measuring(Starts):
             return
         if now - self._stray_s < STRAY_AGAIN_S:
             return
-        if not self.conversation.disturbed(now):  # else it may be a copy, or an unanswered start
+        # in a disturbed network, the cause may be a copy or an unanswered start
+        if not self.conversation.disturbed(now):
             self.health.strays(now)
         # the robot has not been at rest since the last start, or since a restart of the server
         unknown = self._stood_s < max(self.appeared_s, self._started_s)

@@ -79,7 +79,8 @@ class Moves(Asking):
         ``sure``: whether the reply certainly belongs to this move.
         """
         motion = self.motion
-        copies_s = self._started_s + 2 * self._delay_s  # of earlier requests, and their replies
+        # until then, copies of earlier requests and their replies may come
+        copies_s = self._started_s + 2 * self._delay_s
         slow = self._is_slow_stop(reply, motion, now)  # the target was reached nevertheless
         if sure and (slow or isinstance(reply, Ok)) and now >= copies_s:
             self.odometry.wheel.started()
@@ -107,15 +108,15 @@ class Moves(Asking):
     def _learn_from(self, move: Request, now: float) -> None:
         """Learn by how much a move that has ended goes beyond its target.
 
-        On a good network, the driver first downloads the server's record of a turn, because it is
-        more exact.
+        On a good network, the driver first downloads the server's record of a turn, because this
+        record is more exact than the wheel's measurement.
         """
         turns = move.word in (words.MCR, words.MCL)
         if turns and self._records.wanted and not self.conversation.disturbed(now):
             try:
                 self.jobs.ask(Job.TURN_RECORD, None, now)
             except RequestRefused:
-                pass  # the user has called a job
+                pass  # another job is in progress
             else:
                 self._records.asked()
                 self._recorded = move

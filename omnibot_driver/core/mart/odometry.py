@@ -36,8 +36,8 @@ class MartOdometry(Reckoning):
     def told(self, now: float, *, blind_since_s: float | None) -> OdometryReading:
         """Return the odometry, predicted to ``now``.
 
-        ``blind_since_s``: start time of the present controlled move, or None outside a controlled
-        move.
+        ``blind_since_s``: start time of a controlled move that is in progress or may run again, or
+        None.
         """
         speed_mps, rate_radps = self.speeds.means
         counted_s = self.wheel.told_s

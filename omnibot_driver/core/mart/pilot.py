@@ -47,10 +47,10 @@ VOLTS_AFTER_S: Final = STARTS_UP_S - 0.1
 The voltage must be known before the first motion (STARTS_UP_S).
 """
 VOLTS_S: Final = 10.0
-"""Time in s after a voltage query (VOLTS) from which unanswered requests do not delay the next one.
+"""Time in s since the last voltage query (VOLTS) after which the driver no longer delays VOLTS.
 
 VOLTS crashes a server that is starting up. An unanswered request can be the sign of a restart, so
-the driver delays VOLTS after such a request.
+the driver delays VOLTS after such a request, but not beyond this time.
 """
 SILENT_S, SILENT_AFTER_MOVE_S, GREET_AGAIN_S = 0.15, 0.05, 0.1
 """Times in s after which the driver sends the query HELLO to a silent server.

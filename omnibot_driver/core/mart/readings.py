@@ -35,11 +35,11 @@ class DockedReading:
 
 @dataclass(frozen=True, slots=True)
 class JobDone:
-    """The result of a job, which is a request to the controller besides motion.
+    """The result of a job, such as a gyro calibration, a docking move or a download.
 
     ``token``: the object by which the caller recognises the job.
 
-    ``name``, ``content``: empty without a file.
+    ``name``, ``content``: of the downloaded file; empty without a file.
     """
 
     token: object

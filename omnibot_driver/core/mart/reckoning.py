@@ -35,11 +35,11 @@ Unequal motors cause this turn.
 BLIND_MPS: Final = 0.3
 """Standard deviation of the speed of a robot whose motion is unknown, in m/s."""
 ACCELERATION_RADPS2: Final = 3.0
-"""Standard deviation of the turn acceleration since the last count, in rad/s²."""
+"""Standard deviation of the turn's acceleration since the last encoder count, in rad/s²."""
 FRESH_S: Final = 0.2
-"""Largest age in s of the last heading with which the measured turn rate is still valid."""
+"""The measured turn rate is valid while the last reported heading is at most this old, in s."""
 ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
-"""Assumptions for the end of a drive whose heading is unread.
+"""Assumptions for the end of a forward drive (RM) after which the heading was not read.
 
 ``ROLLS_S``: time in s for which the robot coasts. ``MOST_RADPS``: largest turn rate in rad/s.
 ``UNREAD_MPS``: standard deviation of the measured speed, in m/s.
@@ -49,7 +49,7 @@ ROLLS_S, MOST_RADPS, UNREAD_MPS = 0.3, 1.5, 0.1
 class Reckoning(CorrectedPose):
     """Dead reckoning by the encoder count and the relative heading.
 
-    ``motion``: the motion whose counts are being processed.
+    ``motion``: the motion to which new encoder counts belong; Motion.NONE after its last count.
 
     ``stands``: whether the robot was stopped; it may still coast.
 

@@ -15,7 +15,7 @@ from omnibot_driver.core.mart.moment import Moment
 
 DOUBT_RAD: Final = 0.1
 ACCELERATION_RADPS2, MOST_RADPS = 3.0, 1.0
-"""Largest plausible acceleration (rad/s²) and rate (rad/s) of a turn."""
+"""Largest plausible acceleration (rad/s²), and change of the turn rate (rad/s), of a robot."""
 OLD_RAD: Final = 0.01
 """Largest difference in rad at which the first heading in a forward drive (RM) may be an old one.
 
@@ -25,8 +25,8 @@ a late reply.
 MOST_RAD: Final = 1e7
 """A heading of this size in rad or more is rejected, such as 1e15 degrees.
 
-The server reports it after its clock was set back: it integrates the turn rate over unsigned
-milliseconds, and a negative time becomes huge.
+The server reports such a heading after its clock was set back. It integrates the turn rate over
+unsigned milliseconds, and a negative time becomes huge.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is extrapolated, from its last report to a count."""
@@ -56,7 +56,7 @@ class RelativeHeading:
         self._turned_rad = 0.0
         self.same = 0
         self.may_begin_anew = False
-        """Whether the server may have been restarted since the last heading, and reports zero."""
+        """Whether the next heading may be the zero of a server that was restarted."""
         self._odd = 0
         self._track: deque[tuple[float, float]] = deque(maxlen=40)
 

@@ -31,7 +31,10 @@ def is_standstill(wanted: Wanted) -> bool:
 
 
 def is_turn_ramped(wanted: Wanted, now: float) -> bool:
-    """Return whether the yaw rate in a ramp differs from the final one by more than RAMP_LEFT."""
+    """Return whether a ramp still keeps the commanded yaw rate far from its final value.
+
+    Far means a difference of more than RAMP_LEFT times the final value.
+    """
     if wanted is None or isinstance(wanted, Stop | EmergencyStop):
         return False
     present, final = wanted.order(now), wanted.final

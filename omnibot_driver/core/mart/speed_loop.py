@@ -46,10 +46,13 @@ LEARN_TRIPS, LESS_PER_S = 4, 10.0
 SLOWEST_MPS: Final = 0.015
 """A wheel whose measured speed in m/s is above this is regarded as turning."""
 SLOWEST_START_MPS: Final = 0.03
-"""Slowest wheel speed in m/s with which a motion starts, so that the server sees the wheel turn."""
+"""Slowest wheel speed in m/s with which RM (forward) starts, so that the server sees it turn."""
 LEAST_UNITS: Final = 4
 MORE_TIMES: Final = 3
-"""If a start does not turn the motors, the units of the next start are larger by this factor."""
+"""Factor by which the units of the next RM (forward) grow after a start that turned no motor.
+
+The new units are at most MOST_DEAD, unless RM needs more for the commanded speed.
+"""
 HOLD_PER_S, HOLD_MOST_RAD = 1.0, 0.06
 HOLD_AFTER_S: Final = 1.0
 """The heading error is not integrated for this time in s after a new commanded turn rate."""
@@ -119,7 +122,10 @@ class SpeedLoop(Motors):
         self._clear(now + SETTLE_S)
 
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
-        """Return the units with which both motors start: those that the slower wheel needs."""
+        """Return the units with which RM (forward) starts both motors, at most 60.
+
+        They are those that the slower wheel needs, or more if an earlier start did not turn it.
+        """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
         units = min(60, self._right.wanted_units(slower_mps / self.per_unit_mps))
@@ -226,8 +232,8 @@ class SpeedLoop(Motors):
     def _judge_missed(self, *, right_only: bool) -> None:
         """Undo those unanswered changes of the units that have not arrived at the server.
 
-        The driver finds them by the measured speeds: without these changes, the units fit the
-        speeds best.
+        The driver assumes the set of missing changes with which the units fit the measured speeds
+        best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:

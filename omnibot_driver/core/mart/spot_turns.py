@@ -24,7 +24,8 @@ OFF, OFF_AGAIN, EARLY_S = 0.05, 0.12, 1.0
 
 ``OFF``: for the first turn, until it has had a steady rate for EARLY_S (s).
 
-``OFF_AGAIN``: afterwards. It is larger, because the new start disturbs more than a small error.
+``OFF_AGAIN``: afterwards. It is larger, because a new start disturbs the robot's motion more than
+a small error of the rate.
 """
 HELD, LEAST_LESSON = 0.6, 0.6
 """Limits for turns that something slows down, as fractions of the commanded rate.
@@ -68,7 +69,7 @@ UNSURE_PART times the expected turn, plus the turn during two queries.
 JUST_SET_S: Final = 2.0
 """Time in s for which the server certainly keeps the speed of turns that SSP has set."""
 SLOW_UNITS: Final = 20
-"""Speed of backward drives (B) and of turns on the spot with the word SLOW, in motor units."""
+"""Motor units with which the server starts B (backward) and turns on the spot at the speed SLOW."""
 SETTING_REFUSED: Final = (
     "the server does not accept a speed for turns on the spot, so it makes all of them at its"
     " own speed SLOW, which is faster than most commanded turns; `spin_speed: fixed` has the"
@@ -79,9 +80,9 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn.
+    ``units``: motor units of the last turn, or of the next one as soon as they are requested.
 
-    ``seen_radps``: measured rate of the last turn.
+    ``seen_radps``: measured rate of the last turn, in rad/s.
 
     ``settings`` may be replaced.
     """
@@ -173,7 +174,7 @@ class SpotTurns:
     def _is_off(self, rate_radps: float, steady_s: float, *, disturbed: bool) -> bool:
         """Return whether the turn's rate is so wrong that the driver must begin the turn anew.
 
-        False while the commanded rate changes.
+        The result is False while the commanded rate changes.
         """
         if disturbed or not self._is_seen(steady_s):
             return False
@@ -226,8 +227,8 @@ class SpotTurns:
     ) -> None:
         """Evaluate the angle in the reply to the stop of a turn, or None if there was no angle.
 
-        ``uncounted_s``: time from the last count to the stop. ``disturbed``: whether the network is
-        disturbed, so that nothing is learned.
+        ``uncounted_s``: time in s from the last count to the stop. ``turned_s``: time in s since
+        the turn began. ``disturbed``: whether the network is disturbed, so that nothing is learned.
         """
         odometry = self._odometry
         spun_rad = odometry.turn.spun_rad

@@ -154,7 +154,7 @@ class Starts(FailedStarts):
         return words.B.request("SLOW")
 
     def _check(self, now: float) -> Packets:
-        """Return the check of the IMU, unless a late reply could be mistaken for its reply."""
+        """Return the check of the IMU if it is due, and no late reply can look like its reply."""
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS
@@ -239,7 +239,8 @@ class Starts(FailedStarts):
         self._no_starts, self.health.heading_changes = 0, 0
         self.state = WHILE[self.motion]
         self._begun_s = now
-        copies_s = self._started_s + 2 * self._delay_s  # of RST IMU, whose reply is ok too
+        # until then, the reply may be a copy of the ok to RST IMU
+        copies_s = self._started_s + 2 * self._delay_s
         sure = not self.conversation.disturbed(now) or now >= copies_s
         self.odometry.started(now, sure=sure and not answer.when.doubtful)
         if not sure:  # the start's own reply may still come

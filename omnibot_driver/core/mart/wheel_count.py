@@ -24,7 +24,7 @@ STRAY_COUNTS: Final = 3
 """Largest accepted change of the count of a robot at rest."""
 ODD_TIMES: Final = 3
 SAME_TIMES: Final = 2
-"""If this number of counts equal the last count before a start, the start is regarded as lost."""
+"""If this many counts are within 1 of the count before a start, the start is regarded as lost."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,8 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last count, if it equals the count before the start command. This command may
-    then be lost. Otherwise 0.
+    ``maybe``: the last count, if it differs by at most 1 from the count before the start command.
+    This command may then be lost. Otherwise 0.
     """
 
     def __init__(self) -> None:

@@ -3,7 +3,7 @@
 """The table of all commands of the MART controller: port, replies and times of each.
 
 A command is a case-sensitive ASCII datagram without a terminator. This module knows the commands;
-it does not know their permitted states (see ``states``) or times (see ``conversation``).
+it does not know in which state (see ``states``) or when (see ``conversation``) each may be sent.
 """
 
 from dataclasses import dataclass, field

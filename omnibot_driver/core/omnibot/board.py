@@ -45,7 +45,7 @@ TRAITS: Final = Traits(
     authorities=frozenset(Authority),
     requests=frozenset(Request),
     wheels=("A", "B", "C"),
-    unheard_s=0.3,  # the board may be restarting
+    unheard_s=0.3,  # after this time, the board may be restarting
     silence_s=1.5,  # the board sends something at least once a second
     advice={
         Fault.WRONG_WAY: (
@@ -166,7 +166,7 @@ class OmniBot:
 
     @property
     def advice(self) -> str | None:
-        """A sentence on a setting that the board's data contradicts; None if all settings fit."""
+        """A sentence on a setting that the board's data has contradicted; None until then."""
         return self._translation.suspicion.advice
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> list[Reading]:

@@ -2,8 +2,8 @@
 
 """The encoder that turns orders into the board's frames.
 
-The vendor found the velocity scales, 70 and 500, by trial. Commanded poses are assumed to be in mm
-and mrad.
+The vendor found the velocity scales by trial: 70 LSB per m/s, and 500 LSB per rad/s. Commanded
+poses are assumed to be in mm and mrad.
 
 This module knows orders and frames; it knows neither modes nor send times.
 """
@@ -94,14 +94,18 @@ class CommandEncoder:
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Encode wheel rates in rad/s for independent wheel drive.
 
-        On the line: rim speeds in ``linear_scale`` LSB per m/s.
+        The frame contains rim speeds, with ``linear_scale`` LSB per m/s.
         """
         unit = self._settings.linear_scale * self._settings.wheel_radius_m
         a, b, c = rates_radps
         return self._drive(frames.WHEEL_MODE, (a * unit, b * unit, c * unit))
 
     def meaning(self, packets: Packets) -> BodyTwist:
-        """Return the twist that is commanded by the last command frame in ``packets``."""
+        """Return the twist that is commanded by the last command frame in ``packets``.
+
+        The result is zero for Stop, the emergency stop and data without a command frame. For a
+        goal, the result has no meaning.
+        """
         settings = self._settings
         mode, a, b, c = frames.last_command(packets[-1][1])
         linear = settings.linear_scale
@@ -113,9 +117,10 @@ class CommandEncoder:
         return BodyTwist(0.0, 0.0, 0.0)
 
     def drive_to(self, pose: Pose) -> bytes:
-        """Encode a goal for positional control. The zero goal is a real position, not Stop.
+        """Encode a goal in the board's own frame, for positional control.
 
-        Raises CommandRefused above 16 bits, or if a high byte is a letter (S, P, R).
+        A goal at the origin is a real position, not Stop. Raises CommandRefused if a value exceeds
+        16 bits, or if a high byte is a letter (S, P, R).
         """
         position, heading = self._settings.position_scale, self._settings.heading_scale
         counts = (pose.x_m * position, pose.y_m * position, pose.yaw_rad * heading)

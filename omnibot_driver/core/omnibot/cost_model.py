@@ -67,9 +67,11 @@ BAD_TEXT: Final = 4.0
 """Cost of a complete «Paused» text within unexplained bytes. Its nine fixed bytes hardly arise by
 chance."""
 KNOWN_GAP: Final = 11.0
-"""Cost of a pause within a frame, on a line that has so far paused only between frames.
+"""Cost of a pause within a frame, if the line has so far paused only between frames.
 
-The cost is high, so only strong evidence makes the decoder accept the frame.
+A pause of ``late_reads.IDLE_S`` or longer has this cost on any line.
+
+The cost is high, so only strong evidence makes the decoder accept a frame with such a pause.
 """
 CUT_SHORT: Final = 6.0
 """Cost of a frame that is incomplete because the line was closed."""
@@ -144,7 +146,7 @@ class Context(NamedTuple):
     deltas: int = 0
     """Number of deltas since the last pose."""
     shaken: bool = False
-    """Whether the last IMU frame had an unusual norm, or differed much from the one before it."""
+    """Whether the last IMU frame had unusual acceleration, or differed much from the one before."""
     turned: int | None = None
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 

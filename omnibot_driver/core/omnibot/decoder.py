@@ -225,7 +225,8 @@ class FrameDecoder:
         directly.
         """
         pauses, calm = self.pauses, self.calm
-        # It came in one read. If frames begin only after a pause, no other one begins in this read.
+        # The last frame came in one read. If frames begin only after a pause, no other frame
+        # begins in this read.
         if self._arrived >= length:
             return not (pauses.sharp or (calm and pauses.collected and not due))
         in_time = pauses.at_pace or (calm and pauses.in_its_tick(start))

@@ -41,15 +41,15 @@ _POSE: Final = {
     "little": struct.Struct("<3fB").unpack_from,
 }
 
-# Making an unfrozen object, and turning it into a frozen one, takes a third of the time.
+# To make a frozen object takes three times as long as to make an unfrozen one and then freeze it.
 UnfrozenImu, UnfrozenDelta, UnfrozenPose = (
     type(kind.__name__, (), {"__slots__": vars(kind)["__slots__"]})
     for kind in (ImuFrame, DeltaFrame, PoseFrame)
 )
 
 LEARN_EVERY: Final = 8
-"""In a run of frames, at most one in ``LEARN_EVERY`` is used to learn the usual scatter of the IMU.
-More frames would add little."""
+"""Of consecutive frames, at most one in ``LEARN_EVERY`` is used to learn the usual scatter of the
+IMU. More frames would add little."""
 
 
 class Walk:

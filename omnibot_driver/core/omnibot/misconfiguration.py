@@ -63,7 +63,7 @@ class MisconfigurationChecks:
         self._moved: list[DisplacementReading] = []
 
     def displaced(self, reading: DisplacementReading) -> None:
-        """Store a delta. The sum of deltas is compared with the next pose, to check their frame.
+        """Store a delta, to compare the sum of deltas with the next pose (setting ``delta_frame``).
 
         ``reading``: the delta as the settings interpret it.
         """
@@ -100,7 +100,7 @@ class MisconfigurationChecks:
             )
 
     def posed(self, frame: PoseFrame, reading: PoseReading, order: ByteOrder) -> None:
-        """Check two settings with a new pose: the byte order of poses, and the frame of the deltas.
+        """Check two settings with a new pose: ``pose_byte_order`` and ``delta_frame``.
 
         ``reading``: the pose as the settings interpret it. ``order``: configured byte order.
         """
