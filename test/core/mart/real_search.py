@@ -43,8 +43,8 @@ WISHES: Final[dict[str, Callable[[MartBench], object]]] = {
 MOST_DATAGRAMS: Final = 7
 """Largest number of disturbed datagrams in each direction, divided by the number of wishes.
 
-Each of these datagrams is disturbed in a trial of its own. Regular queries, and all replies that
-are numbers, are not counted.
+Each of these datagrams is disturbed in a trial of its own. Regular queries and their replies are
+not counted.
 """
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
@@ -74,8 +74,8 @@ class Trial(NamedTuple):
 
     ``way``: direction of the disturbed datagram: 0 to the server, 1 from the server.
 
-    ``number``: the disturbed datagram's number in that direction, from 0. Regular queries, and
-    replies that are numbers, are not counted.
+    ``number``: the disturbed datagram's number in that direction, from 0. Regular queries and their
+    replies are not counted.
 
     ``fate``: what happens to this datagram.
 
@@ -142,6 +142,12 @@ class Carrier:
             heapq.heappush(self._late, (at_s, self._carried, way, packet))
             self._carried += 1
 
+    @property
+    def _is_polled(self) -> bool:
+        """Whether the driver waits for the reply to a regular query."""
+        pending = self.bench.board._pilot.conversation.pending
+        return pending is not None and pending.word.kind is words.Kind.QUERY
+
     def receive(self, data: bytes, now: float, channel: int) -> None:
         self._put(0, (channel, data), data in POLLS)
 
@@ -151,7 +157,7 @@ class Carrier:
             return out
         for _ in range(5):
             for channel, data in self.board.advance():
-                self._put(1, (channel, data), data[3:4].isdigit() or data[3:4] == b"-")
+                self._put(1, (channel, data), self._is_polled)
             while self._late and self._late[0][0] <= self.board.now_s:
                 _, _, way, (channel, data) = heapq.heappop(self._late)
                 if way:
