@@ -31,7 +31,10 @@ ROW_EVERY_S: Final = 1.0
 
 
 def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
-    """Run the demo with this board for ``seconds``, or until ``asked_to_end`` returns True.
+    """Run the demo with this board.
+
+    The robot drives for ``seconds``. The demo ends earlier if ``asked_to_end`` returns True, or if
+    the user quits the monitor.
 
     Raises ParameterError for an unknown board, ImportError without ROS, and DemoFailed if the demo
     cannot continue.
@@ -115,7 +118,10 @@ def run(board: str, seconds: float, asked_to_end: Callable[[], bool]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demo until its time is over, or until SIGINT or SIGTERM; return the exit code."""
+    """Run the demo; return the exit code.
+
+    The demo ends after its time, at SIGINT or SIGTERM, or when the user quits the monitor.
+    """
     parser = argparse.ArgumentParser(
         prog="demo",
         description="Lets a simulated robot drive a square. A real robot is not needed.",

@@ -58,7 +58,7 @@ def of(name: str) -> Capability:
 
 
 def port_arguments(name: str, ports: dict[str, str]) -> str:
-    """Return the arguments after ``--ros-args`` for this board.
+    """Return the arguments after ``--ros-args`` with which the driver is started for this board.
 
     ``ports``: addresses of the ports, by the name of the port's parameter.
     """

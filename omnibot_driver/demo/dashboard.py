@@ -16,7 +16,7 @@ from omnibot_driver.tools.monitor.screen import has_screen
 class Dashboard:
     """The tool ``monitor`` on this terminal, until the user quits it or ``close`` is called.
 
-    ``possible``: whether the terminal and the installed libraries allow this.
+    ``possible``: whether the terminal and the installed libraries allow the monitor.
     """
 
     def __init__(self, namespace: str) -> None:

@@ -19,9 +19,10 @@ class DemoFailed(Exception):
 
 
 class Program:
-    """A module of this package as a child process. The kernel ends it if this program ends first.
+    """A module of this package as a child process.
 
-    Ctrl-C does not reach the child process. ``end`` ends it.
+    Ctrl-C does not reach the child process. ``end`` ends the child process. The kernel ends it if
+    this program ends first.
     """
 
     def __init__(self, name: str, *arguments: str, console: bool = False) -> None:
@@ -60,7 +61,8 @@ class Program:
     def ask(self, question: str = "") -> str:
         """Send ``question`` to the process; return the next line that the process prints.
 
-        Raises DemoFailed if no line arrives. The process must have been started with ``console``.
+        Raises DemoFailed if the process has ended or prints no line in time, and ValueError if it
+        was started without ``console``.
         """
         stdin, stdout = self._process.stdin, self._process.stdout
         if stdin is None or stdout is None:

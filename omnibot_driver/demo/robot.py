@@ -30,8 +30,8 @@ from omnibot_driver.tools.monitor.rates import Rate
 REMEMBERED = 1000
 """Number of points of the path that are kept, enough for several laps."""
 ENOUGH_IMU_HZ, ENOUGH_ODOM_HZ = 20, 8
-"""Message rates in Hz that must be reached before the robot drives. Every board exceeds them when
-its driver has run for a while."""
+"""Message rates in Hz that must be reached before the robot drives. Every board exceeds these rates
+when its driver has run for a while."""
 
 
 class Robot:

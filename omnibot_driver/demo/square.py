@@ -59,7 +59,7 @@ def steer_ahead(pose: Pose, leg: int) -> tuple[int, BodyTwist]:
 
 
 def _progress(pose: Pose, leg: int) -> tuple[int, float, float]:
-    """Return the present leg, and the robot's distance along it and to its left, in m."""
+    """Return the present leg, and the robot's distances along the leg and to its left, in m."""
     turned = Pose(pose.x_m - SIDE_M / 2, pose.y_m - SIDE_M / 2).turned(-(leg % 4) * QUARTER_RAD)
     along_m, aside_m = turned.x_m + SIDE_M / 2, turned.y_m + SIDE_M / 2
     return _progress(pose, leg + 1) if SIDE_M - along_m <= CORNER_M else (leg, along_m, aside_m)

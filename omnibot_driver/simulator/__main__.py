@@ -56,7 +56,8 @@ def run(module: SimulatorModule, name: str, argv: Sequence[str] | None) -> int:
     """Run the board of ``module`` until a signal or ``quit``; return the exit code."""
     arguments = _parser(module).parse_args(argv)
     board, lines = options.from_arguments(arguments, module)
-    # The driver refuses relative paths, and the hint is for another terminal.
+    # The printed command needs absolute paths: the driver refuses others, and the user may run the
+    # command in another folder.
     links = [os.path.abspath(link) for link in getattr(arguments, "link", None) or []]
     try:
         with (
@@ -131,7 +132,8 @@ def _hints(module: SimulatorModule, name: str, served: ServedBoard[SimulatedBoar
 def _signals_as_readable() -> Iterator[int]:
     """Yield a descriptor that becomes readable when SIGINT, SIGTERM or SIGHUP arrives.
 
-    These signals have no other effect. SIGHUP is left alone if it is ignored, as by nohup.
+    These signals have no other effect. If the process already ignores SIGHUP, as under nohup, it
+    still ignores SIGHUP.
     """
     reader, writer = os.pipe()
     os.set_blocking(writer, False)
@@ -179,12 +181,12 @@ def _is_in_background(console: int) -> bool:
     """
     try:
         return os.tcgetpgrp(console) != os.getpgrp()
-    except OSError:  # not a terminal, or not that of this process
+    except OSError:  # the console is not this process's terminal
         return False
 
 
 def _typed(console: int) -> bytes:
-    """Return the next input of the console; empty at its end, or if the terminal is gone."""
+    """Return the next input of the console; empty at its end, or if the terminal was closed."""
     try:
         return os.read(console, 4096)
     except OSError:

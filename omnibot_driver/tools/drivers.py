@@ -38,7 +38,7 @@ def running_drivers(node: Any) -> list[str]:
 def discovery_advice(environment: Mapping[str, str] = os.environ) -> str:
     """Return the end of a message about a driver that was not found; usually empty.
 
-    With a discovery server, a process that is not a super client sees no driver in any list.
+    With a discovery server, only a process that is a super client can list the running drivers.
     """
     if not environment.get("ROS_DISCOVERY_SERVER"):
         return ""

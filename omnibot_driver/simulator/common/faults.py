@@ -45,7 +45,7 @@ class FaultyLine:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of bytes affected by each fault, by the name of the fault."""
+        """Numbers of ``lost`` and ``flipped`` bytes so far, by these names."""
         return Counter(lost=self.lost, flipped=self.flipped)
 
     def carry(self, data: bytes) -> bytes:

@@ -17,7 +17,8 @@ class NetworkFaults:
     """Faults of a network, per datagram and in both directions.
 
     lose, duplicate: probabilities.
-    delay_s: longest delay in s; uniformly distributed per copy, so the order may change.
+    delay_s: longest delay in s. Each datagram and each duplicate has its own random delay from 0 to
+        this value, so the order may change.
     """
 
     lose: float = 0.0
@@ -77,7 +78,7 @@ class FaultyNetwork:
 
     @property
     def counts(self) -> Counter[str]:
-        """Number of datagrams affected by each fault, in both directions, by the fault's name."""
+        """Numbers of ``lost`` and ``duplicated`` datagrams in both directions, by these names."""
         paths = (self.to_board, self.from_board)
         return Counter(
             lost=sum(path.lost for path in paths), duplicated=sum(path.duplicated for path in paths)

@@ -39,7 +39,10 @@ def load(module: str) -> SimulatorModule:
 
 
 def command(module: str) -> str:
-    """Return the shell command that runs this board; its ``--help`` lists the options."""
+    """Return the shell command that simulates the board of the package ``module``.
+
+    The command with ``--help`` lists the options of the board.
+    """
     board = module.rpartition(".")[2]
     return "simulator" if board == DEFAULT_BOARD else f"simulator --board {board}"
 
@@ -82,7 +85,7 @@ def from_arguments(
 def from_url(url: str, simulator: SimulatorModule) -> tuple[SimulatedBoard, list[Line]]:
     """Return the board and the lines that a URL such as ``sim://?seed=1&imu_only`` describes.
 
-    Raises OptionError.
+    Raises OptionError for an unknown option or an invalid value.
     """
     parts = urlsplit(url)
     if place := parts.netloc + parts.path:
@@ -99,7 +102,7 @@ def from_words(
 ) -> tuple[SimulatedBoard, list[Line]]:
     """Return the board and the lines that command line arguments describe.
 
-    Raises OptionError.
+    Raises OptionError for an unknown option or an invalid value.
     """
     parser = _Parser(add_help=False, allow_abbrev=False)
     add_options(parser, simulator)

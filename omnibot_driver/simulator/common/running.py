@@ -33,7 +33,8 @@ _JOIN_S = 5.0
 class RunningBoard(ABC, Generic[B]):
     """Runs a board in a thread from ``start`` to ``stop``; its packets pass through ``lines``.
 
-    ``dropped``: number of bytes that the driver did not read in time.
+    ``dropped``: number of bytes that were lost at the port, because the driver did not read them in
+    time or its UDP address is unknown.
 
     ``board``: other threads must hold ``lock`` while they use the board.
 
@@ -77,7 +78,10 @@ class RunningBoard(ABC, Generic[B]):
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop the thread and wait until it ends."""
+        """Stop the thread, and wait until it ends.
+
+        Raises RuntimeError if the thread has died, or does not end within 5 s.
+        """
         self._stopping.set()
         self._thread.join(_JOIN_S)
         if self._thread.is_alive():
@@ -117,7 +121,7 @@ class RunningBoard(ABC, Generic[B]):
                 due_s -= remaining_s
             self._collect(max(0.0, remaining_s))
             ticks, due_s = self._due(due_s)
-            if ticks > 1:  # this thread was late: earlier input comes before these ticks
+            if ticks > 1:  # this thread was late: receive waiting input before these ticks
                 self._collect(0.0)
             if ticks:
                 with self._ticked:
@@ -132,7 +136,7 @@ class RunningBoard(ABC, Generic[B]):
     def _due(self, due_s: float) -> tuple[int, float]:
         """Return the number of overdue ticks, and the time in s of the next tick.
 
-        The output of overdue ticks is sent at once, as on a real line.
+        The caller must run the overdue ticks at once.
         """
         late_s = time.monotonic() - due_s
         ticks = 0 if late_s < 0 else 1 + int(late_s / self.board.tick_s)

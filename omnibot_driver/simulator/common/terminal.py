@@ -18,10 +18,10 @@ from omnibot_driver.simulator.common.running import UNREAD_LIMIT
 class Terminal:
     """A new pseudo-terminal. The driver opens ``address``, the simulator uses ``descriptor``.
 
-    Beyond ``UNREAD_LIMIT`` unread bytes, bytes are lost.
+    While ``UNREAD_LIMIT`` bytes are unread, further bytes are lost.
 
     ``link``: path of a symbolic link. It replaces a dead link, or a link to a pseudo-terminal.
-    Raises FileExistsError if anything else is at this path.
+    Raises FileExistsError if anything else is at this path, and OSError if the link cannot be made.
     """
 
     def __init__(self, link: str | Path | None = None) -> None:

@@ -56,7 +56,9 @@ class UdpSocket:
 def open_sockets(count: int, port: int = 0) -> list[UdpSocket]:
     """Open ``count`` sockets on consecutive ports, beginning with ``port``.
 
-    If ``port`` is 0, any free ports are used. Raises OSError if the ports are not free.
+    If ``port`` is 0, the system chooses the first port. Raises OSError if the ports are not free or
+    do not
+    exist.
     """
     if not 0 <= port <= LARGEST - count + 1:
         raise OSError(

@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""A board with its lines, in board time: each packet passes through a line, perhaps a faulty one.
+"""A board with its lines, in board time. The lines carry packets, and can be faulty.
 
-Equal input gives equal output. This module knows channels and lines. It must not know real time or
-packets' meaning.
+Serial bytes to the board never have faults. Equal input gives equal output. This module knows
+channels and lines. It must not know real time or packets' meaning.
 """
 
 from collections.abc import Sequence
@@ -48,7 +48,10 @@ class WiredBoard(Generic[B]):
         self._board_began_s = 0.0
 
     def receive(self, data: bytes, now: float, channel: int = 0) -> None:
-        """Send data to the board through its line; ``now`` is in s, by any monotonic clock."""
+        """Send data to the board; ``now`` is in s, by any monotonic clock.
+
+        A datagram passes through its line. Serial bytes reach the board at once, without faults.
+        """
         line, time_s = self.lines[channel], self._time_s
         if isinstance(line, FaultyLine):
             self.board.receive(data, now, channel)

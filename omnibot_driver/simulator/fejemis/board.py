@@ -26,7 +26,7 @@ STEPS_PER_TICK = 2
 class SimulatedFejemis:
     """A simulated Fejemis with the common interface of simulated boards.
 
-    ``tick``: number of ticks since construction.
+    ``tick``: number of ticks of 2 ms since construction.
     """
 
     channels = CHANNELS

@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""The two distance sensors of the drive Teensy. They face a wall across the x axis.
+"""The two distance sensors of the drive Teensy, which look forward.
 
-The sonar measures only when it is triggered. The module knows only the robot's pose.
+A wall may lie across the x axis. The sonar measures only when it is triggered. The module knows
+only the robot's pose.
 """
 
 from math import cos

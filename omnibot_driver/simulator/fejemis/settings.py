@@ -2,7 +2,8 @@
 
 """Settings of the two simulated Teensys and their robot: sizes, firmware, planned faults.
 
-``Firmware`` has one switch for each point that the manual leaves open or its sources contradict.
+``Firmware`` has one switch for each point that the manual does not decide, or on which the manual
+and other sources differ.
 """
 
 from dataclasses import dataclass, field
@@ -18,10 +19,11 @@ WHEEL_BASE_M = 0.40
 class Firmware:
     """Variant of the firmware. Each switch decides one point on which the sources differ.
 
-    ``sums``: lines carry the checksum ``;NN`` and are checked. If False, lines have none (manual).
+    ``sums``: lines carry the checksum ``;NN`` and are checked. If False, lines have none, as in the
+    manual.
 
-    ``reverse``: angle of the front wheel for driving backward. ``mirrored``: the same as forward on
-    the same curve. ``clamped``: an angle beyond ±90° stays at ±90°.
+    ``reverse``: angle of the front wheel for driving backward. ``mirrored``: the same angle as for
+    driving forward on the same curve. ``clamped``: an angle beyond ±90° stays at ±90°.
 
     ``tilt``: ``pose`` has a fifth number.
 

@@ -165,7 +165,7 @@ class Teensy(Generic[C]):
             return b""
         self._told_s = now_s
         self._clock_s += STEP_S * self._rate
-        while self._clock_s >= (self._cycles + 1) * STEP_S:  # 0 to 2 cycles
+        while self._clock_s >= (self._cycles + 1) * STEP_S:  # true 0 to 2 times
             self._cycles += 1
             self._next_cycle()
         if not self._out:
@@ -223,7 +223,7 @@ class Teensy(Generic[C]):
             self.commands.append(Obeyed(self._told_s, body))
             self.say(self._items[word[:-1]]())
             return
-        for name, execute in self._commands.items():  # like strncmp, longest name first
+        for name, execute in self._commands.items():  # longest name first
             if body.startswith(name) and not (self._is_exact(name) and body != name):
                 self.commands.append(Obeyed(self._told_s, body))
                 execute(body[len(name) :])

@@ -120,7 +120,8 @@ class SimulatedLois:
     def terminal_mode(self) -> int:
         """Terminal mode that the last command 0x11 set.
 
-        The board sends messages of its own only in modes 0 and 4.
+        In other modes than 0 and 4, the board sends no periodic messages and no records. Without
+        the quirk ``button_is_lost_in_terminal_mode``, it still reports the e-stop button.
         """
         return self._terminal.mode
 

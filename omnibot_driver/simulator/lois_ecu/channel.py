@@ -15,8 +15,8 @@ TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_PER_TURN_US = 300_000
-"""Shortest level whose speed is measured, times the number of ticks per turn. With 60 ticks per
-turn, this level is 5 ms long: 200 RPM."""
+"""Duration in µs of the shortest encoder level from which a speed is computed, times the number of
+ticks per turn. With 60 ticks per turn, this level lasts 5 ms, which is a speed of 200 RPM."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024
@@ -92,7 +92,7 @@ class WheelChannel:
     def settle(self, now_s: float) -> None:
         """Set the measured speed to zero if the last edge is more than ``STALE_S`` ago.
 
-        The manual implies this. The quirk ``keeps_speed_of_stalled_wheel`` disables it.
+        The manual implies this. With the quirk ``keeps_speed_of_stalled_wheel``, the speed stays.
         """
         if not self._quirks.keeps_speed_of_stalled_wheel and now_s - self._ticked_s > STALE_S:
             self.rpm, self.exact_rpm = 0, 0.0
@@ -118,7 +118,11 @@ class WheelChannel:
     # Commands
 
     def command_rpm(self, rpm: int) -> None:
-        """Set the speed target in RPM (closed loop). Zero or a reversal stops the motor."""
+        """Set the speed target in RPM (closed loop).
+
+        If the target becomes zero or changes its sign, duty, measured speed and controller are
+        reset.
+        """
         self.open_loop = False
         if rpm == 0 or rpm * self._next_target < 0:
             self._halt()

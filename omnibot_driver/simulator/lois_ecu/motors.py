@@ -105,7 +105,7 @@ class Encoder:
     def __init__(self, steps: int, short: float, *, noise: float, random: Random) -> None:
         self._periods = 0.0
         self._level_from = self._level_to = 0.0
-        """Positions of the ends of the level at the sensor since the last edge, in periods."""
+        """Positions of both ends of the level that is at the sensor now, in periods."""
         self._per_turn = steps / 2
         self._short = short
         # The distance between two marks has the errors of both, hence the square root of 2.

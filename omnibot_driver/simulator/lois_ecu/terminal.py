@@ -31,7 +31,8 @@ class Terminal:
     def on(self) -> bool:
         """Whether the board is in a terminal mode.
 
-        In a terminal mode, it sends data of its sensors, and no messages of its own.
+        In a terminal mode, the board sends data of its sensors, and no periodic messages or
+        records.
         """
         return self.mode not in NO_TERMINAL
 

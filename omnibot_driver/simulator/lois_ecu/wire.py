@@ -69,7 +69,7 @@ class LineReader:
         self._buffer: list[str] = []
 
     def take(self, character: int) -> tuple[int, int] | None:
-        """Process a character. Return command and payload if it completes a line, else None."""
+        """Process a character. If it completes a valid line, return command and payload."""
         letter = chr(character)
         length = LINE_CHARACTERS if self.checks else LINE_CHARACTERS - 2
         if letter == ":" or len(self._buffer) >= length:
@@ -88,7 +88,7 @@ class LineReader:
         return command, high * 0x10000 + low
 
     def take_all(self, data: bytes) -> Iterator[tuple[int, int]]:
-        """Process many characters. Yield command and payload of each complete line."""
+        """Process many characters. Yield command and payload of each valid line."""
         for character in data:
             found = self.take(character)
             if found is not None:

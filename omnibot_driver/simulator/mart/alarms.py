@@ -187,8 +187,9 @@ def _hold_course(server: "MartServer", motion: Motion) -> None:
 def change_speed(server: "MartServer", motion: Motion, right: int, left: int) -> None:
     """Change the speeds of both wheels.
 
-    ``right``, ``left``: changes in register units, forward positive. If one wheel would be faster
-    than full speed, the other wheel becomes slower instead.
+    ``right``, ``left``: changes in units of the motor registers, of which 128 are full speed;
+    forward is positive. If one wheel would be faster than full speed, the other wheel becomes
+    slower instead.
     """
     new_right, new_left = motion.right - right, motion.left - left
     if motion.backward:

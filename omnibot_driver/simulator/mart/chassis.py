@@ -181,7 +181,9 @@ class Chassis:
 
 
 def sight_m(chassis: Chassis, front_m: float, rear_m: float, *, backward: bool) -> float:
-    """Return the distance in m from a sonar to the wall in its direction, or infinity.
+    """Return the distance in m from a sonar to the wall in its direction.
+
+    The result is infinity if the sonar faces no wall.
 
     ``backward``: whether it is the rear sonar; else it is the front sonar. The walls lie across
     the x axis, at ``front_m`` and ``-rear_m``.

@@ -2,8 +2,8 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-In the table of commands, the first row that fits the beginning of a request is used. This module
-knows command words and numbers; it does not know how a motion proceeds.
+The first row of the table of commands that fits a request is used. This module knows command words
+and numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -235,7 +235,7 @@ def _last_distance(server: "MartServer", text: str) -> str | None:
 
 
 def _clearance(server: "MartServer", text: str) -> str | None:
-    """Set the front clearance in inches (TFSFC). The next move forward (TF) stops below it."""
+    """Set the front clearance in inches (TFSFC). A nearer wall stops the next move forward (TF)."""
     server.motions[Kind.CONTROLLED_LINEAR].clearance_in = wire.integer(text[6:])
     return "ok"
 

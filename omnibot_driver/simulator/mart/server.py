@@ -168,7 +168,7 @@ class MartServer(ServerState):
     def wait(self, port: int, kind: Kind, then: Then | None, *args: Any) -> None:
         """Call ``then`` at the next notice that a motion of this kind has started or ended.
 
-        If a notice is already there, call it now.
+        If the motion already has a notice, call ``then`` now.
         """
         motion = self.motions[kind]
         if motion.posts:
@@ -179,9 +179,9 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give a notice to the first waiting port: a motion of this kind has started or ended.
+        """Give a notice to the first port that waits for the start or the end of such a motion.
 
-        If no port waits, keep the notice.
+        If no port waits for a motion of this kind, keep the notice.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -131,9 +131,10 @@ def record_sonar(server: "MartServer", text: str) -> str | None:
 
 
 def take_bias(server: "MartServer", text: str) -> str | None:
-    """Measure the gyro bias (SB). If the server has stopped using the IMU, it first opens the IMU.
+    """Measure the gyro bias (SB).
 
-    If that fails, SB fails.
+    If the server has stopped using the IMU, it first opens the IMU. SB fails if the IMU does not
+    answer then.
     """
     imu = server.imu
     if imu.closed and not imu.plugged(server.now_s):

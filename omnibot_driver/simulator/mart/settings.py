@@ -28,7 +28,8 @@ class Quirks:
     reference_start_counts_on: the start of RM continues the sample count of the previous stop of
         RM. If RM fails, it reports the failure text of the last F or B.
     speed_word_first: a speed word after the number is ignored.
-    zero_distance_is_unlimited: TF, TB, MCF and MCB do not end at a distance if it is 0 or a word.
+    zero_distance_is_unlimited: TF, TB, MCF and MCB drive without a limit if the request has 0 or a
+        word instead of a distance.
     echoes_distance: TF and TB report the distance computed from time, not the driven one.
     crashes_on_missing_numbers: TIME, CS, MCS, SFR, SRR and SDR end the server if a number is
         missing.
@@ -41,7 +42,8 @@ class Quirks:
     undocumented_commands: without this quirk, ENC is the only undocumented command.
     heading_in_reference_moves_only: the heading of RMRA changes in RM only.
     probe_turns: MCR 0 runs the motors until the wheel moves, or 0.5 s with a dead IMU.
-    heading_starts_off: RM's first sample adds half the turn rate * time since the previous RM.
+    heading_starts_off: RM's first sample turns the heading of RMRA by half the turn rate * time
+        since the previous RM.
     corrects_after_stop: TF, TB, PTF, MCF and MCB may correct the heading even in the sample in
         which they stop by themselves. This leaves one motor on, usually with one unit.
     """
@@ -102,7 +104,8 @@ class MartSettings:
 
     speed_mps_per_unit: wheel speed for one register unit at ``nominal_volts``.
 
-    dead_zone_units: a motor turns only above this number of units; the excess gives speed.
+    dead_zone_units: a motor turns only above this number of register units. Only the units above it
+        give speed.
 
     motor_inequality: how much faster the left motor is, as a fraction of the speed.
 

@@ -21,7 +21,8 @@ NEAR_READINGS_S = 0.15
 """Duration in s of the three sonar readings that confirm a near obstacle."""
 FARTHEST_IN = 254
 UNSIGNED_S = 2**64 / 1000
-"""Time in s that the server adds to a negative duration, because it counts ms without a sign."""
+"""Time in s that the server adds to a negative duration, because the server counts ms in an
+unsigned number."""
 FILES = 100
 
 Then = Callable[..., None]
@@ -137,7 +138,7 @@ class ServerState:
         self.last_files["TURN" if note.is_turn else "MOVE"] = note.name
 
     def sonar_in(self, *, backward: bool, ago_s: float = 0.0) -> int:
-        """Return the reading of a sonar ``ago_s`` ago, in inches.
+        """Return the reading that a sonar had ``ago_s`` seconds ago, in inches.
 
         The result is -1 if no wall is in range.
         """

@@ -36,7 +36,7 @@ def end_motion(server: "MartServer", motion: Motion) -> bool:
     """Stop an uncontrolled motion (F, B, RM, R, L).
 
     Return whether the caller must wait for the notice that the motion has ended. A motion that is
-    stopping already, or that the server does not supervise (except R and L), is left alone.
+    already stopping, or a drive (F, B, RM) that the server does not supervise, does not change.
     """
     if motion.kind is Kind.SPIN:
         if motion.stopping:

@@ -124,7 +124,7 @@ class SimulatedBoard:
 
     @property
     def odometry(self) -> BoardPose:
-        """The board's own pose, in mm and mrad as in the 5 Hz frame."""
+        """The board's own pose in mm and mrad, as the board sends it at 5 Hz."""
         return self._odometry.reported
 
     def hold(self, *, roll_rad: float = 0.0, pitch_rad: float = 0.0, yaw_rate: float = 0.0) -> None:

@@ -2,8 +2,8 @@
 
 """The firmware's odometry from its encoders (manual, Odometry equation).
 
-Each 25 Hz frame rounds its own difference. A host that adds these differences also adds rounding
-errors.
+Each 25 Hz message contains a rounded displacement. A host that adds these displacements also adds
+their rounding errors.
 
 This module knows encoder counts, the assumed dimensions and units. It must not know modes, time, or
 the true pose.
@@ -15,7 +15,7 @@ from omnibot_driver.simulator.omnibot.wire import Triple
 
 
 class Odometry:
-    """The board's own pose in its earth frame, and the motion since the last 25 Hz frame."""
+    """The board's own pose in its earth frame, and the motion that is not sent yet."""
 
     _body_unsent: tuple[float, float, float]
     _counts_unsent: Triple
@@ -28,7 +28,7 @@ class Odometry:
 
     @property
     def reported(self) -> BoardPose:
-        """The board's own pose, in mm and mrad as in the 5 Hz pose frame."""
+        """The board's own pose in mm and mrad, as the board sends it at 5 Hz."""
         return BoardPose(*(1000 * value for value in self.pose))
 
     def integrate(self, counts: Triple) -> None:
@@ -44,10 +44,7 @@ class Odometry:
         self._counts_unsent = (a_unsent + a, b_unsent + b, c_unsent + c)
 
     def difference(self) -> Triple:
-        """Return the motion since the last 25 Hz frame, in the units of such a frame.
-
-        The next call returns the motion from now on.
-        """
+        """Return the motion since the last call, in the units of the 25 Hz message."""
         words = self._counts_unsent
         if self._settings.frame == "body":
             words = _tenths(self._body_unsent)

@@ -32,7 +32,8 @@ LetterPlace = Literal["between", "anywhere"]
 Command = StateLetter | ControlFrame
 # The bytes held now, the completed frame or None, and whether the byte may belong to a frame.
 Step = tuple[bytes, ControlFrame | None, bool]
-# Stateless. Arguments: the bytes held, a new byte, and the pause before it in s.
+# A function that keeps no state. Arguments: the bytes held, a new byte, and the pause before the
+# new byte in s.
 Framing = Callable[[bytes, int, float], Step]
 
 _FIRST, _SECOND = COMMAND_HEADER
@@ -62,9 +63,9 @@ def naive(held: bytes, byte: int, pause_s: float) -> Step:
 
 
 def idle_gap(held: bytes, byte: int, pause_s: float) -> Step:
-    """Find frames as ``counting`` does, but discard an incomplete frame before a long pause.
+    """Find frames as ``counting`` does, but discard an incomplete frame after a pause of 5 ms.
 
-    A pause of ``IDLE_GAP_S`` between two bytes is long.
+    The pause (``IDLE_GAP_S``) is the time between two bytes.
     """
     return counting(b"" if pause_s >= IDLE_GAP_S else held, byte, pause_s)
 

@@ -27,15 +27,15 @@ class BoardPose:
 class BoardSettings:
     """Properties of a simulated board, and deviations of its robot from the ideal.
 
-    * ``frame``: meaning of the 25 Hz frame. "earth": difference of positions in the board's earth
+    * ``frame``: content of the 25 Hz message. "earth": difference of positions in the board's earth
       frame. "body": sum of the ticks' displacements. "wheel_counts": encoder counts, as in the
       manual's section Deprecated.
-    * ``delta_period_s``: a multiple of 10 ms. The manual also has 10 Hz.
+    * ``delta_period_s``: period of this message, a multiple of 10 ms. The manual also states 0.1 s.
     * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: LSB per rad/s.
     * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
-    * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad, unwrapped.
-    * ``estop_latches``: whether motion is refused until a reset; else until the next motion
-      command.
+    * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad of an unwrapped heading.
+    * ``estop_latches``: whether an emergency stop lasts until a reset; else it lasts until the next
+      motion command.
     * ``axis_signs``: signs of the board's x, y and yaw relative to REP-103.
     * ``motor_wiring``: number of the motor, 1 to 3, that is connected to each controller. A
       negative number: the motor's poles are swapped, but its encoder is not.

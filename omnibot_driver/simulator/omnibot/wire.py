@@ -60,7 +60,7 @@ def imu_frame(accel: Triple, gyro: Triple) -> bytes:
 
 
 def delta_frame(difference: Triple, seq: int) -> bytes:
-    """Encode the 9 bytes of the 25 Hz frame.
+    """Encode the 9 bytes of the delta frame, which is sent at 25 Hz.
 
     ``difference``: in 0.1 mm and 0.1 mrad, or wheel counts, as int16.
     """

@@ -23,7 +23,7 @@ FLICKER: Final = 2 * np.log(2) / np.pi
 WALK_FROM_S: Final = 58.0
 """Shortest recording, in s, from which the tool estimates bias instability and random walk.
 
-A recording of a minute may lack some readings.
+It is a little less than a minute, because a recording of a minute may lack some readings.
 """
 
 

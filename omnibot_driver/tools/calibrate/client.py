@@ -28,7 +28,8 @@ SPIN_S: Final = 0.005
 """Time, in s, for which the executor waits for a message.
 
 It is constant, because rclpy's executor takes turns between the subscriptions only if each call has
-the same timeout. Otherwise, on a busy computer, the IMU would leave no turn for the e-stop.
+the same timeout. Otherwise, on a busy computer, the executor would handle only the IMU's messages,
+and not those of the e-stop.
 """
 
 

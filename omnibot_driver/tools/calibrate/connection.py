@@ -21,7 +21,10 @@ from omnibot_driver.tools.needs import ToolError
 def connect(
     namespace: str, ros_arguments: Sequence[str], interruption: Interruption
 ) -> Iterator[Robot]:
-    """Connect to the driver in ``namespace``. Raises ToolError if no driver is running in it."""
+    """Connect to the driver in ``namespace``.
+
+    Raises ToolError if ``namespace`` or a ROS argument is invalid, or if no driver runs there.
+    """
     context = Context()
     quiet = SignalHandlerOptions.NO
     try:

@@ -125,7 +125,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    All three texts end at the second significant digit of the uncertainty.
+    If the uncertainty is known, all three texts end at its second significant digit, or at the
+    decimal point if this digit is before the point.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

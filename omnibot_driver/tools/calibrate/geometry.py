@@ -22,7 +22,8 @@ from omnibot_driver.tools.calibrate.seen import WHEELS
 from omnibot_driver.tools.calibrate.waypoints import square, visit
 
 PLAIN: Final = 0.005
-"""The tool warns if a wheel's radius differs from the mean by more than this fraction."""
+"""The tool warns if a wheel's radius differs from the mean by more than this fraction, and by more
+than three standard deviations."""
 INTRODUCTION: Final = (
     "You need a tape measure and something to mark the floor with. Before each drive, mark the"
     " floor under the robot's centre (use a plumb line, or a fixed point of the lowest deck), and"

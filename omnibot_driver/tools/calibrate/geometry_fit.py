@@ -87,7 +87,8 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 
     ``drift``: standard deviation, in m, that slip causes in a wheel's distance of 1 m.
 
-    Raises ToolError if the fit fails, or if a radius differs by more than 20 % (``UNKNOWN``).
+    Raises ToolError if the fit fails, or if the mean wheel radius or the base radius differs from
+    the assumed radius by more than 20 % (``UNKNOWN``).
     """
 
     weights = [_weights(reading, base_radius_m, drift) for reading in readings]
@@ -119,7 +120,7 @@ def fit(readings: Sequence[Reading], base_radius_m: float, drift: float) -> Geom
 def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> Column:
     """Return the poses that a path has if the radii differ from the assumed ones, (n, 3).
 
-    The wheel rotations are the same. The result begins at the origin.
+    The wheels turn by the same angles as on ``path``. The result begins at the origin.
 
     ``path``: poses that were computed with the assumed radii.
 

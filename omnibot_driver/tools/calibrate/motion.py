@@ -127,7 +127,7 @@ class Obedience:
         """Add the commanded and the measured motion since the last call, and compare the sums.
 
         The sums cover 1 s or 3 s. Raises ToolError if the robot moved by less than a fifth of the
-        commanded motion.
+        commanded motion, unless the command was slower than ``PLAIN``.
 
         ``seconds``: time since the last call. ``measured``: in the units of ``command``.
         """

@@ -74,7 +74,8 @@ class Mounting:
 def up(imu: Imu) -> Array:
     """Return the upward direction in the sensor's axes, as a unit vector.
 
-    Raises Contradiction if the sensor moved, or did not measure gravity.
+    Raises Contradiction if there are no readings, or if the sensor moved or did not measure
+    gravity.
     """
     if not len(imu.stamp_s):
         raise Contradiction("no reading of the IMU was received")

@@ -157,8 +157,8 @@ def answer(
             continue
         rate = np.maximum(rpm[passed] * per_rpm, 1e-9)
         at_s = now_s + STEP_S - (ticks[passed] - whole[passed]) / rate
-        # The board notices a tick only after it has sent. The measured speed is too low at this
-        # tick, and too high at the next tick.
+        # While the board sends, it notices a tick only at the end of the sending. The measured
+        # speed is too low at this tick, and too high at the next tick.
         if not calm:
             since_s = (at_s - sends_s[passed]) % loop.sends_each_s
             at_s = at_s + np.maximum(SENDS_S - since_s, 0.0)

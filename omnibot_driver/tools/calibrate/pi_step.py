@@ -59,7 +59,10 @@ Records = dict[str, list[Column]]
 
 
 def run(robot: Any, console: Console, arguments: argparse.Namespace) -> Result:
-    """Record the wheels, fit their plants, tune their gains, and measure the effect."""
+    """Record the wheels, fit their plants, tune their gains, and measure the effect.
+
+    Raises ToolError if a record or a fit fails. The tool first tries to restore the parameters.
+    """
     goals = Goals(
         overshoot=arguments.overshoot / 100,
         band=arguments.band / 100,

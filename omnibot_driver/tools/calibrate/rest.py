@@ -2,8 +2,9 @@
 
 """The evaluation of an IMU at rest: its biases, its noise, and the upward direction.
 
-A tilt, a slope and a sideways bias have the same effect on the readings. Therefore only the bias
-along gravity is found. This module knows readings; it does not know how they are recorded.
+A tilt of the sensor, a slope of the floor, and a bias at right angles to gravity have the same
+effect on the readings. Therefore only the bias along gravity is found. This module knows readings;
+it does not know how they are recorded.
 """
 
 from collections.abc import Callable

@@ -106,12 +106,13 @@ class Robot(Listener):
 
         ``obeys``: whether a robot that does not move is an error.
 
-        ``monitored``: whether the driver's motion monitor stays on. It must be off before speed
-        and direction are calibrated.
+        ``monitored``: whether the driver's motion monitor stays on. It must be off until speed and
+        direction are calibrated.
 
         ``show``: called with the seconds since the start.
 
-        Raises ToolError on an e-stop, lost data, another node's command, or no motion.
+        Raises ToolError on an e-stop, lost data, another node's command, a motion beyond the
+        bounds, no motion, or a robot that does not come to rest.
         """
         if self.parameters.get("control_method", "velocity") != "velocity":
             raise ToolError(
@@ -140,7 +141,8 @@ class Robot(Listener):
     def record(self, service: str, topic: str, command: Sequence[float]) -> Path:
         """Record the response to ``command``; return the path of the driver's record.
 
-        The robot must be at rest. Raises ToolError on any fault, as ``drive`` does.
+        The robot must be at rest. Raises ToolError on an e-stop, lost data, or a failure that the
+        driver reports. Commands of other nodes are not noticed.
         """
         self._begin(("nominal",))
         publisher = self._node.create_publisher(Float32MultiArray, topic, 1)

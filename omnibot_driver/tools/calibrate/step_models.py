@@ -3,8 +3,8 @@
 """Models of a wheel's step response, as the odometry measures it.
 
 A model gives the angle that the wheel has turned since a step. Each delta of the odometry gives the
-mean rate over 40 ms, which is the difference of two such angles. This module knows models and
-times; it does not know measured data.
+mean rate over 40 ms, which is the difference of two such angles divided by 40 ms. This module knows
+models and times; it does not know measured data.
 """
 
 from collections.abc import Callable

@@ -104,7 +104,7 @@ def fit(records: Sequence[Column], ticks_per_revolution: int) -> PlantFit:
     marks = marks_in(search.off(values), ticks_per_revolution)
     if marks is not None:
         values = search.with_marks(marks, values)
-    search.correlate(values)  # both orders must be compared with the same correlation
+    search.correlate(values)  # the fits of first and second order must use the same correlation
     values = search.closely(values)
     second = _described(search, values, marks, ticks_per_revolution)
     first = _described(search, search.first_order(values), marks, ticks_per_revolution)

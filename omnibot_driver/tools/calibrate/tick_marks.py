@@ -4,7 +4,8 @@
 
 A *mark* is a place on the encoder's disc at which the board counts a tick. Uneven distances between
 marks cause errors of the times between ticks, which repeat in each turn of the wheel. It is not
-known at which mark a record begins. Input: these errors; output: the distances between the marks.
+known at which mark a record begins. Input: the errors of the times; output: the distances between
+the marks.
 """
 
 from collections.abc import Sequence
@@ -106,7 +107,8 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    It is the median of all times over this distance. The mean of the result is shifted to zero.
+    It is the median of the errors of all times over this distance. The mean of the result is
+    shifted to zero.
 
     ``rows``: for each record, the relative errors of its times between ticks.
 

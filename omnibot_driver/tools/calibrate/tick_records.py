@@ -27,7 +27,7 @@ A larger factor shows that the board missed an edge of the encoder's signal or n
 SMOOTHED: Final = 4
 """Number of successive times between ticks from which one speed is computed.
 
-A displaced mark changes the sum of these times only if it is the first or the last one.
+A displaced mark changes the sum of these times only if the sum begins or ends at this mark.
 """
 
 
@@ -115,7 +115,7 @@ def _runs(ticks_s: Column, good: "np.ndarray[tuple[int], np.dtype[np.bool_]]") -
 class Response:
     """A measured step response.
 
-    ``times_s``: times from the first tick on.
+    ``times_s``: times since the first tick, in s.
 
     ``rpm``: smoothed speeds at these times.
     """

@@ -49,7 +49,7 @@ Even such distant residuals are correlated, because the load changes slowly.
 MISSED: Final = 0.42
 """Least sum of the relative errors of two successive times that shows a missed mark.
 
-A missed mark doubles a time, which is a sum of 1. The board's clock can lose up to 6 ms, which
+A missed mark doubles a time, so that the sum is 1. The board's clock can lose up to 6 ms, which
 makes the sum smaller. If the board only noticed a mark late, the next time is shorter, so that the
 sum is near 0.
 """
@@ -83,7 +83,7 @@ def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
     ``values``: the values of a search. They contain the sum and the ratio of the time constants
-    instead, because a search for these has only one optimum.
+    instead, because exchanged time constants describe the same plant.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -127,7 +127,8 @@ class Search:
         starts = []
         for total_s in STARTS_S:
             # The values have the time of the first mark, not its distance from the start. The
-            # distance would be too small: just after the start, it grows with the cube of the time.
+            # distance would be too small for the search: just after the start, it grows with the
+            # cube of the time.
             begins_s = [(0.5 * total_s**2 / self._rate) ** (1 / 3)] * records
             starts.append(np.array([math.log(self._rate), math.log(total_s), 0.3, *begins_s]))
         return self._best(starts)
@@ -147,8 +148,8 @@ class Search:
     def off(self, values: Column) -> list[Column]:
         """Return, for each record, the relative errors of its times, assuming evenly spaced marks.
 
-        A record has one error for each distance between marks. The error beside a missed mark is
-        NaN.
+        A record has one error for each distance between marks. The two errors beside a missed mark
+        are NaN.
         """
         found = []
         for row, count in zip(self._off_even(values), self._counts, strict=True):
@@ -193,7 +194,7 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Measure the correlation of the residuals at these values. Later searches remove it.
+        """Measure the correlation of the residuals at these values, which later searches remove.
 
         Before the marks are fitted, uneven marks cause the correlation. After their fit, only the
         changing load causes correlation.

@@ -80,6 +80,8 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
+    If no gains are within the limits, the result has the smallest gains of the search.
+
     ``now``: the present gains. A motor's errors are divided by its errors with these gains.
     """
     references = [behaviour(motor, now) for motor in motors]

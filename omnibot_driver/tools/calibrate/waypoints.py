@@ -42,7 +42,10 @@ def visit(places: Sequence[Pose], speed: float, turning: float) -> Law:
 
 
 def straight(way_m: float, speed: float) -> Law:
-    """Return a law that drives a base with two wheels straight ahead, at up to ``speed`` m/s."""
+    """Return a law that drives a base with two wheels straight ahead.
+
+    ``way_m``: distance in m. ``speed``: largest speed in m/s.
+    """
 
     def law(_seconds: float, pose: Pose) -> Vector3 | None:
         left_m = way_m - pose.x_m

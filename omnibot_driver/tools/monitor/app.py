@@ -198,7 +198,7 @@ class Monitor(App[None]):
     # Keys
 
     def on_key(self, event: events.Key) -> None:
-        """Steer the robot, or change its speed, if the key has this meaning."""
+        """Steer the robot if the key is a steering key; change its speed if the key is + or -."""
         dead_man = self._robot.dead_man
         if dead_man is None:
             return

@@ -40,7 +40,7 @@ class Flow:
     """How often messages arrive on a topic.
 
     ``hz``: message rate.
-    ``age_s``: time since the last message; None if no message came recently.
+    ``age_s``: time since the last message; None if it is above 2 s.
     ``history``: number of messages in each second of the last minute.
     """
 

@@ -92,7 +92,8 @@ class DeadMan:
     def command(self, now_s: float) -> BodyTwist | None:
         """Return the command to publish now; None if nothing is to be published.
 
-        While a key moves the robot, the command is a motion. Afterwards it is zero a few times.
+        While a key moves the robot, the command is a motion. Afterwards, the next five commands
+        (``ZEROS``) are zero.
         """
         self._notice_sleep(now_s)
         self._asked_s = now_s

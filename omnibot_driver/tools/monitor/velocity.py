@@ -28,7 +28,7 @@ class VelocityTopic:
 
     Both use the message type of the driver's subscription, because a process must use only one type
     for a topic.
-    ``heard``: receives each command on the topic.
+    ``heard``: function that is called with each command on the topic.
     ``dead_man``: if None, nothing is published.
     """
 

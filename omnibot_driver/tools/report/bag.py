@@ -31,8 +31,8 @@ Progress = Callable[[int, int], None]
 def read(path: Path, namespace: str | None, progress: Progress) -> Log:
     """Return the log of one robot in a bag.
 
-    Raises ToolError if the bag has no readable message, or if it has several robots and
-    ``namespace`` is None.
+    Raises ToolError if the bag has no readable message of the robot, or if it has several robots
+    and ``namespace`` is None.
     """
     with ExitStack() as stack:
         readers, troubles = _open(path, stack)
@@ -74,8 +74,8 @@ def _messages(
     storage = reader.storage
     try:
         if isinstance(storage, McapReader) and not storage.chunks:
-            # Without an index ``messages`` requires ascending times, which a bag does not
-            # guarantee.
+            # If the mcap file has no index, ``messages`` requires ascending times, which a bag does
+            # not guarantee.
             yield from storage.messages_scan(wanted)
         else:
             yield from reader.messages(wanted)

@@ -21,8 +21,8 @@ STATES: Final = {
 }
 WIDTH_IN: Final = 10.0
 POINTS: Final = 3000
-"""Largest number of points of a drawn line. Of a longer line, only the smallest and largest values
-are drawn."""
+"""Largest number of points of a drawn line. Of a longer line, only the smallest and the largest
+value of each short piece are drawn."""
 
 
 def new_figure(height_in: float) -> Figure:

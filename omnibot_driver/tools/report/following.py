@@ -23,14 +23,16 @@ YAW_WEIGHT_M: Final = 0.143
 WHEEL_WEIGHT_M: Final = 0.029
 """Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
 
-They fit an OmniBot. Other robots do not need their own: the factors only decide which speeds are
-motion, and how much each axis counts in the search for the lag. They do not change the ratios.
+They fit an OmniBot. Other robots do not need other factors, because the factors only decide which
+speeds are motion, and how much each axis counts in the search for the lag. They do not change the
+reported ratios of measured to commanded motion.
 """
 STANDS: Final = 0.2
 """Ratio of measured to commanded speed below which the robot is regarded as standing still."""
 SUSTAINED_S: Final = 1.0
 AFTER_STOP_S: Final = 1.5
-"""Time in s after an e-stop or the last command within which the robot must come to rest."""
+"""Time in s within which the robot must come to rest after an e-stop, or after the last command has
+timed out."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +160,7 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 def judge(log: Log) -> Iterator[Finding]:
     """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    Motion without a command is reported too.
+    If the log has any command, motion without a command or during an e-stop is reported too.
     """
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(

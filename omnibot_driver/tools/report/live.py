@@ -81,7 +81,7 @@ def _discover(
     namespace: str | None,
     asked_to_end: Callable[[], bool],
 ) -> tuple[str, Topics, dict[str, str], bool]:
-    """Find the robot; return its namespace, topics, all message types, and whether it is alone.
+    """Find the robot; return its namespace and topics, every topic's type, and whether it is alone.
 
     "Alone" means that no other robot was found.
     """
@@ -120,7 +120,8 @@ def _subscribe(node: Node, recorder: Recorder, topic: str, role: str, kind: str)
     latched = role in EVENTS and role != DIAGNOSTICS
     qos = QoSProfile(
         depth=DEPTH,
-        # A commander may publish as best effort; a best-effort subscription receives from all.
+        # The node that sends commands may be a best-effort publisher. A best-effort subscription
+        # receives from best-effort and from reliable publishers.
         reliability=ReliabilityPolicy.BEST_EFFORT
         if role in COMMANDS
         else ReliabilityPolicy.RELIABLE,

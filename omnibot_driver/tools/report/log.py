@@ -89,7 +89,7 @@ class Status:
 class Log:
     """The messages of one robot. All values are in SI units.
 
-    ``start_ns``: the time of day at the beginning.
+    ``start_ns``: Unix time at the beginning, in ns.
 
     ``imu``: angular velocity and specific force, 6 columns.
 

@@ -250,7 +250,7 @@ def timeline(log: Log) -> Figure:
 def _said(told: list[Status]) -> Iterator[tuple[Span, str]]:
     """Yield a span of time and a colour for each message of a status.
 
-    The span ends at the next message. If the next message is late, the span lasts 1 s.
+    The span ends at the next message. If the next message is late or missing, the span lasts 1 s.
     """
     for item, after in zip_longest(told, told[1:]):
         end_s = item.at_s + 1.0

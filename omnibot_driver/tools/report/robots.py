@@ -56,7 +56,8 @@ def choose(robots: Mapping[str, Topics], wanted: str | None, where: str) -> tupl
     """Return the namespace and the topics of one robot.
 
     ``wanted``: namespace of this robot; None selects the only robot.
-    ``where``: name of the source of the topics, for error messages. Raises ToolError.
+    ``where``: name of the source of the topics, for error messages.
+    Raises ToolError if there is no such robot, or if ``wanted`` is None and there are several.
     """
     names = ", ".join(robots)
     if not robots:
