@@ -241,6 +241,13 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
     assert "still latched at the end" in said(drive, "E-stop", "The e-stop was").text
 
 
+def test_motion_under_a_latched_estop_is_found_without_any_command(drive: Drive) -> None:
+    """The log has no commands, for example because the robot drove to goals."""
+    drive.estops += [(10.0, True)]
+    drive.cmd_vel.drop(-np.inf, np.inf)
+    assert said(drive, "E-stop", "moved while").level is Level.BAD
+
+
 def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
     """The pose jumps by 0.5 m, which the twist does not explain.
 

@@ -160,8 +160,10 @@ def answer(pair: Pair, usable: Mask) -> Answer | None:
 def judge(log: Log) -> Iterator[Finding]:
     """Judge the commands: whether they were valid, had no pauses, and were followed by the robot.
 
-    If the log has any command, motion without a command or during an e-stop is reported too.
+    Motion during an e-stop is reported too, and, if the log has any command, motion without a
+    command.
     """
+    yield from _despite_the_estop(log, twists(log))
     if not len(log.cmd_vel) and not len(log.wheel_cmd):
         yield Finding(
             Level.NOTE,
@@ -203,14 +205,17 @@ def _speeds(found: list[Pair]) -> tuple[Array, Array, Array]:
     """
     if not found:
         return np.empty(0), np.empty(0), np.empty(0)
-    times_s = found[0].measured.stamp_s
-    weights = np.array(found[0].weights)
-    moved = np.linalg.norm(found[0].measured.values * weights, axis=1)
+    times_s, moved = found[0].measured.stamp_s, _rim_speed(found[0])
     told = np.zeros(len(times_s))
     for pair in found:
         command = np.linalg.norm(pair.commands.held(times_s) * np.array(pair.weights), axis=1)
         told = np.maximum(told, command)
     return told, moved, times_s
+
+
+def _rim_speed(pair: Pair) -> Array:
+    """Return the measured speed of a wheel's rim in m/s, at the times of the measurements."""
+    return np.asarray(np.linalg.norm(pair.measured.values * np.array(pair.weights), axis=1))
 
 
 def _stopped(log: Log, at_s: Array) -> Mask:
@@ -292,24 +297,30 @@ def _followed(log: Log, pair: Pair, found: Answer | None) -> Iterator[Finding]:
     yield Finding(Level.WARN, "Commands", f"{figure}.", advice)
 
 
+def _despite_the_estop(log: Log, pair: Pair) -> Iterator[Finding]:
+    if not len(pair.measured):
+        return
+    times_s, moved = pair.measured.stamp_s, _rim_speed(pair)
+    late = [Span(item.begin_s + AFTER_STOP_S, item.end_s, "") for item in log.latched]
+    if moving := _sustained(times_s, log.within(late, times_s) & (moved > TOLD)):
+        yield Finding(
+            Level.BAD,
+            "E-stop",
+            f"The robot moved while the e-stop was latched, first at {moving[0].begin_s:.1f} s.",
+            "If the robot was not pushed, cut its power with the switch in the power line. Do not"
+            " drive the robot before you know the cause.",
+        )
+
+
 def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Finding]:
     since = np.flatnonzero(told > 0.0)
     last_s = np.full(len(times_s), -np.inf)
     if len(since):
         newest = np.searchsorted(times_s[since], times_s, "right") - 1
         last_s = np.where(newest >= 0, times_s[since][np.maximum(newest, 0)], -np.inf)
-    untold = _sustained(times_s, (times_s - last_s > AFTER_STOP_S) & (moved > TOLD))
-    late = [Span(item.begin_s + AFTER_STOP_S, item.end_s, "") for item in log.latched]
-    stopped = _sustained(times_s, log.within(late, times_s) & (moved > TOLD))
-    if stopped:
-        yield Finding(
-            Level.BAD,
-            "E-stop",
-            f"The robot moved while the e-stop was latched, first at {stopped[0].begin_s:.1f} s.",
-            "If the robot was not pushed, cut its power with the switch in the power line. Do not"
-            " drive the robot before you know the cause.",
-        )
-    elif untold:
+    moved_s = (times_s - last_s > AFTER_STOP_S) & (moved > TOLD)
+    untold = _sustained(times_s, moved_s & ~log.within(log.latched, times_s))
+    if untold:
         yield Finding(
             Level.WARN,
             "Commands",
