@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from omnibot_driver.simulator.omnibot import motors as simulated
+from omnibot_driver.tools.calibrate import tuning
 from omnibot_driver.tools.calibrate.step_models import (
     SPAN_S,
     first_order,
@@ -22,6 +23,7 @@ from omnibot_driver.tools.calibrate.tuning import (
     better_gains,
 )
 from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, Gains, Motor, answer, sensitivity_peak
+from omnibot_driver.tools.needs import ToolError
 
 wheel_motors = st.builds(Motor, st.floats(15, 120), st.floats(2, 15), st.floats(0, 5))
 
@@ -168,6 +170,15 @@ def test_better_gains_are_better_and_within_the_limits(motor: Motor) -> None:
         after.command_error_s / before.command_error_s + after.load_error_s / before.load_error_s
         < 2
     )
+
+
+def test_if_no_gains_are_within_the_limits_none_are_proposed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The limit of Ms is below 1, which no loop can reach. The tool says so."""
+    monkeypatch.setattr(tuning, "LARGEST_MS", 0.9)
+    with pytest.raises(ToolError, match=r"no gains keep Ms at most 0\.9"):
+        better_gains([Motor(46.0, 6.0, 0.0)])
 
 
 def test_gains_for_three_motors_keep_within_the_limits_on_each() -> None:

@@ -21,6 +21,7 @@ from omnibot_driver.tools.calibrate.wheel_loop import (
     answer,
     sensitivity_peak,
 )
+from omnibot_driver.tools.needs import ToolError
 
 # This limit of the sensitivity's peak tolerates a factor of 2.6 in gain, or 36° in phase.
 LARGEST_MS: Final = 1.6
@@ -80,9 +81,9 @@ def behaviour(motor: Motor, gains: Gains) -> Behaviour:
 def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
     """Return the best gains for all these motors together, within the limits of this module.
 
-    If no gains are within the limits, the result has the smallest gains of the search.
-
     ``now``: the present gains. A motor's errors are divided by its errors with these gains.
+
+    Raises ToolError if no gains are within the limits.
     """
     references = [behaviour(motor, now) for motor in motors]
     need = min(motor.pwm_per_count for motor in motors)
@@ -102,6 +103,11 @@ def better_gains(motors: Sequence[Motor], now: Gains = MANUAL) -> Gains:
             _cost(behaviour(motor, gains), reference)
             for motor, reference in zip(motors, references, strict=True)
         )
+        if not np.isfinite(np.min(cost)):
+            raise ToolError(
+                f"no gains keep Ms at most {LARGEST_MS:g} and the overshoot at most"
+                f" {LARGEST_OVERSHOOT:.0%}; repeat the measurement, with each wheel off the ground"
+            )
         place = np.unravel_index(np.argmin(cost), np.shape(cost))
         best = Gains(*(float(axis.flat[n]) for axis, n in zip(grid, place, strict=True)))
         forward = _around(best.feed_forward / need, 1.0 / CANDIDATES, 0.0, 1.2)
