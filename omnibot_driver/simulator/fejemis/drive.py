@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import cos, degrees, pi, radians, sin
 
+from omnibot_driver.simulator.common.casts import to_int32
 from omnibot_driver.simulator.fejemis import wire
 from omnibot_driver.simulator.fejemis.config import WHEELS, DriveConfig
 from omnibot_driver.simulator.fejemis.distances import Distances
@@ -237,7 +238,7 @@ class DriveTeensy(Teensy[DriveConfig]):
             if self.firmware.start_resumes:
                 self.reference = (v, radians(turn_dps))
             return
-        self.source = int(source)
+        self.source = to_int32(source)
         self.reference = (v, radians(turn_dps))
 
     def _front_wheel(self, rest: str) -> None:

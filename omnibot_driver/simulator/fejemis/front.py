@@ -11,6 +11,7 @@ from dataclasses import replace
 from math import atan2, copysign, cos, degrees, radians
 from random import Random
 
+from omnibot_driver.simulator.common.casts import to_int32
 from omnibot_driver.simulator.fejemis import wire
 from omnibot_driver.simulator.fejemis.config import FrontConfig
 from omnibot_driver.simulator.fejemis.help_text import FRONT_HELP
@@ -239,7 +240,7 @@ class FrontTeensy(Teensy[FrontConfig]):
         self._lift_until_ms = self._cycles + 1e3 * time_s if time_s > 0.0 else 0.0
 
     def _set_pwm(self, rest: str) -> None:
-        self._pwm_hz = int(wire.padded(rest, 1)[0])
+        self._pwm_hz = to_int32(wire.padded(rest, 1)[0])
 
     def _set_ir(self, rest: str) -> None:
         a1, b1, a2, b2 = wire.padded(rest, 4)
@@ -263,5 +264,5 @@ class FrontTeensy(Teensy[FrontConfig]):
 
 
 def _colour(rgb: list[float]) -> tuple[int, int, int]:
-    red, green, blue = (max(0, min(255, int(part))) for part in rgb)
+    red, green, blue = (max(0, min(255, to_int32(part))) for part in rgb)
     return red, green, blue

@@ -141,7 +141,7 @@ def _fault(text: str) -> Fault:
         at_s = float(at)
     except ValueError:
         at_s = -1.0
-    if at_s < 0.0 or half not in ("drive", "front") or what not in allowed(half):
+    if not at_s >= 0.0 or half not in ("drive", "front") or what not in allowed(half):
         raise argparse.ArgumentTypeError(f"{text!r} is not a fault such as 5:front:silent")
     return Fault(at_s=at_s, half=half, what=what)
 

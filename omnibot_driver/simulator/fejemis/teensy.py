@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Generic, TypeVar
 
+from omnibot_driver.simulator.common.casts import to_int32
 from omnibot_driver.simulator.common.faults import FaultyLine, LineFaults
 from omnibot_driver.simulator.fejemis import wire
 from omnibot_driver.simulator.fejemis.config import DriveConfig, FrontConfig
@@ -242,7 +243,7 @@ class Teensy(Generic[C]):
             self.unhandled += 1
             self.say(f"# {self.clock_text(4)} unhandled: 'sub{rest}'")
             return
-        period_ms = int(next(iter(wire.numbers(rest.partition(key)[2])), 0.0))
+        period_ms = to_int32(next(iter(wire.numbers(rest.partition(key)[2])), 0.0))
         self._due_ms.pop(key, None)
         if period_ms > 0:
             self._periods_ms[key] = period_ms
@@ -265,7 +266,7 @@ class Teensy(Generic[C]):
     # Configuration
 
     def _set_id(self, rest: str) -> None:
-        number = int(next(iter(wire.numbers(rest)), 0.0))
+        number = to_int32(next(iter(wire.numbers(rest)), 0.0))
         if number == 0:
             self.config = self.saved = replace(self._factory, number=0)
         else:

@@ -8,6 +8,7 @@ the other wheel.
 
 from math import copysign
 
+from omnibot_driver.simulator.common.casts import to_int32
 from omnibot_driver.simulator.lois_ecu.motors import Gains, SpeedController
 from omnibot_driver.simulator.lois_ecu.settings import Quirks
 
@@ -76,7 +77,8 @@ class WheelChannel:
         count = int(at_s * 1e6 / self._timer_us) % TIMER_COUNTS
         passed_us = (count - self._count) % TIMER_COUNTS * TIMER_US
         self._count, self._ticked_s = count, at_s
-        passed_us = int(passed_us * (self.long_correction if is_long else self.short_correction))
+        correction = self.long_correction if is_long else self.short_correction
+        passed_us = to_int32(passed_us * correction)
         self.rpm, self.exact_rpm = 0, 0.0
         measures = self._target != 0 or not quirks.sign_of_command
         if passed_us > self._shortest_us and measures:

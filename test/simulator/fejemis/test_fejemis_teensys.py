@@ -312,7 +312,14 @@ def test_options_reach_the_board_by_a_url() -> None:
 
 
 @pytest.mark.parametrize(
-    "wrong", ["fault=5:rear:silent", "fault=5:drive:hall-broken", "ids=a,b", "boot=-1"]
+    "wrong",
+    [
+        "fault=5:rear:silent",
+        "fault=nan:drive:silent",
+        "fault=5:drive:hall-broken",
+        "ids=a,b",
+        "boot=-1",
+    ],
 )
 def test_a_wrong_option_is_refused(wrong: str) -> None:
     """A wrong option is refused. An example is a fault of the angle sensor in the drive half."""

@@ -10,7 +10,7 @@ Checksums, comments, subscriptions and firmware variants are tested.
 from itertools import pairwise
 
 import pytest
-from fejemis_rig import DRIVE, FRONT, Rig
+from fejemis_rig import BEAT, DRIVE, FRONT, Rig
 
 from omnibot_driver.simulator.fejemis import Firmware, wire
 
@@ -210,6 +210,23 @@ def test_numbers_are_read_one_after_the_other(line: str, v: float, turn_dps: flo
     rig.run(0.01)
     assert rig.board.drive.reference[0] == v
     assert rig.board.drive.turn_dps == pytest.approx(turn_dps)
+
+
+@pytest.mark.parametrize(
+    ("port", "line"),
+    [
+        (DRIVE, "rc 1e999 0 0"),
+        (DRIVE, "sub pose 1e999"),
+        (DRIVE, "setid 1e999"),
+        (FRONT, "pwmf 1e999"),
+        (FRONT, "ledb 1e999 0 0"),
+    ],
+)
+def test_a_number_that_is_too_large_ends_no_board(port: int, line: str) -> None:
+    """A number in a line overflows to infinity. The board continues to send heartbeats."""
+    rig = Rig().booted()
+    rig.say(port, line)
+    assert any(number == port and BEAT.match(text) for number, text in rig.run(1.0))
 
 
 def test_lines_end_with_or_without_a_carriage_return() -> None:

@@ -103,6 +103,16 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
             rig.say(SetRpm(0, 0))
 
 
+@pytest.mark.parametrize("correction", [math.nan, math.inf, 1e30])
+def test_a_correction_beyond_all_numbers_ends_no_board(correction: float) -> None:
+    """An impossible correction is written. The wheels turn, and the board continues to send."""
+    rig = Rig(DOCUMENTED).booted()
+    rig.board.wheels[0].short_correction = correction
+    rig.say(SetDuty(45, 45))
+    assert ticks_in(rig.run(1.0))
+    assert not rig.board.standing
+
+
 @pytest.mark.slow
 @BOTH
 def test_the_button_stops_it_and_is_told_both_ways(quirks: Quirks) -> None:
