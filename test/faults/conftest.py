@@ -3,19 +3,17 @@
 """Fixtures of the campaign's tests."""
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 
 import pytest
 import rclpy
+from probe import ros
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _ros() -> Iterator[None]:
-    ours = not rclpy.ok()
-    if ours:
-        rclpy.init()
-    yield
-    if ours:
-        rclpy.shutdown()
+    with nullcontext() if rclpy.ok() else ros():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -9,9 +9,8 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import pytest
-import rclpy
 from driver_process import Driver
-from probe import Probe
+from probe import Probe, ros
 
 from omnibot_driver.shared_session import WAITED
 
@@ -21,9 +20,8 @@ if TYPE_CHECKING:
 
 @pytest.fixture(scope="session", autouse=True)
 def _ros() -> Iterator[None]:
-    rclpy.init()
-    yield
-    rclpy.shutdown()
+    with ros():
+        yield
 
 
 @pytest.fixture

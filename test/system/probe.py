@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any, Self
 
+import rclpy
 from driver_process import PATIENCE_S
 from geometry_msgs.msg import Twist
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -28,6 +29,22 @@ NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
 
 The executor would add each event to every wait, which takes more time than the messages.
 """
+
+
+@contextmanager
+def ros() -> Iterator[None]:
+    """Set up ROS, and keep one node until the end.
+
+    Without this node, the end of each probe would delete the participant of the middleware. Fast
+    DDS has crashed there twice.
+    """
+    rclpy.init()
+    node = Node("tests", enable_rosout=False, start_parameter_services=False)
+    try:
+        yield
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
 
 
 class Probe:
