@@ -194,12 +194,12 @@ _WORDS: Final = {
     "tn": "Integral time Tn of the {} wheel's speed controller",
     "td": "Time constant Td of the {} wheel's speed controller",
     "short_correction": (
-        "Factor by which the board multiplies the measured durations of the {} encoder's short"
-        " levels. The encoder's signal has short and long levels in turn"
+        "The {} encoder's signal alternates between a short and a long level. The board multiplies"
+        " the measured durations of the short ones by this factor"
     ),
     "long_correction": (
-        "Factor by which the board multiplies the measured durations of the {} encoder's long"
-        " levels. The encoder's signal has short and long levels in turn"
+        "The {} encoder's signal alternates between a short and a long level. The board multiplies"
+        " the measured durations of the long ones by this factor"
     ),
     "feed_forward": "Feed-forward of the {} wheel's speed controller",
 }

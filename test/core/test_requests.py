@@ -37,7 +37,10 @@ def test_on_a_silent_board_every_request_is_answered_in_time(
 
 @pytest.mark.slow
 def test_a_board_that_does_not_hear_gets_no_false_confirmation(bench: Bench) -> None:
-    """The board sends data but receives none. A pause and a reset both fail in time."""
+    """The board sends data but receives none. A pause is reported as failed within 5 s.
+
+    A reset is reported as failed within 10 s.
+    """
     bench.hears = False
     answer = bench.ask(Request.PAUSE, 5.0)
     assert not answer.success

@@ -85,7 +85,11 @@ class PiecesTerminal(Terminal):
         return len(data) - lost
 
     def _arrival_s(self, count: int, to_come: int) -> float:
-        """Return the time at which the next piece of a tick of ``count`` bytes is complete."""
+        """Return the time at which the last byte of the next piece arrives.
+
+        ``count``: number of bytes that the board sends in this tick. ``to_come``: how many of them
+        have not arrived yet.
+        """
         return self._tick_at + (count - to_come + min(PIECE, to_come)) * BYTE_S
 
 

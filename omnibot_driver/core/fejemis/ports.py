@@ -62,7 +62,7 @@ class Ports:
         return all(half.sums for half in self.halves)
 
     def half(self, role: Role) -> Half | None:
-        """Return the half that has the ``role``; None if neither has it, or both."""
+        """Return the half that has the ``role``. Return None if neither or both have it."""
         first, second = self.halves
         if first.role == role:
             return None if second.role == role else first

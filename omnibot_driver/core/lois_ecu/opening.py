@@ -89,7 +89,8 @@ class SettingsWriter:
 
     @property
     def ignored(self) -> bool:
-        """Whether the settings are unconfirmed after twice the usual number of rounds."""
+        """Whether the board seems to ignore the settings: they were sent in twice the usual number
+        of rounds, and it has not confirmed them."""
         return self._rounds >= 2 * ROUNDS and not self.confirmed
 
     @property

@@ -153,7 +153,10 @@ class StallWatch:
         return abs(told[wheel]) > most_mps - SAME_MPS
 
     def _lacks_power(self, wheel: int) -> bool:
-        """Return whether a wheel gets no power: its reported speed is not below its set-point."""
+        """Return whether the controller gives a wheel no power, because of its reported speed.
+
+        This speed is then not below the set-point.
+        """
         told_mps = 0.0 if self._told is None else abs(self._told[wheel])
         return told_mps > abs(self._targets[wheel]) * self.settings.rim_mps_per_rpm - SAME_MPS
 

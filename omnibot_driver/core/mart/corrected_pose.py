@@ -112,7 +112,7 @@ class CorrectedPose:
 
         If the server has reported an implausible angle, there are two possible causes: it is the
         angle of another motion, or only one of the wheels has turned. So the whole difference
-        between this angle and the wheel's angle is added as a possible error.
+        between this angle and the one computed from the encoder count is added to the uncertainty.
         """
         wrong_rad = self.turn.end(may_be_recorded=may_be_recorded)
         self._correct_yaw(wrong_rad)

@@ -137,8 +137,8 @@ class Measuring(Starts):
             self._rescue = True
             self._switch_off.doubt()
             self._notice(
-                "robot moves, but the server knows of no motion; the driver switches the motors off"
-                " (a server that does not know MCS has to turn the robot by 1 degree for that)",
+                "robot moves, but the server knows of no motion; the driver switches the motors"
+                " off. If the server does not know MCS, the robot turns by 1 degree for this",
                 halt=True,
             )
             return

@@ -133,5 +133,5 @@ def _learn_spin(lines: Lines, units: int, speed: float) -> None:
 
 
 def _nominal_units_per_count(settings: MartSettings) -> float:
-    """Return the nominal units that turn an ideal motor by one count per second at 1 V."""
+    """Return how many units give an ideal motor one encoder count per second, with 1 V."""
     return abs(settings.metres_per_count) * settings.nominal_volts / settings.speed_per_unit

@@ -63,7 +63,9 @@ class MartOdometry(Reckoning):
         )
 
     def _unheard(self, ahead_s: float, now: float, blind_since_s: float | None) -> Errors:
-        """Return the errors of the motion since the last encoder count, and of this count's time.
+        """Return the possible errors of the motion since the last encoder count.
+
+        They include the error of this count's time.
 
         ``ahead_s``: time since the last count, in s. ``blind_since_s``: start time of the present
         controlled move, or None.

@@ -154,7 +154,11 @@ class Starts(FailedStarts):
         return words.B.request("SLOW")
 
     def _check(self, now: float) -> Packets:
-        """Return the check of the IMU if it is due, and no late reply can look like its reply."""
+        """Return the request that checks the IMU.
+
+        Return no packets while the check is not due, or while a late reply to another request could
+        look like its reply.
+        """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):
             return NO_PACKETS

@@ -49,7 +49,8 @@ HALF_STUCK: Final = (
 )
 UNCONTROLLED: Final = (Motion.REFERENCE, Motion.REVERSE, Motion.SPIN)
 CREEP_MPS, CREEP_RADPS = 0.01, 0.02
-"""Measured speeds in m/s and rad/s. A robot that exceeds either of them certainly moves."""
+"""Limits in m/s and rad/s. A robot whose measured speed or turn rate exceeds one of them certainly
+moves."""
 BLOCKED_S: Final = 0.6
 """Time in s for which a wheel must stand still in a drive before it is regarded as blocked."""
 STUCK_S, COASTS_S = 0.5, 0.2

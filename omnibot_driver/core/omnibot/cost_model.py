@@ -151,7 +151,10 @@ class Context(NamedTuple):
     """Sum of the deltas' turns since the last pose, in 0.1 mrad."""
 
     def damaged(self) -> "Context":
-        """Return what is still known after an unknown number of frames were lost."""
+        """Return the context after an unknown number of frames were lost.
+
+        The sequence number, the pose and the sum of turns are then unknown.
+        """
         return Context(self.imu, deltas=self.deltas, shaken=self.shaken)
 
 

@@ -50,7 +50,8 @@ time since the previous read.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
-"""Shortest delay in s of a read that is corrected. Shorter ones may come from the board's clock."""
+"""Shortest delay of a read, in s, for which arrival times are corrected. An inaccurate clock of the
+board can look like a shorter delay."""
 POSE_LSB_M: Final = 1e-3
 POSE_LSB_RAD: Final = 1e-3
 

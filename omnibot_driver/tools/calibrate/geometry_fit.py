@@ -132,7 +132,10 @@ def rolled(path: Column, factors: Column, base: float, base_radius_m: float) -> 
 
 
 def _rolled(rims: Column, factors: Column, base_radius_m: float) -> Column:
-    """Return the poses after each step of the wheels, (n, 3). ``rims``: their distances in m."""
+    """Return the pose at the origin, and the pose after each of n - 1 steps, (n, 3).
+
+    ``rims``: distance that each wheel rolls in each step with the assumed radii, in m, (n - 1, 3).
+    """
     body = rims * factors @ np.linalg.inv(_rims(base_radius_m)).T
     yaw = np.concatenate(([0.0], np.cumsum(body[:, 2])))
     middle = yaw[:-1] + body[:, 2] / 2

@@ -109,7 +109,7 @@ def _estop(log: Log) -> Iterator[Finding]:
 
 
 def _diagnostics(log: Log) -> Iterator[Finding]:
-    """Report the worst message of each status, and how often it was sent."""
+    """Report how often each status was not OK, its worst level, and that level's usual message."""
     if log.diagnostics and not log.alone:
         ports = ", ".join(sorted({status.hardware_id for status in log.diagnostics}))
         yield Finding(

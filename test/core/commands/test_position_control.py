@@ -124,7 +124,7 @@ def test_a_goal_that_is_not_finite_is_refused(bench: Bench, bad: float) -> None:
 def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench) -> None:
     """The driver is set to position control and refuses velocities.
 
-    The board would take 0.3 m/s for a goal at 21 mm.
+    The board would interpret a velocity of 0.3 m/s as a goal 21 mm from the origin.
     """
     start = len(bench.written)
     for command in (lambda: bench.drive(0.3), lambda: bench.turn_wheels(1.0, 1.0, 1.0)):
@@ -136,7 +136,7 @@ def test_velocities_are_refused_while_the_switch_stands_on_position(bench: Bench
 def test_goals_are_refused_while_the_switch_stands_on_velocity() -> None:
     """The driver is set to velocity control and refuses goals.
 
-    The board would take a goal at 1 m for a velocity of 14 m/s.
+    The board would interpret a goal 1 m from the origin as a velocity of 14 m/s.
     """
     bench = Bench(BoardSettings(running=True))
     bench.open()

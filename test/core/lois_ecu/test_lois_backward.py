@@ -121,10 +121,10 @@ def test_backward_with_set_gains_the_way_is_within_10_percent(name: str, seed: i
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: int) -> None:
-    """The user's feed-forward is so large that wheels roll backward at twice their set-points.
+    """The robot drives backward. A large feed-forward makes its wheels twice as fast as commanded.
 
-    No ticks are counted, but the board's odometry (0x20) shows the speed. The distance is right
-    within 3 %.
+    The public firmware counts no ticks backward, but the board's odometry (0x20) shows the speed.
+    The distance is right within 3 %.
     """
     motors = MotorSettings(rpm_per_percent=1.1 * 0.97), MotorSettings(rpm_per_percent=1.1)
     one = motion(replace(nominal("firmware", seed), motors=motors), "reverse", HOST_GAINS)

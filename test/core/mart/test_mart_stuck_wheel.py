@@ -63,7 +63,7 @@ def test_a_left_wheel_that_is_stuck_in_a_turn_is_reported(first_s: float) -> Non
 def test_starts_that_do_not_turn_the_right_wheel_are_not_repeated_without_end(
     vx: float, yaw_rate: float
 ) -> None:
-    """The right wheel is stuck, so each start turns the robot by the left wheel until it fails.
+    """The right wheel is stuck. So at each start the left wheel alone moves, until the start fails.
 
     After three starts the driver refuses this motion until the command ends. When the wheel is
     free, a new command moves the robot again.

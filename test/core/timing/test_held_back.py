@@ -53,9 +53,9 @@ def step(before: OdometryEstimate, after: OdometryEstimate) -> float:
 @example(ticks=592, frame="earth", vx=0.0)
 @example(ticks=291, frame="body", vx=0.4)
 def test_no_step_is_larger_than_its_stamps_allow(ticks: int, frame: str, vx: float) -> None:
-    """An adapter holds back data and loses some of it. No step of odom is too fast for a robot.
+    """An adapter holds back data and loses some of it. By odom, the robot is never too fast.
 
-    Two seconds later, odom is right.
+    Two seconds after the adapter has delivered the data, odom is right.
     """
     bench = through_a_stall(ticks, frame, vx, 0.5)
     fastest_mps = OdometrySettings().fastest_mps
