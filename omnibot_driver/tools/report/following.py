@@ -318,14 +318,14 @@ def _untold(log: Log, times_s: Array, told: Array, moved: Array) -> Iterator[Fin
     if len(since):
         newest = np.searchsorted(times_s[since], times_s, "right") - 1
         last_s = np.where(newest >= 0, times_s[since][np.maximum(newest, 0)], -np.inf)
-    moved_s = (times_s - last_s > AFTER_STOP_S) & (moved > TOLD)
-    untold = _sustained(times_s, moved_s & ~log.within(log.latched, times_s))
-    if untold:
+    untold = (times_s - last_s > AFTER_STOP_S) & ~log.within(log.latched, times_s)
+    moving = _sustained(times_s, untold & (moved > TOLD))
+    if moving:
         yield Finding(
             Level.WARN,
             "Commands",
-            f"The robot moved {counted(len(untold), 'time')} without a command, first at"
-            f" {untold[0].begin_s:.1f} s.",
+            f"The robot moved {counted(len(moving), 'time')} without a command, first at"
+            f" {moving[0].begin_s:.1f} s.",
             "Someone may have pushed the robot, or a topic that is not in the recording may have"
             " commanded it. Otherwise see docs/safety.md.",
         )

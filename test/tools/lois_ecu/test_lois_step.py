@@ -13,9 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lois_robot import SimulatedRobot, random_motors
 
-from omnibot_driver.boards.lois_ecu import PARAMETERS
 from omnibot_driver.boards.lois_ecu_records import save
 from omnibot_driver.core.lois_ecu import (
     Record,
@@ -33,10 +31,6 @@ from omnibot_driver.simulator.lois_ecu import (
     MotorSettings,
     SimulatedLois,
 )
-from omnibot_driver.tools.calibrate import pi_step, step
-from omnibot_driver.tools.calibrate.arguments import command_line, require_able
-from omnibot_driver.tools.calibrate.console import Console
-from omnibot_driver.tools.calibrate.interruption import Interrupted
 from omnibot_driver.tools.calibrate.pi_loop import Loop, PiGains, answer, phase_margin_deg, traits
 from omnibot_driver.tools.calibrate.pi_tuning import Goals, Tuned, dead_time_s, told, tune
 from omnibot_driver.tools.calibrate.tick_fit import Column, Plant, fit, speed
@@ -312,88 +306,6 @@ def test_a_record_with_a_damaged_cell_is_refused(tmp_path: Path) -> None:
     path.write_text("left_tick_s,right_tick_s\n0.01,0.0x\n")
     with pytest.raises(ToolError, match=r"rpm.csv cannot be read"):
         read(path)
-
-
-def test_whoever_has_gains_as_parameters_can_do_it() -> None:
-    """``calibrate step`` accepts every driver that has parameters for gains, with any board."""
-    values = PARAMETERS.check_all({})
-    require_able("step", values)
-    with pytest.raises(ToolError, match="the OmniBot's wheels"):
-        require_able("commission", values)
-
-
-def test_a_robot_is_calibrated_from_its_records(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The robot has marks that are 10 % off, unequal wheels, dead time and backlash.
-
-    ``calibrate step`` finds the plants, and sets corrections and gains in the driver. The
-    calibration file may contain all of these values.
-    """
-    monkeypatch.setattr(pi_step, "ROUNDS", 1)
-    motors = random_motors(5)
-    robot = SimulatedRobot(tmp_path, motors)
-    words = ["step", "--yes", "--records", "5", "--responses", "1", "--samples", "100"]
-    result = step.run(robot, Console(yes=True), command_line().parse_args(words))
-    found = {finding.name: finding for finding in result.findings}
-    for side, motor in zip(("left", "right"), motors, strict=True):
-        for one, planted_s in (
-            ("slow", motor.time_constant_s),
-            ("fast", motor.second_time_constant_s),
-        ):
-            value = float(found[f"{side}: {one} time constant"].value)
-            assert value == pytest.approx(planted_s, rel=0.1)
-        assert found[f"{side}: overshoot, measured"].before is not None
-        assert f"The {side} wheel, with the new gains: a step to" in " ".join(result.notes)
-    assert "not kept" not in " ".join(result.notes)
-    names = {f"{side}_{gain}" for side in ("left", "right") for gain in ("kp", "tn", "td")}
-    levels_of = {f"{side}_{n}_correction" for side in ("left", "right") for n in ("short", "long")}
-    assert set(result.parameters) == names | levels_of
-    assert {name: robot.parameters[name] for name in result.parameters} == result.parameters
-    assert robot.parameters["drive_mode"] == "rpm"
-    robot.rest(3.0)
-    gains = robot.board.wheels[1].controller.gains
-    assert gains.kp == pytest.approx(result.parameters["right_kp"])
-    assert gains.td == pytest.approx(result.parameters["right_td"])
-    assert all(name in PARAMETERS.calibrated for name in result.parameters)
-
-
-def test_values_that_an_ended_measurement_leaves_are_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The tool ends early. It cannot restore parameters that had no value, so it names them."""
-
-    def fail(*_arguments: object) -> None:
-        raise ToolError("the robot does not move")
-
-    monkeypatch.setattr(pi_step, "fit", fail)
-    robot = SimulatedRobot(tmp_path, random_motors(5))
-    words = ["step", "--yes", "--records", "1", "--responses", "1", "--samples", "100"]
-    with pytest.raises(ToolError, match=r"not move; .* left_short_correction, .*; restart both"):
-        step.run(robot, Console(yes=True), command_line().parse_args(words))
-    assert robot.parameters["left_short_correction"] is not None
-
-
-def test_an_interrupted_measurement_restores_the_parameters(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Ctrl-C interrupts the tool during a record. The driver gets back the values it had before."""
-    robot = SimulatedRobot(tmp_path, random_motors(5))
-    before = dict(robot.parameters)
-    during: list[dict[str, object]] = []
-
-    def interrupt(*_arguments: object) -> None:
-        during.append(dict(robot.parameters))
-        monkeypatch.setattr(robot, "set_parameters", interrupt)  # refused after an interruption
-        raise Interrupted("interrupted")
-
-    monkeypatch.setattr(robot, "restore_parameters", robot.set_parameters)
-    monkeypatch.setattr(robot, "record", interrupt)
-    words = ["step", "--yes", "--records", "1", "--responses", "1", "--samples", "100"]
-    with pytest.raises(Interrupted):
-        step.run(robot, Console(yes=True), command_line().parse_args(words))
-    assert during[0] != before
-    assert robot.parameters == before
 
 
 def test_what_is_worse_than_before_is_told_as_it_is() -> None:
