@@ -39,7 +39,7 @@ class Ecu:
     def stands_for_good(self) -> None:
         """Wait until the robot has been at rest for 0.8 s.
 
-        A command expires in a shorter time.
+        By default, ``cmd_vel_timeout`` is shorter, so earlier commands have then expired.
         """
         since: list[int] = []
 
