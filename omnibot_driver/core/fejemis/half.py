@@ -35,8 +35,8 @@ STREAMS: Final[Mapping[Role, Mapping[str, int]]] = {
 }  # fmt: skip
 """The streams to subscribe to on each board, with their periods in ms.
 
-``confs`` (steering geometry) is not requested by ``confsi``: if the last letter of this request is
-lost, the board sets its geometry to zero.
+The driver subscribes to ``confs`` (steering geometry), and never requests it with the line
+``confsi``: if that line loses its last letter, the board sets its geometry to zero.
 """
 NEEDED: Final[Mapping[Role, str]] = {"drive": "pose", "front": "fwl"}
 """For each board: the stream that must arrive while the robot is driven."""
@@ -127,16 +127,13 @@ class Half:
         return [key for key in streams if f"sub {key} {streams[key]}" in self.unknown_words]
 
     def not_understood(self, now: float) -> bool:
-        """Return whether many recent lines were damaged or unknown; True at most once a second.
+        """Return whether many lines were damaged or unknown in this second.
 
         The caller calls this after each read.
         """
         if now - self._counted_at >= 1.0:
             self._counted_at, self._counted = now, self.statistics.faults
-        if self.statistics.faults - self._counted <= MANY:
-            return False
-        self._counted = self.statistics.faults + MANY
-        return True
+        return self.statistics.faults - self._counted > MANY
 
     def came_at(self, keyword: str) -> float:
         """Return when the last line with ``keyword`` arrived, in s; -infinity before the first."""
