@@ -16,11 +16,11 @@ from typing import TextIO
 def write_whole(
     path: Path, write: Callable[[TextIO], object], *, wanted: Callable[[], bool] = lambda: True
 ) -> bool:
-    """Write a text file, in UTF-8 and with the line ends of ``write``. Create its folder if needed.
+    """Write a text file in UTF-8, and create its folder if needed.
 
     An existing file is replaced. Return whether the new file exists. Raises OSError.
 
-    ``write``: function that writes the content to the open file.
+    ``write``: function that writes the content to the open file. Line ends are not converted.
 
     ``wanted``: called after writing. If it returns False, the new data are discarded.
     """

@@ -60,8 +60,8 @@ class SharedSession:
         self.told = False
         """Whether the last Stop was written to every line when the link ended.
 
-        If the port was lost then, Stop is written when it is open again. ``told`` then stays False
-        if no stop was owed (``Shutdown.owed``).
+        If the port was lost at that time, the reader opens it again and writes Stop. After that,
+        ``told`` is True only if the robot had to be stopped (``Shutdown.owed``).
         """
         self.stood = False
         """Whether measurements showed the robot at rest when the link ended."""

@@ -11,12 +11,12 @@ import time
 from typing import Final
 
 STANDSTILL_S: Final = 0.4
-"""Time in s since the last call of ``StallDetector.passed`` from which the process is regarded as
-stalled. After a slightly longer time, the guard process stops the robot; the driver must notice
-each of these stalls."""
+"""Time in s without a call of ``StallDetector.passed`` after which the process is regarded as
+stalled. It is a little shorter than the time after which the guard process stops the robot, so that
+the driver notices each stall in which the guard stops the robot."""
 SETTLE_S: Final = 0.25
-"""Time in s after the end of a stall in which commands are still refused. The sender's clock is
-known only roughly, so they may have been sent during the stall."""
+"""Time in s for which commands are still refused after the end of a stall. The sender's clock is
+known only roughly, so a command from this time may have been sent during the stall."""
 LATEST_S: Final = 10.0
 """Longest assumed time in s from the sending of a command to its arrival, retransmissions included.
 A command that seems to be older comes from a sender whose clock is wrong."""

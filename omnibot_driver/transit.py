@@ -8,7 +8,8 @@ difference = arrival by our clock - sending by the sender's clock;
 offset = the sender's smallest difference;
 delay = difference - offset.
 
-docs/internals/stopping.md explains why. This module does not read a clock, and does not use ROS.
+docs/internals/stopping.md explains this estimate and its limits. This module does not read a clock,
+and does not use ROS.
 """
 
 import math
@@ -61,8 +62,8 @@ class Delay:
 
     * ``total_s``: time since the message was sent.
     * ``waited_s``: part of this time in our own queue.
-    * ``sent_ns``: time of sending by our clock. It has two possible values until the offset of the
-      sender's clock is known.
+    * ``sent_ns``: possible times of sending by our clock. There are two until the offset of the
+      sender's clock is known, and then only one.
     """
 
     total_s: float
@@ -143,7 +144,8 @@ class _Sender:
     def improbability(self, differences_s: Differences, at_s: float) -> float:
         """Return how badly the message fits this sender, as a delay in s; 0 fits exactly.
 
-        A message that is too early counts as late by ten times (``CLOCK_RETREATS``) that time.
+        If a message is too early, the result is the time by which it is too early, multiplied by
+        ten (``CLOCK_RETREATS``).
         """
         late_s = min(
             offset.late_s(difference_s, at_s)

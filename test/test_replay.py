@@ -2,7 +2,7 @@
 
 """Tests of replays: every replay of a recorded line gives the same result, at any speed.
 
-The result is also that of the session which ran during the recording.
+The session that ran during the recording had this result, too.
 """
 
 import itertools

@@ -42,7 +42,7 @@ def test_a_thread_that_passes_in_time_does_not_stand_still() -> None:
 def test_a_standstill_is_told_once_with_its_length() -> None:
     """After a stall, only the first call of ``begun`` returns the length of the stall.
 
-    The next stall is reported again.
+    The length of the next stall is returned once, too.
     """
     standstill = StallDetector()
     standstill.passed(100.0, wall_ns(100.0))

@@ -78,7 +78,7 @@ pauses_s = st.floats(0.001, 30.0)
 def test_no_command_that_came_in_time_is_refused_however_far_the_clocks_are_apart(
     sender_s: float, receiver_s: float, messages: list[tuple[float, float, bool]]
 ) -> None:
-    """The estimated delay never exceeds the true delay, so no command in time is refused.
+    """The estimated delay never exceeds the true one, so a command that is in time is not refused.
 
     The estimate includes the network and the driver's queue.
     """

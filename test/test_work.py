@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Bounds for the number of Python calls for one tick (10 ms) of a running board's data.
+"""Tests that the driver makes few Python calls for the data of one tick (10 ms) of a running board.
 
-Times are not measured. If a bound is raised, docs/internals/performance.md gives the reason.
+Each test has a bound for the number of calls, and measures no times. A change that raises a bound
+gives its reason in docs/internals/performance.md.
 """
 
 import gc
@@ -34,8 +35,8 @@ TICK_S = 0.01
 SETTLED = 400
 TICKS = 400
 IMU, DELTA, POSE = 14, 14 + 9, 14 + 9 + 15
-"""Bytes that the board sends in a tick of 10 ms. There are three kinds of ticks: only an IMU frame;
-IMU and delta; IMU, delta and pose."""
+"""Number of bytes that the board sends in a tick of 10 ms, for three kinds of ticks: only an IMU
+frame; IMU and delta; IMU, delta and pose."""
 
 
 def calls(work: Callable[[], object]) -> int:

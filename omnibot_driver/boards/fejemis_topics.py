@@ -245,8 +245,8 @@ class FejemisTopics:
     def _say(self, what: str, action: Callable[[Services, float], None], *, off: bool) -> str:
         """Call ``action``; return the reason if it was refused, or an empty string.
 
-        ``what``: name of the topic or device in the reason. ``off``: whether the action switches
-        something off. Switching off is allowed without a connection.
+        ``what``: name of the topic or device, which the reason contains. ``off``: whether the
+        action switches something off. Switching off is allowed without a connection.
         """
 
         def say(session: Session, now: float) -> str:
@@ -273,7 +273,7 @@ def _why_not_connected(what: str, session: Session) -> str:
 
 
 def _publisher_of(node: Node, topic: str) -> Publisher:
-    """Return the publisher of this topic that the driver has already created for every board."""
+    """Return the publisher of a topic that every board has; the driver has already created it."""
     name = node.resolve_topic_name(topic)
     return next(one for one in node.publishers if one.topic_name == name)
 

@@ -18,7 +18,7 @@ SHORTEST_PERIOD_S: Final = 0.05
 LONGEST_PERIOD_S: Final = 60.0
 MOST_TERMINAL_RATE_HZ: Final = 25.0
 """Largest rate of commands in a terminal mode, in Hz. In such a mode, the board forwards each
-command to its sensors over slow lines; that of the compass carries at most 34 commands a second."""
+command to a sensor over a slow line. The compass' line carries at most 34 commands a second."""
 
 WHEELS: Final = (
     Parameter(

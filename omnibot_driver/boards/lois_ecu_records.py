@@ -17,7 +17,8 @@ from omnibot_driver.core.lois_ecu.readings import RecordReading
 from omnibot_driver.files import write_whole
 
 SATURATED: Final = 0xFFFF
-"""Timer count that the board reports if the time of an encoder tick does not fit into 16 bits."""
+"""Timer count that the board reports if the time from one encoder tick to the next does not fit
+into 16 bits."""
 
 Row = tuple[object, ...]
 

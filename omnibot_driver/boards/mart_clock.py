@@ -10,8 +10,8 @@ import time
 from typing import Final
 
 ENDS_S: Final = range(56, 59)
-"""Seconds of each minute in which the driver sends TIME with the next full minute. The controller's
-clock is then at most 4 s fast."""
+"""Seconds near the end of a minute. In these seconds, the driver sends TIME with the next full
+minute. The controller's clock is then at most 4 s fast."""
 
 
 def clock_fields(now_s: float, *, may_set_back: bool) -> tuple[int, ...] | None:

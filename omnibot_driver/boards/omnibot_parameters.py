@@ -139,7 +139,7 @@ OMNIBOT: Final = (
 
 
 def require_a_frame_for_goals(values: Mapping[str, Any]) -> None:
-    """Raise ParameterError if the axis signs give a goal pose no consistent meaning.
+    """Raise ParameterError if goal poses are used and the axis signs contradict each other.
 
     The sign of yaw must be the product of the signs of x and y. Otherwise the board's axes would be
     a mirror image of the robot's axes.

@@ -159,8 +159,8 @@ def table(
         raise ValueError(f"these are not common parameters: {', '.join(sorted(unknown))}")
     if kept := sorted({*without} - DISPENSABLE):
         raise ValueError(
-            f"the board {board} must have the parameters {', '.join(kept)}: the driver reads them"
-            " on every board with such traits. A board may only omit the parameters"
+            f"the board {board} must have the parameters {', '.join(kept)}, because the driver"
+            " reads them. The only parameters that a board may omit are"
             f" {', '.join(sorted(DISPENSABLE))}"
         )
     sections = {

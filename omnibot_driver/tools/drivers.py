@@ -36,7 +36,7 @@ def running_drivers(node: Any) -> list[str]:
 
 
 def discovery_advice(environment: Mapping[str, str] = os.environ) -> str:
-    """Return the end of a message about a driver that was not found; usually empty.
+    """Return a text to append to a message about a driver that was not found; usually empty.
 
     With a discovery server, only a process that is a super client can list the running drivers.
     """

@@ -29,7 +29,7 @@ from ratios import Figure, table
 DOCUMENT = Path(__file__).parents[2] / "docs" / "internals" / "performance.md"
 BEGIN, END = "<!-- figures: begin -->", "<!-- figures: end -->"
 OTHERS = {"lois_ecu": "lois_ecu_bench", "mart": "mart_bench", "fejemis": "fejemis_bench"}
-"""The modules that measure the other boards, by the name of the board."""
+"""For each board except the OmniBot, the module that measures its driver."""
 SCALES = (1, 2, 4, 8)
 
 

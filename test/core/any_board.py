@@ -234,7 +234,7 @@ class AnyBench:
     def run(self, seconds: float) -> None:
         """Advance the simulated time by ``seconds``.
 
-        The session is called only when it has something to do, as by the driver's threads.
+        As in the driver, the session is called only when data arrives or when it is due.
         """
         wake_s = self.session.wake_at
         for _ in range(round(seconds / TICK_S)):
@@ -252,7 +252,7 @@ class AnyBench:
                 wake_s = self.session.wake_at
 
     def stall(self, seconds: float) -> None:
-        """Simulate a stall of the process: data waits for ``seconds`` and is then read together."""
+        """Let the process stall for ``seconds``, and then read all data of this time at once."""
         waiting: list[Packet] = []
         for _ in range(round(seconds / TICK_S)):
             self.now += TICK_S

@@ -86,7 +86,7 @@ class Line:
             assert isinstance(reading, PausedReading)
 
     def _command(self) -> None:
-        """Command a smooth curve of up to 0.45 m/s along each axis and 0.45 rad/s."""
+        """Command a smooth curve of up to 0.43 m/s along each axis and 0.45 rad/s."""
         sizes = (30, 30, 225)
         words = [
             round(self._commanding * size * math.sin(self.now * speed + phase)) & 0xFFFF
@@ -96,10 +96,10 @@ class Line:
 
     @property
     def _commanding(self) -> bool:
-        """Whether to send commands: the test wants to drive, and the board runs.
+        """Whether to command motion: the test wants to drive, and the board runs.
 
-        None are sent to a paused board, which may mistake a byte of a command for a letter such as
-        P.
+        Otherwise zeros are commanded. A paused board may mistake a byte of another command for a
+        letter such as P.
         """
         return self.drives and self.board.mode is BoardMode.NOMINAL
 

@@ -128,12 +128,12 @@ class Bench:
             self.run(TICK_S)
 
     def configure(self, **changed: Any) -> None:
-        """Change fields of SessionSettings. Fields that are not given keep their first values."""
+        """Change fields of SessionSettings. The others have their initial values."""
         self.session.configure(replace(self.settings, **changed), self.now)
         self.settle()
 
     def configure_board(self, **changed: Any) -> None:
-        """Change fields of OmniBotSettings. Fields that are not given have their defaults."""
+        """Change fields of OmniBotSettings. The others have defaults that fit the board."""
         board = self.board.settings
         settings = OmniBotSettings(
             delta_frame=board.frame, delta_period_s=board.delta_period_s, **changed

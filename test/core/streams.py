@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Byte streams of the simulated board: divided into frames, and decoded.
+"""Byte streams of the simulated board, and functions that divide them into frames or decode them.
 
-The division into frames is made according to the manual's tables.
+A stream is divided by the manual's tables, and decoded by the driver's decoder.
 """
 
 import struct
@@ -24,7 +24,7 @@ LEAD_IN = encode(REST) * 2
 
 
 def velocity(x: int, y: int, omega: int) -> bytes:
-    """Return the frame of a body velocity command, written from the manual."""
+    """Return the frame of a body velocity command, by the layout in the manual."""
     return bytes.fromhex("FF FE 01") + struct.pack(">3h", x, y, omega)
 
 

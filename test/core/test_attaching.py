@@ -232,9 +232,10 @@ def test_what_was_driven_before_a_reset_does_not_move_the_pose_after_it() -> Non
 
 
 def test_every_change_of_the_boards_frame_is_counted_and_nothing_else() -> None:
-    """The odometry counts each change of the place of its frame in the board's earth frame.
+    """The odometry frame gets a new place in the board's earth frame, for example by a reset.
 
-    Such a change, for example by a reset, makes old goals invalid.
+    The odometry counts these changes and nothing else, because each of them makes old goals
+    invalid.
     """
     odometry = Odometry(SETTINGS)
     attach(odometry, PoseReading(1.0, 2.0, 0.0))

@@ -37,7 +37,7 @@ def assert_stands_for_good(bench: AnyBench) -> None:
 
 
 def assert_obeys(bench: AnyBench, within_s: float = 3.0) -> None:
-    """Command motion until the robot moves. A MART may have been restarted, and gets some time."""
+    """Command motion until the robot moves. A MART that was restarted needs some time for this."""
     end = bench.now + within_s
     while bench.robot.stands:
         assert bench.now < end

@@ -46,7 +46,7 @@ def test_the_state_follows_what_is_heard_and_nothing_else() -> None:
 
 
 def test_without_auto_start_a_paused_board_stays_paused() -> None:
-    """The driver is set not to start the board. It writes no S when the port opens."""
+    """``auto_start`` is false. The driver writes no S, and the board stays paused."""
     bench = Bench(run=False)
     bench.open()
     bench.run(3.0)

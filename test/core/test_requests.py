@@ -96,7 +96,10 @@ def test_what_was_asked_of_a_lost_port_is_not_said_on_the_next() -> None:
 
 @pytest.mark.parametrize("speaks", [True, False])
 def test_between_what_is_due_nobody_is_woken(speaks: bool) -> None:
-    """A request waits. The board sends data, or is silent. The next wake-up is in the future."""
+    """While a request is under way, the session's next wake-up is always in the future.
+
+    This is tested with a board that sends data, and with a silent one.
+    """
     bench = Bench()
     bench.speaks = speaks
     bench.open()
@@ -161,7 +164,8 @@ def test_a_reset_of_a_paused_board_leaves_it_paused(asked: bool) -> None:
 def test_a_paused_board_that_does_not_hear_r_is_not_said_to_have_restarted() -> None:
     """A paused board does not receive the R of a reset, and so does not restart.
 
-    The numbers in its «Paused» texts continue, which shows this. The reset fails.
+    The numbers in its «Paused» texts continue, so the driver sees that it did not restart. The
+    reset fails.
     """
     bench = Bench(run=False)
     bench.open()

@@ -23,9 +23,9 @@ PIECE: Final = 4
 BYTE_S: Final = 10 / 115200
 TICKS: Final = 3000
 SILENCE_S: Final = 1.0
-"""Shortest pause of the simulated board, in s, for which the driver may warn about the cable."""
+"""The driver may warn about the cable only if the data pauses for at least this time, in s."""
 TRANSIT: Final = 200
-"""Largest number of frames on their way to the driver when the comparison of messages begins."""
+"""Largest number of sent frames whose messages have not arrived when the comparison begins."""
 REACH: Final = 200
 """Number of sent frames with which a published message is compared.
 
@@ -48,7 +48,7 @@ class PiecesTerminal(Terminal):
     _tick_at = 0.0
     """When the newest tick began, in s of the monotonic clock."""
     _is_newest = True
-    """Whether the board's next output is that of the newest tick."""
+    """Whether the tick that the board simulates now is the newest of the ticks that are due."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)

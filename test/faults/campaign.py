@@ -159,7 +159,10 @@ class Campaign(Outcome):
         self._one_life(GoalRig, lambda _: GOALS, damaged_bytes=False)
 
     def ending(self, name: str) -> None:
-        """Test one way in which a driver can end, in every round. Each round has a new driver."""
+        """Make a driver end in the given way, and check the result.
+
+        Repeat this in every round, with a new driver each time.
+        """
         ending = ENDINGS[name]
         self._ends(f"the driver ends: {name}", ending, before=ending.before)
 
@@ -201,7 +204,7 @@ class Campaign(Outcome):
     def losses(self, number_of_life: int, numbers: range) -> None:
         """Test how the robot stops if the line loses bytes on the way to the board.
 
-        The loss lasts until the last stop.
+        The line continues to lose bytes during all stops.
 
         ``number_of_life``: index of the group of stops (``LIVES``) that each driver performs.
 

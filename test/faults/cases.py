@@ -314,7 +314,7 @@ def driver_hangs(rig: Rig) -> None:
 
 
 def second_driver(rig: Rig) -> None:
-    """Start a second driver on the same port. This driver must be refused.
+    """Start a second driver on the same port. It must report that the port is in use, and by whom.
 
     The first driver must continue to drive the robot.
     """

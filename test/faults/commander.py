@@ -13,7 +13,10 @@ from std_srvs.srv import SetBool
 
 DRIVE_HZ: Final = 20.0
 FAR_M: Final = 10.0
-"""Distance of a goal, in m for each commanded m/s. No test drives far enough to reach the goal."""
+"""Distance of a goal in m, if 1 m/s is commanded. It is proportional to the commanded speed.
+
+No test drives far enough to reach a goal.
+"""
 
 
 class Hand(Protocol):

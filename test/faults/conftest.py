@@ -18,10 +18,9 @@ def _ros() -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def lenience() -> dict[str, float]:
-    """Return times of the rig, in s, that are long enough for a busy computer.
+    """Return three times for ``Rig``, in s. They are suitable for a busy computer.
 
-    These are the grace time for a stop, the time for the driver's end, and the time of rest after
-    a stop. ``rest_s`` is the time of ten commands, so a commander that continues is noticed.
-    ``make faults`` uses 0.1 s, 2 s and 1 s.
+    ``rest_s`` is short, but long enough for ten commands. A commander that does not stop is
+    therefore noticed. ``make faults`` uses other times: 0.1 s, 2 s and 1 s.
     """
     return {"grace_s": 30.0, "ends_within_s": 60.0, "rest_s": 0.5}

@@ -21,7 +21,10 @@ CALLS_ONE_IN: Final = 20
 BURST: Final = 10
 """Number of messages per tick of 10 ms. There are 1000 messages a second."""
 HELD: Final = 0.99
-"""Least share of the sent IMU frames that must be published within 2 s of the random input."""
+"""Least share of the IMU frames that must be published.
+
+The board sends these frames during the random input and in the 2 s after it.
+"""
 CDR_LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 
 

@@ -2,8 +2,9 @@
 
 """Stops of the robot while the line loses bytes on the way to the board.
 
-The loss ends when the robot must be at rest. The stops run in real time. In simulated time,
-test/integrity/outbound.py measures the rate of failures.
+The line continues to lose bytes until the end of the test, also when the robot must be at rest.
+The stops run in real time. In simulated time, test/integrity/outbound.py measures the rate of
+failures.
 """
 
 import signal

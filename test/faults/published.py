@@ -38,7 +38,7 @@ def sent_imu_key(frame: bytes) -> Key | None:
 def odom_key(message: Odometry) -> Key | None:
     """Return the speed in 0.1 mm per 40 ms, and the yaw rate in 0.1 mrad per 40 ms.
 
-    These two do not depend on the robot's heading. None means that they were not measured.
+    These two do not depend on the robot's heading. If they were not measured, return ``None``.
     """
     v = message.twist.twist
     unknown = message.twist.covariance[0] >= UNMEASURED_VARIANCE

@@ -48,11 +48,12 @@ class RigBoard:
 
     ``lossy``: returns the settings of the n-th board behind a lossy line.
 
-    ``line``, ``serve``: make the board's line and its server. None: a serial line on a terminal.
+    ``line``, ``serve``: make the board's line and its server. ``None`` means a serial line on a
+    terminal.
 
-    ``cases``: returns the faults of the n-th round. None: those of a serial line.
+    ``cases``: returns the faults of the n-th round. ``None`` means the faults of a serial line.
 
-    ``steps``: faults of a random walk. None: those of a serial line.
+    ``steps``: faults of a random walk. ``None`` means the faults of a serial line.
 
     ``without``: faults and parts of the campaign that do not apply.
     """

@@ -12,7 +12,10 @@ from walk import CALLS, steps_of
 
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_board_has_faults_and_leaves_out_only_what_exists(board: str) -> None:
-    """Every board has faults to inject. The faults that it leaves out (``without``) exist."""
+    """Every board has faults to inject.
+
+    Each name in its ``without`` is a fault or a part of the campaign.
+    """
     kind = load(board)
     own = (kind.cases or survivable)(0)
     assert own.keys() - kind.without

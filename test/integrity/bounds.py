@@ -23,13 +23,15 @@ BUSY_FAULTS = ("none, starting anywhere", "1 byte in 1,000 lost", "1 byte in 100
 class Bound:
     """The limits of a parser's errors under one fault of the line.
 
-    ``one_wrong_in_visible``: at most one decoded frame in this number may be wrong; None if no
-    frame may be wrong. This limit is for chunkings that show the line's idle gaps to the parser.
+    ``one_wrong_in_visible``: at most one decoded frame in this number may be wrong. With ``None``,
+    every decoded frame must be right. This limit is for chunkings that show the line's idle gaps
+    to the parser.
 
     ``one_wrong_in_hidden``: the same for chunkings that hide the idle gaps.
 
-    ``delivered``: least share of the intact frames that must be decoded. 1.0 means each intact
-    frame except the first two; of a reader with busy loops, 99.9 % of all.
+    ``delivered``: least share of the intact frames that must be decoded. With 1.0, every intact
+    frame after the first two must be decoded. While busy loops run, 99.9 % of all intact frames
+    are enough.
 
     ``chunkers``: names of the chunkings that have these limits.
     """
@@ -42,7 +44,7 @@ class Bound:
     def one_wrong_in(self, chunker: str) -> int | None:
         """Return the number N in "at most one decoded frame in N may be wrong".
 
-        None means that no frame may be wrong.
+        Return ``None`` if every decoded frame must be right.
         """
         visible = chunker in GAPS_VISIBLE
         return self.one_wrong_in_visible if visible else self.one_wrong_in_hidden

@@ -38,7 +38,7 @@ SHARE_S, SLOW_S = (0.002, 0.009), (0.0025, 0.004)
 """
 HOGGED_PIECE = 4
 SEGMENT_BYTES = (300, 6000)
-"""Range of the number of bytes after which another kind of pieces, such as single bytes, begins."""
+"""The kind of pieces, such as single bytes, changes after a number of bytes in this range."""
 
 
 def delay_s(random: Random, now: float = 0.0) -> float:

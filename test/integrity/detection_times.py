@@ -40,9 +40,9 @@ def robot(**settings: object) -> Callable[[float], Bench]:
 
 
 def gripped_after_s(bench: Bench, command: Triple, motion: Triple) -> float:
-    """Make a robot that obeys ``command`` move with the velocity ``motion`` instead.
+    """Drive a robot with ``command``. Then let it move with the velocity ``motion`` instead.
 
-    Return the time in s until the driver sends Stop.
+    Return the time in s from this change until the driver sends Stop.
     """
     if any(command):
         for _ in range(15):

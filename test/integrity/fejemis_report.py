@@ -49,9 +49,10 @@ Stream = list[dict[int, bytes]]
 class Score:
     """Counts of published values. Scores can be added.
 
-    ``sent``, ``out``: numbers of values with undamaged and with damaged lines.
+    ``sent``: number of values that are published if the lines are undamaged.
 
-    ``wrong``: number of wrong values with damaged lines.
+    ``out``, ``wrong``: number of values that are published if the lines are damaged, and number of
+    wrong values among them.
 
     ``odometry``: number of compared odometry messages.
 

@@ -2,8 +2,8 @@
 
 """Integrity of the LOIS ECU's codec on a line that loses or adds bytes (``make integrity``).
 
-The simulated board shares no code with the driver. A decoded report is right if it equals a true
-report that follows the previous right one.
+The simulated board shares no code with the driver. Decoded and true reports are compared in order.
+A decoded report is right if it equals any true report after the last one that was found.
 """
 
 from collections import Counter

@@ -42,7 +42,8 @@ class Bound:
 
     ``long_in``: N of "at most one uncommanded set-point of over 2 ms in N control frames".
 
-    ``overdue``: whether a robot that drives when it must be at rest is an error.
+    ``overdue``: whether it is an error if the robot still drives when it must be at rest, or at the
+    end.
     """
 
     share: float = 1.0

@@ -2,7 +2,7 @@
 
 """The driver in an outbound trial: what the real session writes, and when.
 
-At the driver's end, this module acts in place of the driver's link and guard.
+When the driver ends, this module acts in place of the driver's link and guard.
 """
 
 import contextlib
@@ -30,7 +30,7 @@ READ_S: Final = 0.002
 """Time from a tick until the driver reads its bytes, in s."""
 STANDS: Final = Shown("running", False)
 CLOCK_S: Final = 1e-6
-"""Time between two readings of the clock, in s."""
+"""Shortest time until the session's next wake-up, in s, even if the wake-up is already due."""
 History = tuple[tuple[int, Shown], ...]
 """The states that the board shows in a scene, each with the tick at which the state begins."""
 

@@ -33,7 +33,8 @@ class Score:
 
     ``for_good``: number of trials in which the robot still drove at the end.
 
-    ``frames``: number of control frames in ``driving_s``.
+    ``driving_s``: total time for which the driver drove. ``frames``: number of control frames that
+    it wrote in this time.
 
     ``uncommanded_s``: total time of the ``uncommanded`` set-points.
 

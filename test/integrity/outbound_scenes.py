@@ -21,7 +21,7 @@ from omnibot_driver.core.requests import Request
 from omnibot_driver.core.session import Session
 
 FROM_S: Final = 0.3
-"""Time in s from which the board runs, and the driver has received this state."""
+"""Time in s from which the board runs, and the driver knows this."""
 STANDS_S: Final = 1.2
 """Time in s from the last command until the robot must be at rest."""
 ESTOPPED_S: Final = 0.3

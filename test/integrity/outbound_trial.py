@@ -2,8 +2,8 @@
 
 """One outbound trial: a scene, a damaged line, a receiver, and the board behind the receiver.
 
-The board reports a moving robot while the driver drives, or while a motion is the set-point. The
-driver can see a change after one or two ticks.
+The board reports a moving robot while the driver drives, and while the board's own set-point is a
+motion. A change of the board's state appears in its reports after one or two ticks.
 """
 
 import math
@@ -35,8 +35,8 @@ Memo = dict[tuple[bytes, bool, bytes], Made]
 """Cached results of a receiver on a running board.
 
 A key has the bytes that the receiver held before, whether a pause preceded the new bytes, and the
-new bytes. A value has the bytes that the receiver holds afterwards, and each frame found with the
-position of its last byte. The value is None if the bytes contain a letter.
+new bytes. A value has the bytes that the receiver holds afterwards, and the frames that it found,
+each with the position of its last byte. The value is ``None`` if the bytes contain a letter.
 """
 
 

@@ -143,7 +143,8 @@ def test_the_judge_tells_an_old_command_from_one_that_was_never_given() -> None:
 def test_the_judge_tells_letters_of_the_driver_from_others() -> None:
     """The board acts on three letters. The judge accepts a letter that the driver sent.
 
-    It reports a byte of a frame as a "false" letter, and counts a byte from the line as "added".
+    It reports a byte of a frame as a "false" letter. A letter that the line added is counted as
+    "added".
     """
     judge = Judge()
     judge.write(parse(bytes(8) + STOP + bytes(8) + b"P"), 0.0)
@@ -197,9 +198,9 @@ def test_a_write_is_read_by_the_layout_alone() -> None:
 
 
 def test_sums_of_one_scene_and_of_all_that_end() -> None:
-    """The scores of all scenes are added. Scenes that only drive are omitted from the sum.
+    """Without the name of a scene, ``over`` adds the scores of all scenes that end a drive.
 
-    If a scene is named, only its scores are added, even if the scene only drives.
+    With a name, it adds only the scores of this scene, even if the scene only drives.
     """
     scores = {
         ("a", "r", "timeout"): Score(trials=1),

@@ -81,9 +81,10 @@ def chunks_of(scenario: str, fault: str, chunker: str, seed: int) -> Chunks:
 
 
 def one_in(number: int, *choices: Iterable[str]) -> list[Any]:
-    """Return one in ``number`` combinations of the choices.
+    """Combine one choice from each list, and return about one in ``number`` of all combinations.
 
-    The result contains each pair of choices if every list has at least ``number`` choices.
+    If every list has at least ``number`` choices, any two choices from different lists are together
+    in at least one of the returned combinations.
     """
     combined = product(*(enumerate(names) for names in choices))
     return [

@@ -52,8 +52,8 @@ FAILURES = {
 def built(folder: Path, fails: str, source: str, *, wanted: str = "1") -> str:
     """Build the package into ``lib`` in ``folder``, and return the output of the build.
 
-    A substitute replaces mypyc. ``fails``: Python statement that it runs. ``source``: content of
-    the C file that it writes. ``wanted``: value of ``OMNIBOT_DRIVER_COMPILE``.
+    A substitute replaces mypyc. ``fails``: Python statement that the substitute runs. ``source``:
+    content of the C file that it writes. ``wanted``: value of ``OMNIBOT_DRIVER_COMPILE``.
     """
     (folder / "stand_in/mypyc").mkdir(parents=True, exist_ok=True)
     (folder / "stand_in/mypyc/__init__.py").touch()

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what ``colcon build`` and ``pip install`` install, started as ``ros2 run`` does it."""
+"""Tests of the files that ``colcon build`` and ``pip install`` create, and of the programs in them.
+
+The programs are started as ``ros2 run`` starts them.
+"""
 
 import os
 import re

@@ -66,9 +66,9 @@ def test_a_linked_venv_is_not_emptied(tmp_path: Path) -> None:
 
 @pytest.fixture
 def venv_with_errors(tmp_path: Path) -> Path:
-    """Return a ready ``.venv`` whose Python only records its arguments, and fails for checks.
+    """Return a complete ``.venv`` whose Python is a script that only records its arguments.
 
-    The failure stands for errors that the check has found.
+    If the arguments request a check, the script exits with 1, as if the check had found errors.
     """
     venv = tmp_path / "venv"
     (venv / "bin").mkdir(parents=True)

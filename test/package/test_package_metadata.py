@@ -183,7 +183,7 @@ def test_only_tools_need_what_an_extra_brings() -> None:
 
 
 def test_what_rosdep_does_not_bring_the_readme_has_pip_bring() -> None:
-    """rosdep does not install some libraries in a suitable version. A pip command installs them.
+    """rosdep cannot install suitable versions of two libraries. A pip command installs them.
 
     The README has this command, with the option that Ubuntu 24.04 requires.
     """

@@ -20,7 +20,10 @@ def quick_folders() -> list[str]:
 
 
 def nodes_of_files_with(text: str) -> Iterator[tuple[str, ast.AST]]:
-    """Yield each syntax node of each quick test file with ``text`` in it, and the file's name."""
+    """Search the quick tests for files with ``text``, and yield their syntax nodes.
+
+    Each node comes with the name of its file.
+    """
     for folder in quick_folders():
         for path in sorted((ROOT / folder).rglob("*.py")):
             if text in (source := path.read_text()):

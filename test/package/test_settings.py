@@ -211,7 +211,7 @@ def test_foxglove_shows_topics_and_services_that_exist() -> None:
 
 
 def test_foxglove_lays_out_every_panel_once() -> None:
-    """Each panel in Foxglove's layout has one place, and each place has a panel's settings."""
+    """Foxglove's layout shows each panel that has settings exactly once, and no other panel."""
     layout = json.loads((CONFIG / "foxglove.json").read_text())
     places = list(everything_under("first", layout)) + list(everything_under("second", layout))
     panels = [place for place in places if isinstance(place, str)]

@@ -152,7 +152,7 @@ def test_a_board_on_the_network_prints_its_address() -> None:
 def test_a_link_that_cannot_be_made_is_one_sentence_and_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A link is impossible. The program prints one line on stderr and ends with code 1.
+    """A link cannot be created. The program prints one line on stderr and ends with code 1.
 
     The signal handlers are restored.
     """

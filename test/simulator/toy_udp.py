@@ -2,11 +2,11 @@
 
 """A simulated toy board that answers requests over UDP and executes one move at a time.
 
-``odo``: answers ``ok X`` with the position X, in m.
+``odo``: the board answers ``ok X`` with its position X, in m.
 
-``move D``: drives D m at 0.5 m/s, then answers ``ok X``, as to ``odo``.
+``move D``: the board drives D m at 0.5 m/s. It then answers ``ok X`` with its new position X.
 
-``stop``: ends the move. The reply to the move is then a failure.
+``stop``: the board ends the move, and answers ``fail stopped`` to the move and ``ok`` to the stop.
 """
 
 import argparse

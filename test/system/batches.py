@@ -11,7 +11,7 @@ BATCH: Final = 5
 
 
 class InBatches(RunningBoard[B]):
-    """Runs ``BATCH`` ticks at once, or the ticks that are due when a packet arrives.
+    """Runs ``BATCH`` ticks at once. If a packet arrives earlier, only the ticks that are due run.
 
     What the board sends in these ticks arrives together, as through a USB adapter.
     """

@@ -41,7 +41,8 @@ Triple = tuple[float, float, float]
 class Outcome:
     """Result of a drive.
 
-    ``imu_sent``, ``odom_sent``: frames that the board sent, from the first one that was published.
+    ``imu_sent``, ``odom_sent``: number of frames that the board sent, counted from the first frame
+    that the driver published.
 
     ``imu_wrong``, ``odom_wrong``: messages that match no frame.
 
@@ -255,7 +256,7 @@ def _words(message: Any) -> tuple[int, ...]:
 
 
 def _displacement(message: Any) -> tuple[float, int]:
-    """Return the length and the turn of the displacement in a message's twist.
+    """Return the displacement from which a message's twist was computed: its length and turn.
 
     The length is in 0.1 mm, and the turn in 0.1 mrad.
     """

@@ -3,8 +3,8 @@
 """Program that waits until it has found all drivers of a fleet through a discovery server.
 
 Run ``python fleet_observer.py COUNT PREFIX`` with ``ROS_SUPER_CLIENT`` set. This is a separate
-process because of Fast DDS: a process that has been a client of a discovery server finds no nodes
-later without a server. Other tests in the same process would fail.
+process because of Fast DDS: a process that was once a client of a discovery server can no longer
+find nodes without a server. Other tests in the same process would therefore fail.
 """
 
 import sys

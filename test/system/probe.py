@@ -25,7 +25,7 @@ from omnibot_driver.stall_detector import SETTLE_S
 
 NO_EVENTS = SubscriptionEventCallbacks(use_default_callbacks=False)
 NO_PUBLISHER_EVENTS = PublisherEventCallbacks(use_default_callbacks=False)
-"""The probe waits for no events of the middleware.
+"""The probe does not wait for events of the middleware.
 
 The executor would add each event to every wait, which takes more time than the messages.
 """
@@ -35,8 +35,8 @@ The executor would add each event to every wait, which takes more time than the 
 def ros() -> Iterator[None]:
     """Set up ROS, and keep one node until the end.
 
-    Without this node, the end of each probe would delete the participant of the middleware. Fast
-    DDS has crashed there twice.
+    Without this node, the end of each probe would delete the participant of the middleware. During
+    such a deletion, Fast DDS has crashed twice.
     """
     rclpy.init()
     node = Node("tests", enable_rosout=False, start_parameter_services=False)

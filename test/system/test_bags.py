@@ -149,7 +149,7 @@ def test_every_replay_of_a_bag_is_the_same(drive: Drive) -> None:
 def replay(stack: ExitStack, drive: Drive) -> tuple[Driver, Probe, dict[str, list[Message]]]:
     """Start a driver that replays the recorded bytes.
 
-    Return it, its probe, and its messages by topic.
+    Return the driver, its probe, and the messages by topic.
     """
     driver = stack.enter_context(Driver(port=f"replay://{drive.bag}?speed=4&delay=7"))
     probe = stack.enter_context(Probe(driver.namespace))

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the log at the driver's start: what the calibration file sets, and what is ignored."""
+"""Tests of what the driver logs at its start about the calibration file and its entries."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -54,7 +54,7 @@ def test_names_that_are_not_read_are_told_with_the_nearest(
 ) -> None:
     """One warning lists all names in the calibration file that the driver does not read.
 
-    For a mistyped name it has the nearest known one.
+    For a mistyped name, the warning also gives the nearest known name.
     """
     path = tmp_path / "robot.yaml"
     path.write_text("axis_sings: [1, -1, -1]\nmax_linear_speed: 0.2\n7: 1\n")

@@ -93,9 +93,9 @@ join = threading.Thread.join
 threading.Thread.join = lambda thread, timeout=None: join(thread, timeout and 100 * timeout)
 atexit.register(lambda: print("left running:", sum(bool(e._sigint_gc) for e in executors)))
 """
-"""Code that makes the driver print how many executors still run at its exit.
+"""Code that makes the driver print, at its exit, how many executors still run.
 
-The driver also waits longer for its threads.
+The code also makes the driver wait longer for its threads.
 """
 
 

@@ -56,7 +56,7 @@ class Toy:
     def comes_to_a_stand(self) -> None:
         """Wait until the robot has been at rest for 0.8 s.
 
-        The rests between two moves of a drive are shorter.
+        During a drive, the robot also rests between two moves, but for a shorter time.
         """
         ways: deque[float] = deque(maxlen=80)
 

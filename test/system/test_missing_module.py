@@ -32,7 +32,7 @@ def test_it_says_what_is_missing_and_what_to_do(library: str) -> None:
 
 
 def started_with(**environment: str) -> subprocess.CompletedProcess[str]:
-    """Run a driver that cannot start with these environment variables."""
+    """Run a driver that these environment variables keep from starting. Return its result."""
     return subprocess.run(
         [sys.executable, "-m", "omnibot_driver.driver", "--ros-args", "-p", "port:=sim://"],
         env={**os.environ, **environment},

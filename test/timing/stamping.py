@@ -1,8 +1,8 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stamps that the driver computes for a generated line, compared with the true sampling times.
+"""Stamps that the driver computes for a generated stream, compared with the true sampling times.
 
-``test/integrity`` generates the line. The board's clock is fast or slow.
+``test/integrity`` generates the stream. The board's clock is fast or slow.
 """
 
 import math
@@ -35,7 +35,7 @@ EVENTS_S = {"none": 0.0, "the board restarts": 0.0, "stall of 0.3 s": 0.3, "stal
 """For each event in the middle of a stream, the time in s for which the host then reads nothing."""
 RESTART = "the board restarts"
 stream_of = lru_cache(maxsize=4)(generate)
-"""The cached generator of streams. All lines carry the same streams and must not change them."""
+"""The generator of streams, cached. All lines get the same stream object and must not change it."""
 BOOT_S = 0.7123
 
 
@@ -114,7 +114,7 @@ class Stamped:
 
 
 def spread(errors: list[float], part: float = 0.99) -> float:
-    """Return half the width of the narrowest interval with the share ``part`` of the errors."""
+    """Return half the width of the narrowest interval that contains ``part`` of the errors."""
     ordered = sorted(errors)
     ends = zip(ordered, ordered[math.ceil(part * len(ordered)) - 1 :], strict=False)
     return min(high - low for low, high in ends) / 2
@@ -184,7 +184,7 @@ def stamp(
 
 
 def _one_after_the_other(before: Truth, after: Truth, begins_s: float) -> Truth:
-    """Return one stream: ``before``, the text of a board that has just booted, and ``after``."""
+    """Return one stream of three parts: ``before``, the boot text of a board, and ``after``."""
     text = b"Paused: 0 \n"
     at = len(before.data) + len(text)
     boots_s = before.times_s[-1] + 0.5

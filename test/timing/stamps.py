@@ -49,8 +49,8 @@ def one(seconds: float, job: tuple[Cell, int]) -> tuple[Cell, Figures]:
 def table(head: str, rows: dict[str, list[Figures]]) -> list[str]:
     """Return the lines of a Markdown table with one row for each case.
 
-    Each row has the worst and the median result of its streams, and how many of them keep both
-    limits.
+    Each row has the worst and the median result of its streams, and the number of streams that keep
+    both limits (``LIMITS_S``).
     ``head``: headings of the case's columns. ``rows``: results of the streams, by case.
     """
     lines = [

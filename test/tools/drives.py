@@ -103,7 +103,7 @@ class Drive:
             self.statuses.append((at_s, "omnibot_driver: Stream", 0, "complete", lost))
 
     def told(self, times_s: Array) -> Array:
-        """Return the commanded vx, vy (m/s) and yaw rate (rad/s) at these times, (n, 3)."""
+        """Return the commanded vx, vy (m/s) and yaw rate (rad/s), with one row for each time."""
         on = (times_s >= REST_S) & (times_s < self.seconds - REST_S)
         wave = np.sin(2 * np.pi * (times_s - REST_S) / 6.0)
         return np.column_stack([0.25 + 0.0 * wave, 0.1 * wave, 0.4 + 0.0 * wave]) * on[:, None]
@@ -190,7 +190,7 @@ class Drive:
 
 
 def spans(changes: list[tuple[float, str]], end_s: float) -> tuple[Span, ...]:
-    """Return the spans between these changes. The last span ends at ``end_s``."""
+    """Return a span from each change to the next one. The last span ends at ``end_s``."""
     times_s = [at_s for at_s, _ in changes] + [end_s]
     return tuple(
         Span(at_s, until_s, what)

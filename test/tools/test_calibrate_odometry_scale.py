@@ -135,9 +135,9 @@ def test_the_way_for_a_count_is_found_by_tape_and_the_units_with_it() -> None:
 def test_the_balance_of_the_motors_that_the_driver_has_measured_is_written(
     shown: str, found: dict[str, float]
 ) -> None:
-    """The tool writes the motors' balance to the file after the driver has measured it.
+    """If the driver has measured the balance of the motors, the tool writes it to the file.
 
-    Before the robot has driven forward, the balance is unknown.
+    The balance is unknown until the robot has driven forward.
     """
     robot = Encoder(motor_balance=1.0)
     robot.diagnosed = {"Motor balance": shown}.__getitem__

@@ -47,7 +47,7 @@ def once(action: Callable[[], object]) -> Callable[[float], None]:
 
 
 def repeated(action: Callable[[], object]) -> Callable[[float], None]:
-    """Return a callback that calls ``action`` at each call from ``AFTER_S`` seconds on."""
+    """Return a callback that calls ``action`` every time, once ``AFTER_S`` seconds have passed."""
     return lambda seconds: action() if seconds > AFTER_S else None
 
 

@@ -89,7 +89,7 @@ def test_what_is_commanded_is_a_whole_count_of_the_board(
 def test_a_speed_that_the_driver_forgot_is_not_measured() -> None:
     """The commands pause while one speed is measured, so the driver may have stopped the robot.
 
-    The tool does not use this speed.
+    The tool does not use the measurement of this speed.
     """
     log = drive((70.0, 70.0, 500.0))
     held = len(speeds(log, ASSUMED, UP, NO_BIAS))

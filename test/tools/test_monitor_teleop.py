@@ -131,9 +131,9 @@ def test_a_key_means_its_direction(key: str, signs: tuple[int, int, int]) -> Non
 
 @given(st.lists(st.sampled_from([1, -1]), max_size=50), keys)
 def test_speeds_stay_within_the_drivers_limits(steps: list[int], key: str) -> None:
-    """The user changes the speed.
+    """The user changes the speeds.
 
-    It stays between a tenth of the driver's limits and the limits.
+    Each speed stays between 10 % and 100 % of the driver's limit for it.
     """
     dead_man = DeadMan()
     dead_man.fastest = (0.4, 1.5)

@@ -142,7 +142,7 @@ def test_a_stream_that_ends_before_the_others_has_a_gap(drive: Drive) -> None:
 
 
 def test_a_wrong_rate_is_reported_as_that_and_not_as_a_gap(drive: Drive) -> None:
-    """Every second reading of a log is missing. The report calls the rate wrong.
+    """Half of the IMU readings are missing: every other one. The report calls the rate wrong.
 
     It does not report gaps.
     """

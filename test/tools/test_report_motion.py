@@ -34,7 +34,7 @@ def test_a_wrong_gravity_is_told_with_the_range_that_explains_it(
 ) -> None:
     """The measured gravity is too small. The report calls this BAD.
 
-    If it is half or a quarter of the true one, the advice gives a factor for ``accel_range``.
+    If it is a half or a quarter of true gravity, the advice gives a factor for ``accel_range``.
     """
     drive.imu.values[:, 3:] *= factor
     gravity = said(drive, "IMU", "Gravity")
@@ -148,9 +148,9 @@ def test_a_sensor_of_a_fejemis_that_hangs_upside_down_is_noted(drive: Drive) -> 
 
 
 def test_the_advice_for_a_fejemis_names_only_its_parameters(drive: Drive) -> None:
-    """A Fejemis has wrong turns, gravity and directions. All advice names parameters of a Fejemis.
+    """Turns, gravity and directions of a Fejemis are wrong. The advice is for its parameters.
 
-    ``imu_rpy`` is an argument of the robot's description.
+    One other name is allowed: ``imu_rpy``, an argument of the robot's description.
     """
     drive.imu.values[:, 2] *= 1.2
     drive.imu.values[:, 3:] /= 9.80665
@@ -242,7 +242,7 @@ def test_motion_under_a_latched_estop_is_wrong(drive: Drive) -> None:
 
 
 def test_motion_under_a_latched_estop_is_found_without_any_command(drive: Drive) -> None:
-    """The log has no commands, for example because the robot drove to goals."""
+    """Motion while the e-stop is latched is BAD, even if the log has no velocity commands."""
     drive.estops += [(10.0, True)]
     drive.cmd_vel.drop(-np.inf, np.inf)
     assert said(drive, "E-stop", "moved while").level is Level.BAD
@@ -263,7 +263,7 @@ def test_a_leap_of_the_odometry_is_wrong(drive: Drive) -> None:
 def test_a_reset_of_the_odometry_is_noted_and_is_not_a_way(drive: Drive) -> None:
     """The pose begins again at zero.
 
-    The report notes this, and the jump is not a driven distance.
+    The report notes this, and does not add the jump to the driven distance.
     """
     way = said(drive, "Odometry", "drove").text.split(" in all")[0]
     drive.odom.values[450:, :3] = 0.0

@@ -2,8 +2,8 @@
 
 """A toy board: two serial lines of text, two wheels, and no IMU.
 
-The line ``drive`` receives ``v LEFT RIGHT``, in mm/s. The line ``sense`` sends ``d WAY TURN``, in
-mm and mrad, every 0.4 s.
+The line ``drive`` receives ``v LEFT RIGHT``, in mm/s. Every 0.4 s, the line ``sense`` sends
+``d WAY TURN``: the motion since the previous message, in mm and mrad.
 """
 
 import re

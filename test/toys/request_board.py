@@ -2,9 +2,9 @@
 
 """A toy board: requests over UDP, and one blocking move at a time.
 
-``WHERE``: the reply ``at WAY TURN`` is the motion since the last reply, in mm and mrad.
+``WHERE``: the reply ``at WAY TURN`` is the motion since the previous such reply, in mm and mrad.
 
-``MOVE V W``: move for 0.2 s, in mm/s and mrad/s, then reply ``ok``.
+``MOVE V W``: move at V mm/s and W mrad/s for 0.2 s, then reply ``ok``.
 
 ``HALT``, on the next higher port: end a move at once.
 """

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of what the driver refuses at its start, because no later attempt could open the port."""
+"""Tests of the check of a port's address, which refuses what no later attempt could open."""
 
 import os
 from pathlib import Path

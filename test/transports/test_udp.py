@@ -165,7 +165,7 @@ def test_a_host_that_may_appear_later_is_not_refused(host: str) -> None:
 
 @pytest.mark.skipif(not Path("/proc/net/if_inet6").exists(), reason="the kernel has no IPv6")
 def test_the_address_of_a_lost_host_is_written_as_in_a_url() -> None:
-    """The host of a URL with an IPv6 address is lost, on the second channel.
+    """A URL has an IPv6 address, and a write to its second channel fails, so the host is lost.
 
     The error has the address in brackets, and the port of the second channel.
     """

@@ -52,7 +52,7 @@ class SpeedLimits:
         return BodyTwist(vx, vy, yaw_rate)
 
     def approach(self, now: BodyTwist, wanted: BodyTwist, duration_s: float) -> BodyTwist:
-        """Return the twist that a robot with the twist ``now`` reaches in ``duration_s``.
+        """Return the twist that a ramp from ``now`` to ``wanted`` reaches in ``duration_s``.
 
         The accelerations are limited. The linear velocity changes along a straight line. The yaw
         rate changes independently of it.

@@ -19,7 +19,10 @@ class Until(Enum):
     """The condition that ends the refusal of motion commands."""
 
     NOTHING = "Motion is allowed"
-    RELEASE = "Motion is refused until you send a zero command, or no command for `cmd_vel_timeout`"
+    RELEASE = (
+        "Motion is refused until you send a zero command, or until no command arrives for"
+        " `cmd_vel_timeout`"
+    )
     START = "Motion is refused until ~/start is called, because this is the second stop within 60 s"
     ESTOP = (
         "Motion is refused until the e-stop is latched and released, because this is the second"
@@ -54,8 +57,8 @@ class MotionInterlock:
     def release(self) -> None:
         """Record that the e-stop was released.
 
-        On a board without ~/start, this ends a refusal whose cause was a second stop within 60 s. A
-        refusal whose cause was a first stop stays, and so does one that only ~/start can end.
+        On a board without ~/start, this ends the refusal of motion after a second stop within 60 s.
+        It does not end a refusal after a first stop, or a refusal that only ~/start can end.
         """
         if self.until is Until.ESTOP:
             self.start()

@@ -153,7 +153,7 @@ class CommandPipeline:
         return motion, expires_at
 
     def wheels(self, rates_radps: Sequence[float], now: float) -> Command:
-        """Return the command for wheel rates in rad/s, in the board's order of wheels."""
+        """Return the command for wheel rates in rad/s, in the sequence of ``Traits.wheels``."""
         return self.shaper.wheels(rates_radps), now + self.policy.settings.timeout_s
 
     def pose(self, goal: Pose) -> Command:
@@ -180,7 +180,7 @@ class CommandPipeline:
     def count_refused(self, count: int, now: float) -> list[str]:
         """Check the number of rejected displacements since the driver began; return notices.
 
-        Several new ones in a row show that the robot does not move as commanded.
+        Several rejected displacements in a row show that the robot does not move as commanded.
         """
         if not (self.monitored and self._obeys):
             self._monitor.disregard_refused(count)

@@ -17,8 +17,8 @@ from omnibot_driver.core.commands.stop_proof import StopProof
 from omnibot_driver.core.packets import Packets
 
 STOPPING_S: Final = 1.05
-"""Shortest time for which Stop is repeated, in s. It is the sum of 1 s, from the first Stop to the
-last, and the longest time between two Stops."""
+"""Shortest time for which Stop is repeated, in s: 1 s from the first Stop to the last, plus the
+longest time between two Stops."""
 UNPROVED_S: Final = 5.0
 """Longest time, in s, for which Stop is repeated without proof that the robot stands still."""
 ROUNDING_S: Final = 1e-6
@@ -61,7 +61,7 @@ class CommandPolicy:
         self.quiet = False
         """Whether the policy sends nothing while it waits for the proof of the last Stop."""
         self.unconfirmed = False
-        """Whether Stop was repeated for the longest time without proof that the robot stopped."""
+        """Whether the repetition of Stop has ended without proof that the robot stands still."""
         self._expires_at = -math.inf
         self._stopping_since: float | None = None
 
@@ -99,8 +99,8 @@ class CommandPolicy:
     def halt(self, now: float) -> None:
         """Drop the current command, and repeat Stop until a standstill is proved.
 
-        Stop is repeated for at least ``STOPPING_S``, and without proof for ``unproved_s``. With a
-        latched e-stop, the emergency stop is repeated.
+        Stop is repeated for at least ``STOPPING_S``. Without proof, the repetition ends after
+        ``unproved_s``. With a latched e-stop, the emergency stop is repeated until ``release``.
         """
         self.current = None
         self.quiet = False

@@ -74,7 +74,7 @@ class CommandShaper:
         )
 
     def wheels(self, rates_radps: Sequence[float]) -> Setpoint:
-        """Return the set-point for wheel rates in rad/s, in the board's order of wheels."""
+        """Return the set-point for wheel rates in rad/s, in the sequence of ``Traits.wheels``."""
         if self._control == "position":
             raise self._at_odds(Authority.WHEELS)
         wheels = self._board.traits.wheels

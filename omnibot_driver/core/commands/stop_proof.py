@@ -42,8 +42,8 @@ arrived."""
 class StopProof:
     """The proof that the robot stands still.
 
-    * ``proved``: whether the robot has stood for ``still_s`` since Stop, or the board has paused,
-      and no motion was sent since then.
+    * ``proved``: whether a standstill is proved. The proof: since Stop, the robot has stood still
+      for ``still_s``, or the board has paused. A command to move or a measured motion ends it.
     * ``owed``: whether a motion was sent, and no standstill was proved since then.
     * ``measured``: whether a measured displacement has arrived since Stop.
     """

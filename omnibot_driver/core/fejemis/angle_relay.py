@@ -1,8 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Writes the front wheel's angle as a line for the drive board, so that damage is detected.
+"""Writes the line with the front wheel's angle so that the drive board can detect damage to it.
 
-A board must never read more than 90°: it would drive its inner wheel faster than the outer one.
+The board must never read an angle above 90°. At such an angle, it would drive its inner wheel
+faster than the outer one.
 """
 
 import math

@@ -41,8 +41,8 @@ class FejemisDecoder:
 
     ``changed``: whether ``sums`` has changed. The caller resets this flag.
 
-    ``doubtful``: whether the last line contradicts ``sums``, as learnt from the heartbeats. While
-    it does, the driver's lines to the board carry no checksum.
+    ``doubtful``: whether ``sums`` was learnt from heartbeats, and the last line other than a
+    heartbeat contradicts it. Meanwhile, the driver's lines to the board carry no checksum.
 
     ``contradicted``: whether the last line contradicts ``line_sums``, the user's setting.
     """

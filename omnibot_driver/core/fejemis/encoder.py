@@ -2,7 +2,7 @@
 
 """Converts an order into motion lines for both boards, depending on the front wheel's angle.
 
-After sending the packets, the caller passes them to ``Encoder.meaning``.
+The caller sends the packets with these lines, and then passes the packets to ``Encoder.meaning``.
 
 The module knows geometry and lines; it does not know when lines are sent.
 """
@@ -110,8 +110,8 @@ class Encoder:
     def meaning(self, packets: Packets) -> BodyTwist:
         """Return the body twist that ``packets`` command at the front angle used by ``encode``.
 
-        The caller passes packets that were sent. Packets other than the last result of ``encode``,
-        or passed a second time, are regarded as a stop.
+        The caller passes packets that were sent. If they are not the last result of ``encode``, or
+        are passed a second time, they are regarded as a stop.
         """
         encoded, self._encoded = self._encoded, None
         if encoded is None or encoded[0] != packets:

@@ -12,9 +12,9 @@ from typing import Final
 IN_A_ROW: Final = 3
 VARIES: Final = 8
 VARIES_WITHOUT_SUM: Final = 18
-"""``VARIES``, ``VARIES_WITHOUT_SUM``: if this number of 24 lines of one kind have another form than
-the learnt one, this kind of line is no longer checked. The first number is for lines with a correct
-checksum, the second for lines without one.
+"""``VARIES``, ``VARIES_WITHOUT_SUM``: numbers of lines. If, among 24 lines of one kind, this number
+do not have the learnt form, lines of this kind are no longer checked. The first number is for lines
+with a correct checksum, the second for lines without one.
 """
 OF: Final = 24
 

@@ -20,13 +20,14 @@ from omnibot_driver.core.readings import ImuReading, Vector3
 STANDARD_GRAVITY: Final = 9.80665
 LATE: Final = 0.98
 REGULAR: Final = 0.6
-"""Interval between two arrivals, in periods, that shows why two successive samples are both late.
+"""Limit of the time between the arrivals of two successive samples, in periods.
 
-If both are late by about a period or more, and arrive farther apart than this, a sample before them
-was lost. If they arrive closer together, no sample was lost: both have waited for a stalled host.
+It matters if both samples are late by about a period or more. If they arrive farther apart than
+this, a sample before them was lost. If they arrive closer together, no sample was lost: both have
+waited for a stalled host.
 """
 CYCLE_S: Final = 0.0015
-"""Longest assumed time in s in which the board sends all lines of one control cycle."""
+"""Longest time in s that the board is assumed to need to send all lines of one control cycle."""
 PHASE_BLOCKS: Final = 3
 BLOCK: Final = 100
 
@@ -102,7 +103,7 @@ class ImuSamples:
         """Set the phase of the sampling times, after a sample that arrived ``delay_s`` late.
 
         The phase is as late as possible, but no recent sample may arrive before its sampling time.
-        Recent are the last three blocks of 100 samples, and the samples since then.
+        The recent samples are the last three blocks of 100 samples, and all samples since then.
         """
         assert self._phase_s is not None
         self._block_s = min(self._block_s, delay_s + self._phase_s)

@@ -37,9 +37,10 @@ WARY_S: Final = 1.0
 stall, the kernel's buffer may have overflowed. Lines were then lost without a silence."""
 KNOWN_S: Final = 0.025
 SUREST_S: Final = 0.05
-"""``KNOWN_S``: difference in s that shows which line of a sample comes first. It is the sum of the
-pauses before gyro lines, minus the sum of the pauses before acceleration lines. The longer pauses
-are between two samples. ``SUREST_S``: largest difference that is stored."""
+"""Limits in s for a difference: the sum of the pauses before gyro lines, minus the sum of the
+pauses before acceleration lines. The longer pauses are between two samples. So the sign of the
+difference shows which line of a sample comes first, if its magnitude is at least ``KNOWN_S``.
+``SUREST_S``: largest magnitude that is stored."""
 MARKED_S: Final = PERIOD_S
 """Time in s that is added to a pause before a gyro or acceleration line, if a line of another kind
 arrives in this pause. Such a pause is probably between two samples."""

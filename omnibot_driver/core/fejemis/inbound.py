@@ -19,8 +19,8 @@ from omnibot_driver.core.fejemis.watch import Watch
 from omnibot_driver.core.readings import PausedReading
 
 AngleTold = Callable[[float, float], bool]
-"""A function that receives the front wheel's angle in rad and the time in s. It returns whether the
-wheel newly fails to follow its target."""
+"""A function that receives the front wheel's angle in rad and the time in s. It returns whether a
+new fault is found: the wheel does not follow its commanded angle."""
 
 
 class Inbound:

@@ -212,9 +212,8 @@ class Jobs:
             elif job is Job.POWER_OFF and late and role == "drive":
                 self._finish(
                     True,
-                    "the command to cut the power"
-                    f" {self._text[4:].decode('ascii')} s after the call was sent; the board does"
-                    " not confirm it",
+                    "power-off command sent: the board should cut the power"
+                    f" {self._text[4:].decode('ascii')} s after this call; it does not confirm it",
                 )
         elif job is Job.LOAD and now - self._begun_at > SAID * AGAIN_S:
             if _answers(role, message):
@@ -274,10 +273,11 @@ class Jobs:
 
 
 def _answers(role: Role, message: Message) -> bool:
-    """Return whether ``message`` answers the request that follows ``eer``.
+    """Return whether ``message`` answers the request that the driver sends after ``eer``.
 
-    An answer shows that the board receives lines. A front board that does not know the request
-    answers with a comment.
+    ``eer`` is the command to load the configuration. The board does not answer it, but an answer to
+    the request after it shows that the board receives lines. A front board that does not know the
+    request answers with a comment.
     """
     if role == "drive":
         return isinstance(message, WheelConfiguration)

@@ -28,7 +28,7 @@ ANGLE_COST: Final = 1e4
 comparison: a speed that is wrong by a factor of 2.7 (e) costs 1."""
 SLOWEST: Final = 30.0
 """The linear speed in the drive board's line is at least the outer wheel's speed divided by this
-number. Smaller linear speeds are not tried, except 0 for a drive that is not backward."""
+number, or it is 0. It is never 0 for backward motion, because its sign gives the direction."""
 SCALES: Final = 4.0
 """Largest factor by which a number in the front board's line may differ from the commanded number.
 """

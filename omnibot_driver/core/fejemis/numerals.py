@@ -48,7 +48,8 @@ def nearest(number: float, *, negative: bool, down: bool = False) -> tuple[float
 
     A safe number is one of ``numerals``: the checksum detects the loss of any two characters.
 
-    ``down``: whether the result must not exceed ``number``, unless all numbers do.
+    ``down``: whether the result must not exceed ``number``. If all safe numbers exceed it, the
+    smallest of them is returned.
     """
     numbers, texts = numerals(negative=negative)
     at = bisect_left(numbers, number)

@@ -34,8 +34,8 @@ STILL_MPS: Final = 0.01
 YAW_DIGIT_RAD: Final = 1e-4
 SETTLE_EVERY_S: Final = 0.2
 NEW_FRAME: Final = 4
-"""If this number of poses in a row are rejected, but each agrees with the rejected pose before it,
-the board has begun a new coordinate frame."""
+"""If this number of rejected poses in a row agree with the rejected pose before them, the board
+has begun a new coordinate frame."""
 
 
 class PoseOdometry:

@@ -26,8 +26,9 @@ turn on the spot may begin. Other motion has full speed up to the same deviation
 ``STILL_ALIGNED_RAD``: largest deviation at which a turn on the spot may continue.
 """
 GIVEN_RAD: Final = math.radians(5.0)
-"""Deviation of the front wheel from its target angle, in rad. At a larger deviation, the speed is
-limited: the error of the body's velocity must not exceed that at full speed and ``GIVEN_RAD``."""
+"""Deviation of the front wheel from its target angle, in rad. At full speed, this deviation causes
+the largest accepted error of the body's velocity. At a larger deviation, the speed is limited, so
+that the error does not become larger than this."""
 
 
 @value(frozen=True, slots=True)

@@ -173,8 +173,8 @@ class StampedReadings:
     def add(self, reading: Reading, stamp_s: float, now: float) -> None:
         """Add a reading with the timestamp ``stamp_s``.
 
-        A timestamp later than ``now`` is lowered to ``now``. One that is less than
-        ``SMALLEST_STEP_S`` after the last timestamp of the same kind of reading is raised.
+        If ``stamp_s`` is later than ``now``, ``now`` is used instead. The timestamp is then raised
+        if it is not at least ``SMALLEST_STEP_S`` after the last one of the same kind of reading.
         """
         kind = type(reading.content if isinstance(reading, ExtraReading) else reading)
         least_s = self._last.get(kind, -math.inf) + SMALLEST_STEP_S

@@ -121,8 +121,8 @@ class Watch:
     def _look_at_reads(self, now: float) -> None:
         """Check whether no line of either board was read for ``UNREAD_S``.
 
-        If so, missing data is not blamed on one board for the next ``OLDEST_S``. In this time,
-        lines that only waited to be read arrive.
+        If so, missing data is not blamed on one board for the next ``OLDEST_S``. By then, the
+        driver has read the lines that were only waiting to be read.
         """
         if now - self._heard_at > UNREAD_S:
             self._unread_until = now + OLDEST_S

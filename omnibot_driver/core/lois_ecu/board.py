@@ -253,7 +253,8 @@ class LoisEcuBoard(Board):
     def encode(self, order: Order) -> Packets:
         """Return the lines that command ``order``. Raises CommandRefused for a goal pose.
 
-        It is raised for any motion while a mode or its change forbids motion.
+        Also raises CommandRefused for any motion while a terminal mode, or a change of mode,
+        forbids motion.
         """
         match order:
             case Drive(twist):
@@ -322,8 +323,8 @@ class LoisEcuBoard(Board):
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record. A later reading contains the record, or the reason of a failure.
 
-        Raises RequestRefused if the board could not complete the record, and while a mode or its
-        change forbids it.
+        Raises RequestRefused if the board could not complete the record, and while a terminal mode,
+        or a change of mode, forbids records.
         """
         self._ecu.record(kind, samples)
 

@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.motion_filter import MotionFilter
 from omnibot_driver.core.lois_ecu.wheel_model import FIRMWARE_STEP_S
 
 LONE_TICKS: Final = 2
-"""Number of tick reports without odometry in the command byte of ticks. If odometry with its own
-command byte arrives after this number, the board works as in the manual."""
+"""Number of tick reports. If odometry with its own command byte arrives after at least this number,
+and no odometry had the command byte of ticks, the board works as in the manual."""
 UNCOUNTED_M: Final = 0.06
 """Sum of both wheels' distances in m. If the wheels roll backward this far and neither count falls,
 this board does not count ticks backward."""
@@ -27,8 +27,8 @@ this board does not count ticks backward."""
 class BoardKind:
     """Kind of the board. It selects how the motion filter ``motion`` models the board.
 
-    ``appends``: whether odometry follows the ticks with their command byte, as in the public
-    firmware.
+    ``appends``: whether an odometry report with the command byte of ticks follows each tick report,
+    as in the public firmware.
     """
 
     def __init__(self, motion: MotionFilter) -> None:
@@ -61,7 +61,7 @@ class BoardKind:
     def watch(self, told: Told | None) -> None:
         """Detect whether this board counts ticks only forward.
 
-        The board does so if its odometry shows a wheel that rolls backward, and no count decreases.
+        This is so if its odometry shows a wheel that rolls backward while no count decreases.
 
         ``told``: changes in the board's odometry since its last report, None if unknown.
         """

@@ -85,8 +85,8 @@ class BoardTime:
 
         The delay follows from the fitted clock, and is negative if the report seems early. It is
         irregular if a late read cannot explain it: if it is clearly negative, or much larger than
-        all recent delays. Return 0 and False while too few reports are stored. This report is not
-        stored.
+        all recent delays. Return 0 and False while too few reports are stored. This method does not
+        store the report.
         """
         if unit is None or self._before is None or len(self._kept[0]) < FEWEST:
             return 0.0, False

@@ -70,9 +70,9 @@ ticks, as a fraction of what the wheel rolls in the gap. First value: at a stead
 value: at an oscillating one."""
 CORRECTED_TICKS: Final = 2.0
 CORRECTED_PART: Final = 0.5
-"""``CORRECTED_PART``: standard deviation of the error of a correction by the board's odometry
-(0x20), as a fraction of the part of the correction that exceeds ``CORRECTED_TICKS``. A large
-correction is wrong, because the filter is linear and the start of a wheel is not."""
+"""A large correction by the board's odometry (0x20) has an error, because the filter is linear, but
+the motion of a starting wheel is not. ``CORRECTED_PART``: standard deviation of this error, as a
+fraction of the part of the correction that exceeds ``CORRECTED_TICKS``."""
 LATE_PART: Final = 0.6
 """A late report causes an error in a wheel's distance without counted ticks. This is the standard
 deviation of the error, as a fraction of the distance that the wheel rolls in the delay."""
@@ -108,7 +108,7 @@ class Comparison:
         """Return the difference between a wheel's reported and expected count, in ticks.
 
         Also return whether the difference is too large for an error of the filter. The difference
-        is 0 while the board does not count. The filter is not corrected.
+        is 0 while the board does not count. This method does not correct the filter.
 
         ``ticks``: reported ticks since the last report.
 

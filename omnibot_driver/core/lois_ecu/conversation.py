@@ -226,8 +226,8 @@ class LoisConversation:
         """Return the lines to write now: settings, modes, the request for a record, and RPM 0/0.
 
         Called at the time ``wake_at``. ``proved``: whether displacements have proved that the
-        robot stands still. A terminal mode begins after this proof, or after 2 s of Stop, because
-        no displacements arrive in a terminal mode.
+        robot stands still. A change of mode that needs a standstill waits for this proof, but at
+        most for 2 s of Stop: in a terminal mode, no displacements arrive that could prove it.
         """
         data = self._upkeep.due(now, stands=bool(self.stands(now)) and proved)
         self._decoder.terminal = self._upkeep.change.terminal
@@ -266,16 +266,16 @@ class LoisConversation:
     def velocity(self, twist: BodyTwist) -> bytes:
         """Return the lines that command a velocity, as RPM or duty (``drive_mode``).
 
-        Return Stop if the velocity rounds to zero. Raises CommandRefused while a mode or its change
-        forbids motion.
+        Return Stop if the velocity rounds to zero. Raises CommandRefused while a terminal mode, or
+        a change of mode, forbids motion.
         """
         return self.wheels(self._points.kinematics.wheel_rates(twist))
 
     def wheels(self, rates_radps: Sequence[float]) -> bytes:
         """Return the lines that command the rates of the left and right wheel, in rad/s.
 
-        Return Stop if both rates round to zero. Raises CommandRefused while a mode or its change
-        forbids motion.
+        Return Stop if both rates round to zero. Raises CommandRefused while a terminal mode, or a
+        change of mode, forbids motion.
         """
         if self._upkeep.change.reason and any(rates_radps):
             raise CommandRefused(f"motion command refused: {self._upkeep.change.reason}")
@@ -314,8 +314,8 @@ class LoisConversation:
     def record(self, kind: RecordKind, samples: int) -> None:
         """Request a record.
 
-        Raises RequestRefused if the board could not complete the record, and while a mode or its
-        change forbids it.
+        Raises RequestRefused if the board could not complete the record, and while a terminal mode,
+        or a change of mode, forbids records.
         """
         if self._upkeep.change.reason:
             raise RequestRefused(f"record refused: {self._upkeep.change.reason}")

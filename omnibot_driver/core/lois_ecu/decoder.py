@@ -41,8 +41,8 @@ class LoisDecoder:
 
     ``ticks_gate``: check of the tick reports.
 
-    ``terminal``: whether text that is not a line of the protocol is a sensor's line. Otherwise, it
-    counts as damage.
+    ``terminal``: whether text that is not a line of the protocol is regarded as a sensor's line. If
+    False, such text counts as damage.
 
     ``times``: for each report of the last call, the time in s at which its last line arrived.
     """

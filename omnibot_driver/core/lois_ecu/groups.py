@@ -33,12 +33,12 @@ from omnibot_driver.core.lois_ecu.record_lines import (
 )
 
 QUIET_S: Final = 0.05
-"""Silence in s after which a group is complete, if a report can have its number of lines. The board
-sends the lines of a group 1.2 ms apart."""
+"""Silence in s after which a group is regarded as complete, if there is a report with this number
+of lines. The board sends the lines of a group 1.2 ms apart."""
 LATE_S: Final = 0.15
 LATE_PART: Final = 0.75
-"""Longest pause within a group, as a fraction of the time between two marker lines: that of this
-group, and that of the previous group with the same command byte.
+"""Longest pause within a group, as a fraction of the time since the previous group with the same
+command byte. This time is measured from marker line to marker line.
 
 The longest pause is at least ``QUIET_S`` and at most ``LATE_S``.
 """

@@ -17,8 +17,8 @@ from omnibot_driver.core.lois_ecu.plausibility import ClockUnit, began_within, w
 from omnibot_driver.core.values import value
 
 LATE_S: Final = 0.4
-"""Shortest time in s without a report after which the times of several tick reports that arrive
-together are corrected. Shorter delays are left to ``BoardTime``."""
+"""Time in s. If no report arrives for this time, and then several tick reports arrive together,
+their times are corrected. Shorter delays are left to ``BoardTime``."""
 RATES_KEPT: Final = 15
 TOWARDS_ARRIVAL: Final = 1.01
 """Factor by which the times between reports are increased. The rate of the clock is not known
@@ -45,7 +45,7 @@ class LateReads:
         self.ticks_per_revolution = ticks_per_revolution
         self._last: Heard | None = None
         self._waited = False
-        """Whether the last tick report waited, so that the reports after it may have waited too."""
+        """Whether the last tick report waited. If so, the reports after it may have waited too."""
         self._unit: ClockUnit | None = None
         self._arrived_s = self._latest_s = -math.inf
         self._rates: deque[float] = deque(maxlen=RATES_KEPT)
@@ -57,9 +57,10 @@ class LateReads:
         """Return the times in s of reports that were read together.
 
         * ``arrived``: the time in s at which the last line of each report was read.
-        * ``unit``: the unit of the board's clock, None if unknown now. If a clock in ns is near
-          zero, it has wrapped, or the board has restarted. Only the arrival times can tell, so they
-          are returned.
+        * ``unit``: the unit of the board's clock, None if unknown now.
+
+        If a clock in ns is near zero, either it has wrapped or the board has restarted. The clock
+        does not show which of the two, so the arrival times are returned.
         """
         self._unit = unit or self._unit
         told = [(at, one) for at, one in enumerate(reports) if isinstance(one, Ticks)]

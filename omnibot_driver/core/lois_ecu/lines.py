@@ -2,8 +2,8 @@
 
 """One line of the protocol: a command byte and 32 bits of payload, as ASCII hex with a checksum.
 
-``:<command><payload><checksum>\\n`` has 14 characters, or 12 to a board without checksums. The
-board always sends checksums.
+``:<command><payload><checksum>\\n`` has 14 characters. If the board expects no checksums, lines
+to it have 12. Lines from the board always have a checksum.
 
 This module knows the layout only, not what a command means.
 """

@@ -31,8 +31,9 @@ START_STDDEV_TICKS: Final = 0.9
 ``START_TICKS``, ``START_STDDEV_TICKS``: mean and standard deviation of this part, in ticks."""
 FAST_TICKS_PER_S: Final = 50.0
 LOST_TICKS: Final = 3.0
-"""Variance, in squared ticks per s, of the motion that the board's odometry (0x20) misses above
-``FAST_TICKS_PER_S``.
+"""If a wheel is faster than ``FAST_TICKS_PER_S``, the board's odometry (0x20) misses some motion.
+
+``LOST_TICKS``: variance of the missed motion, in squared ticks per s.
 
 While the board sends, it notices ticks late. If the next tick comes soon after a late one, the
 board measures no speed.

@@ -94,9 +94,9 @@ class MotionFilter:
         self.tuned = self.signed = self.holds = False
         self.yaw0_rad = 0.0
         self.differing_mps = math.inf
-        """Smallest difference in m/s between the left and the right speed that the board should
-        report, since the last comparison of distances. If it is small, the board's position may
-        have missed motion."""
+        """Smallest difference, in m/s, that the filter expected between the left and the right
+        speed of the board since distances were last compared. While both speeds are equal, the
+        public firmware does not change its position."""
         self._kinds: tuple[str, str] | None = None
         self.history = FilterHistory(self.filter)
 

@@ -29,17 +29,17 @@ __all__ = ["FusedOdometry", "LoisOdometry", "Source"]
 
 UNHEARD_S: Final = 0.6
 UNHEARD_GROUPS: Final = 3
-"""The pose is predicted for this number of tick periods after the last report, or for ``UNHEARD_S``
-s if this is longer."""
+"""After the last report, the pose is predicted for this number of periods of the tick reports, or
+for ``UNHEARD_S`` s if this is longer."""
 LOST_REPORTS_S: Final = 1.2
-"""After a silence of less than this time in s, the reports are assumed to be lost, and the wheels
-to have followed their set-points, unless a set-point changed in the silence."""
+"""If a silence is shorter than this time in s, and no set-point changed in it, only the reports are
+assumed to be lost: the wheels have followed their set-points."""
 LEAST_UNFORESEEN_TURNS: Final = 1 / 30
 """Smallest difference between a reported and an expected count, in turns of the wheel, that can
 show a restart of the board."""
 NUDGED_TURNS: Final = 1 / 60
-"""Largest count, in turns of the wheel, that shows a restart of a board at rest. One tick more or
-less shows nothing, so one tick is allowed in any case."""
+"""Largest count, in turns of the wheel, with which a robot at rest can show a restart of the board.
+A larger count may come from a push. A count of one tick is always small enough."""
 FASTEST_MPS: Final = 5.0
 
 
@@ -57,8 +57,8 @@ class LoisOdometry:
         self._ticks: Ticks | None = None
         self._begun = False
         self._estimated = False
-        """Whether no time has passed since the last estimate. If so, a report may still show motion
-        from before the estimate, because it was read together with the ticks of the estimate."""
+        """Whether no time has passed since the last estimate. Until time passes, a report may still
+        show motion from before the estimate: both were read at the same time."""
         self._may_roll_mps = 0.0, 0.0
         """Greatest possible speed of each wheel since the last report, in m/s."""
         self._heard_at_s = self._lost_s = self._advanced_s = -math.inf
@@ -292,9 +292,10 @@ class LoisOdometry:
         self._motion.history.keep(now)
 
     def _was_silent(self, now: float) -> bool:
-        """Return whether a report at ``now`` ends a long silence, in which the motion is unknown.
+        """Return whether a report at ``now`` ends a silence in which the motion is unknown.
 
-        The motion is unknown if the board may not have received a new set-point.
+        The motion is known if the silence was shorter than ``LOST_REPORTS_S``, and no set-point
+        changed in it. Otherwise the board may not have received a new set-point.
         """
         heard_s = max(self._heard_at_s, self._lost_s)
         if not now > heard_s + self._unheard_s > -math.inf:
@@ -304,7 +305,7 @@ class LoisOdometry:
         return not lost
 
     def _after_silence(self, now: float) -> None:
-        """Add the errors of a long silence.
+        """Add the errors of a silence in which the motion is unknown.
 
         If a Stop was lost in the silence, the wheels rolled on.
         """

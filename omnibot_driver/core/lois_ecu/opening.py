@@ -39,9 +39,9 @@ AFTER_MOTION_S: Final = 0.015
 """Shortest time in s from a motion command to a command that is not a setting, for example for the
 LED. It is shorter than the time between two set-points."""
 AWAY_S: Final = (0.05, 0.09, 0.13, 0.17)
-"""Delays in s, used in turn, from a tick report to the next round of settings or request for a
-date. The board cannot receive while it sends. With a constant delay, it might be sending each
-time."""
+"""Delays in s from a tick report to the next round of settings, or to a request for a date. They
+are used in turn. The board cannot receive while it sends, and with a constant delay, it might be
+sending each time."""
 CONFIRMED_WITHIN: Final = 0.35
 """Largest deviation of the ticks' period that confirms the settings, as a fraction of the requested
 period."""
@@ -189,7 +189,7 @@ class SettingsWriter:
             self._queue.append((now + index * LINE_S, command))
 
     def _turned(self, rounds: int) -> list[Command]:
-        """Return the commands of a round. Each round begins with another command.
+        """Return the commands of a round. Each round begins with a different command.
 
         A board that sends a report once a round could otherwise miss the same line in each round.
         """

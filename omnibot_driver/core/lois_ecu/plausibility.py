@@ -39,8 +39,9 @@ the errors of the arrival times are too large."""
 ROLLED_OUT_TURNS: Final = 0.15
 ROLLED_OUT_TICKS: Final = 1
 STARTING_TURNS_PER_S: Final = 1 / 3
-"""``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * duration``, and ``ROLLED_OUT_TICKS`` more: largest
-count after a restart of the board. A wheel may roll out and start again in this time."""
+"""Largest count that a wheel can reach in ``age`` s after a restart of the board, if it rolls out
+and starts again: ``ROLLED_OUT_TURNS + STARTING_TURNS_PER_S * age`` turns, and
+``ROLLED_OUT_TICKS`` ticks more."""
 
 ClockUnit = Literal["ms", "ns"]
 
@@ -66,8 +67,8 @@ def began_within(duration_s: float, ticks: Ticks, ticks_per_revolution: int) -> 
 class Gate(Generic[Group]):
     """Check of each report against the last accepted report of the same kind.
 
-    ``reachable(before, after, duration_s)``: whether ``after`` can follow ``before`` after this
-    time in s.
+    ``reachable(before, after, duration_s)``: whether the report ``after`` can come ``duration_s``
+    later than the report ``before``.
     """
 
     def __init__(self, reachable: Callable[[Group, Group, float], bool]) -> None:

@@ -53,9 +53,9 @@ values were counted on the public firmware:
 ``NEAR``: after a smaller fall.
 
 ``FELL_IN_GAPS``: after a smaller fall, or a fall from a speed that was reported only once, while
-reports are lost. The rest of the fall may be in a gap.
+reports are lost. The true fall may be larger than the reported one.
 
-``GAPS``: without a fall, while reports are lost. The whole fall may be in a gap.
+``GAPS``: without a reported fall, while reports are lost. The speed may have fallen in a gap.
 
 ``FASTER``: after a fall by at least ``FELL_FAR_RPM`` to ``FASTEST_RPM`` or more. These values were
 not counted, but assumed. Such a speed is wrong if the board noticed the second-to-last tick late.
@@ -94,7 +94,7 @@ class RestingWheel:
         return self._clock_s < self._fell_at_s + SWINGS_S
 
     def note(self, rpm: float, since_s: float) -> None:
-        """Remember an estimated speed, because the board reported none for ``since_s`` s."""
+        """Remember an estimated speed, after ``since_s`` s without a reported speed."""
         self._pass(HIDDEN_PART * since_s)
         self._lately.append((self._clock_s, rpm))
 

@@ -27,8 +27,8 @@ class SetPoints:
 
     ``saturated``: number of commands that were slowed, because a value was above its limit.
 
-    ``stopped_at_s``: time since which only zeros were sent, or infinity. ``clears`` moves it later,
-    to plan the next RPM 0/0.
+    ``stopped_at_s``: time since which only zeros were sent, or infinity. Each time RPM 0/0 is due,
+    ``clears`` replaces this time by a later one, from which the next RPM 0/0 is planned.
 
     ``stood``: whether the robot was seen at rest since ``stopped_at_s``.
 
@@ -75,7 +75,7 @@ class SetPoints:
     # RPM 0/0, which makes the firmware forget the speed of a wheel at rest
 
     def clear_again(self) -> None:
-        """Make ``wheels`` put RPM 0/0 before the next set-points, as it does after a Stop."""
+        """Make ``wheels`` return RPM 0/0 before the next set-points, as after a Stop."""
         self._clears_left = outbound.CLEARED_TIMES
 
     @property

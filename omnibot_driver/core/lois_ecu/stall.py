@@ -22,8 +22,8 @@ STALLED_S: Final = 2.0
 firmware's gains, a wheel starts in half of this time."""
 LEAST_RPM: Final = 2
 LEAST_TICKS: Final = 2
-"""Smallest number of ticks in ``STALLED_S`` at the set-point of a wheel that is watched. With fewer
-ticks, a wheel that rolls may show no motion."""
+"""A wheel is watched only if its set-point gives at least this number of ticks in ``STALLED_S``.
+With fewer ticks, a wheel that rolls may show no motion."""
 SAME_MPS: Final = 1e-3
 TOO_FAST: Final = 1.2
 TOO_FAST_RPM: Final = 3
@@ -45,8 +45,8 @@ class StallWatch:
 
     ``settings`` may be replaced at any time.
 
-    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. The reason
-    is that its speed is too high for a wheel that has stopped.
+    ``may_roll``: for each wheel, whether it may roll although it is reported as stalled. This is so
+    if the repeated speed is higher than the last speed that is usual before a wheel stops.
     """
 
     def __init__(self, settings: LoisEcuSettings) -> None:

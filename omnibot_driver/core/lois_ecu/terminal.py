@@ -82,7 +82,7 @@ class ModeChange:
                 " set terminal_mode to host"
             )
         if self._told is not None and not self.sensor_wanted:
-            return "the board has not left its terminal mode yet; wait until its data arrives"
+            return "the board has not left its terminal mode yet; wait until its reports arrive"
         what_to_do = "set terminal_mode to host" if self.sensor_wanted else "wait"
         if self._stopping:
             changes = (f"{name} is changing to {value}" for name, value in self._stopping.items())

@@ -50,9 +50,9 @@ show a restart, even if the wheels may have rolled back to these counts."""
 NS_WRAPS_S: Final = 2**32 * UNIT_S["ns"]
 """Time in s after which a clock in ns starts from zero again."""
 CONTRADICTED_S: Final = 1.0
-"""Longest time in s for which wheels are assumed to have rolled back since the last tick report, if
-the unit of the board's clock was known, but is not known any more. Without the unit, the clock
-cannot confirm how long ago that report came."""
+"""If the unit of the board's clock has become unknown, wheels are assumed to have rolled back for
+at most this time in s since the last tick report. Without the unit, the clock cannot confirm how
+long ago that report came."""
 
 
 class Translation:
@@ -202,7 +202,7 @@ class Translation:
         return None if wrapped_too else age_s
 
     def _restart_is_shown(self, ticks: Ticks, duration_s: float, now: float) -> bool:
-        """Return whether ``ticks`` show a restart. Their counts and clock may have begun at zero.
+        """Return whether ``ticks``, whose counts and clock may have begun at zero, show a restart.
 
         A clock in ns begins at zero every 4.3 s, so a small clock value alone proves nothing. The
         board has restarted if the clock does not fit the last reports, and rolling wheels do not

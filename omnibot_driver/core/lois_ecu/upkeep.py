@@ -40,8 +40,8 @@ class Upkeep:
     def configure(self, settings: LoisEcuSettings) -> None:
         """Use new settings. Changed settings are written to the board.
 
-        A change of the drive mode, of the duty scale in duty mode, or to a sensor's terminal mode
-        first stops the robot.
+        Three changes first stop the robot: of the drive mode, of the duty scale in duty mode, and
+        to a sensor's terminal mode.
         """
         before, self.writer.settings = self.writer.settings, settings
         if settings.drive_mode != before.drive_mode:

@@ -16,8 +16,10 @@ PER_WHEEL: Final = 5
 """Number of states of a wheel: distance in m, speed in m/s, acceleration in m/s², distance that the
 tick count shows in m, and last measured speed in m/s."""
 X, Y, TURN, ALONG, BIAS, EXCESS = 10, 11, 12, 13, 14, 16
-"""Indices of the body's states: position in m (``X``, ``Y``), and what the board's odometry (0x20)
-should show. ``TURN``: how much farther the right wheel rolled, in m. ``ALONG``: distance in m.
+"""Indices of the body's states. ``X``, ``Y``: position in m.
+
+``TURN``, ``ALONG``: what the board's odometry (0x20) should show, in m: how much farther the right
+wheel has rolled than the left one, and the distance.
 
 ``BIAS``: first of two states, the error of each wheel's speed.
 
@@ -30,8 +32,8 @@ CONTROL_RATE: Final = 2.0
 """Assumed rate in 1/s at which the controller reaches a target speed, critically damped."""
 # The user's gains and motors are unknown, so the assumed noise is large.
 PUSH_PER_SPEED: Final = 2.2
-"""Assumed standard deviation of a wheel's acceleration, in m/s² for each m/s by which its speed
-recently differed from its target."""
+"""Assumed standard deviation of a wheel's acceleration, as a multiple (in 1/s) of ``restless_mps``,
+the largest recent difference between the wheel's speed and its target."""
 SETTLING_S: Final = 1.5
 ROUGH: Final = 7e-4
 """Variance that uneven ground adds to a wheel's speed, in (m/s)² per s."""
@@ -69,7 +71,7 @@ class Step:
 
     ``rows``: changed rows of the transition matrix, by state.
 
-    ``noises``: errors to add, each as the states that it changes, with factors, and its variance.
+    ``noises``: errors to add. For each: the states that it changes, with factors, and its variance.
     """
 
     dt: float

@@ -82,7 +82,7 @@ class Asking(Stops):
             self._lose(now, "the robot is at rest, but the server still reports a motion")
 
     def _sweep(self, now: float) -> None:
-        """Begin to end any motion by the stop commands SRM and SM.
+        """Begin to stop any motion by the commands SRM and SM.
 
         The queries have shown that SRM and SM cannot hang the server now.
         """

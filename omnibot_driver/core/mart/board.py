@@ -87,8 +87,8 @@ class MartBoard(Board):
     def mode(self) -> Mode:
         """The mode of the board.
 
-        The mode becomes nominal when the server has answered the first stop, unless the server is
-        lost, or HELLO has shown that it is another kind of server.
+        The mode becomes nominal when the server has answered the first stop. There are two
+        exceptions: the server is lost, or HELLO has shown that it is another kind of server.
         """
         return self._mode
 

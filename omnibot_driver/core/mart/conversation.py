@@ -142,7 +142,7 @@ class Conversation:
         self._copies_until_s[form] = now + self.delay_s
 
     def answered(self, word: Word, reply: Ok, now: float) -> None:
-        """Record that ``reply``, which the caller has evaluated itself, answers ``word``.
+        """Record that ``reply``, which was not passed to ``hear``, answers ``word``.
 
         The driver can then recognise a later copy of this reply.
         """
@@ -153,7 +153,7 @@ class Conversation:
 
         After that, no other late reply of the same form is expected.
 
-        Ignored if ``reply`` is a copy.
+        Nothing changes if ``reply`` is a copy.
         """
         if not self._has_come(reply, now):
             self._owed_until_s.pop(reply.form, None)

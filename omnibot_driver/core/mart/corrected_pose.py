@@ -92,7 +92,7 @@ class CorrectedPose:
             self.doubt.add(0.0, END_RUN_RAD**2 + (RUN * amount) ** 2)
 
     def lose_turn(self) -> None:
-        """Add the error of a motion whose turn is unknown, because the server was restarted in it.
+        """Add the error of an unknown turn, because the server was restarted during a motion.
 
         The motors keep their last command, and the server's relative heading begins at zero.
         """

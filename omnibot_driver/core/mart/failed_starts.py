@@ -80,9 +80,9 @@ class FailedStarts(Adjusting):
     def _is_of_another(self, reply: Fail, now: float) -> bool:
         """Return whether the failure of RM (forward drive) may have its cause in an earlier motion.
 
-        This is assumed for each failure except an obstacle. RM may also report an obstacle that has
-        ended an earlier backward drive. The obstacle is regarded as RM's own if the front sonar
-        also detects it, or if RM reports an obstacle again.
+        This is assumed for each failure except an obstacle. The obstacle that RM reports may be in
+        front, or it may have ended an earlier backward drive. It is regarded as in front if the
+        front sonar detects an obstacle too, or if RM reports an obstacle again.
         """
         if reply.reason not in words.OBSTACLES or self.health.obstacle(Motion.REFERENCE, now):
             self._obstacle_told = False

@@ -23,7 +23,7 @@ NORMAL_UNITS: Final = 30
 ENOUGH_MOVES, ENOUGH_M = 4, 0.08
 """After ENOUGH_MOVES moves, the robot need only be within ENOUGH_M (m) of the goal.
 
-A smaller distance would require another turn and another straight move.
+To come nearer, the robot would have to make another turn and another straight move.
 """
 STRETCH: Final = 1.3
 """Ratio of driven to requested length of a straight move, until the first measurement.
@@ -134,8 +134,8 @@ class Move:
     def repeated(self) -> "Move":
         """Return the progress to continue with when ``place`` is commanded again.
 
-        A failed goal begins anew. At a goal that the robot has reached, it drives again only if it
-        is more than ENOUGH_M (m) away.
+        A failed goal begins anew. If the robot has reached the goal, it makes another straight move
+        only if it is now more than ENOUGH_M (m) away from the goal.
         """
         if not self.given_up:
             return self

@@ -42,8 +42,8 @@ from omnibot_driver.core.readings import ExtraReading, NoticeReading, OdometryRe
 STARTS_UP_S: Final = 1.5
 """Time in s from a server's first reply after an absence until the driver starts a motion.
 
-A server that is starting up crashes on VOLTS and on most motions. If the motion is RM (forward
-drive), the motors stay on.
+While a server starts up, VOLTS and most motion commands crash it. If the command is RM (forward
+drive), the motors stay on after the crash.
 """
 ABSENT_S, ABSENT_TRIPS = 0.5, 3
 """Silence after which the server is regarded as absent.
@@ -51,7 +51,7 @@ ABSENT_S, ABSENT_TRIPS = 0.5, 3
 The silence is ABSENT_S (s), plus ABSENT_TRIPS times the average duration of a query.
 """
 MOST_GREETINGS: Final = 10
-"""Largest number of HELLO queries whose answers the driver expects. Older ones count as lost."""
+"""The driver expects answers to at most this number of its last HELLO queries."""
 HEADING_S, HEADING_TRIPS = 1.0, 5
 NO_HEADING: Final = (
     "the server does not report the relative heading (RMRA) of the robot at rest, so the heading of"
@@ -68,7 +68,7 @@ ABSENT_BUSY_S: Final = 2.5
 A stop, for example, keeps the server busy.
 """
 RESTARTED_S: Final = 3.0
-"""Silence in s that shows a restart of a server whose stop port was hung."""
+"""After a longer silence in s, a server whose stop port was hung is regarded as restarted."""
 GREET_S: Final = 1.0
 """Time in s from the start of a controlled move to the first HELLO, and between two HELLOs.
 

@@ -224,8 +224,9 @@ class Health:
             )
         if self.outlived:
             return (
-                "the server was lost, and now answers again although it was not restarted; it"
-                " could fail to stop its next motion: restart the server, then the driver"
+                "the connection to the server was lost, and the server answers again without a"
+                " restart. It may not stop the robot after the next motion: restart the server,"
+                " then the driver"
             )
         if self._defective:
             return "this server answers 'fail' to RM although the robot moves: update the server"

@@ -21,7 +21,7 @@ from omnibot_driver.core.mart.words import Form, Kind, Word
 BLIND_PART: Final = 0.15
 """Largest relative change of the motors' units that may be unanswered while no turn is measured.
 
-After a larger unanswered change, the driver stops the robot, because it may turn unnoticed.
+After a larger unanswered change, the robot may turn unnoticed, so the driver stops it.
 """
 
 

@@ -76,9 +76,9 @@ class ImuProof:
         self.again_s = now + REPEAT_S
 
     def answered(self, word: Word, reply: Ok | Fail, took_s: float, now: float) -> bool:
-        """Evaluate the reply to a check; return False if the caller must evaluate a failure.
+        """Evaluate the reply to a check; return False for a failure that the caller must evaluate.
 
-        Failures that are evaluated here: a dead IMU, and a server without RST IMU.
+        This method evaluates only two failures: a dead IMU, and a server without RST IMU.
 
         ``took_s``: time from the check to the reply.
         """

@@ -66,7 +66,7 @@ WORD_OF: Final[dict[Job, Word]] = {
 WITHIN_S: Final[dict[Job, float]] = {Job.DOCK: 90.0}
 USUAL_S: Final = 20.0
 OWN: Final = frozenset({Job.TIME, Job.TURN_RECORD})
-"""Jobs that the driver begins by itself. Until it sends one, a job of the user can replace it."""
+"""Jobs that the driver begins by itself. A user's job can replace one that was not sent yet."""
 REPEATED: Final = frozenset({Job.BIAS, Job.LOG})
 """Jobs whose request may be sent again if the reply is missing."""
 
@@ -191,7 +191,7 @@ class Jobs:
     def missed(self, word: Word, now: float) -> None:
         """Repeat or end the job if the reply to its request did not come in time.
 
-        Ignored if ``word`` is not the command of the job.
+        Nothing changes if ``word`` is not the command of the job.
         """
         if not self._waiting or self._request is None or word is not self._request.word:
             return

@@ -138,7 +138,7 @@ class Measuring(Starts):
             self._switch_off.doubt()
             self._notice(
                 "robot moves, but the server knows of no motion; the driver switches the motors"
-                " off. If the server does not know MCS, the robot turns by 1 degree for this",
+                " off. On a server without the command MCS, it does so by a turn of 1 degree",
                 halt=True,
             )
             return

@@ -190,8 +190,8 @@ class Moves(Asking):
         """Return whether the stops after a controlled move may have stopped a second run of it.
 
         The result is False if the driver has sent no stop after the move. It is also False after a
-        complete move if there was no time for a second run: the server has answered the stop sooner
-        than it can end a motion, and a second run could not have ended by itself before.
+        complete move if there was certainly no second run. This is certain if the server answered
+        the stop sooner than it can end a motion, and too soon for a second run to end by itself.
         """
         quick = min(now, self._port_free_s) < self._first_copy_stop_s + LEAST_STOP_S
         no_time = quick and done.quiet_s < FULL * done.usual_s

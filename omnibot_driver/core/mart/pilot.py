@@ -124,7 +124,7 @@ class Pilot(Hearing):
         """Begin a new connection after a long silence, because the server may have been restarted.
 
         Nothing changes during a motion or a job. Nothing changes either if the server's stop port
-        may be hung, because a gap in the network does not repair it.
+        may be hung: if only the network failed, the port is still hung after the silence.
         """
         if self.state in (State.STILL, State.UNKNOWN) and not self.health.outlived:
             self.connect()

@@ -235,8 +235,8 @@ class Reckoning(CorrectedPose):
     def maybe(self) -> tuple[float, float]:
         """Distance of the right wheel in m, and turn in rad, that the pose may lack.
 
-        The counts may not show whether the last motion has begun. In that case, the values are
-        those of this motion. Otherwise both are zero.
+        If the counts do not show whether the last motion has begun, the values are those of this
+        motion. Otherwise both are zero.
         """
         wheel_m = self.wheel.maybe * self._settings.metres_per_count
         return wheel_m, self._rim_rad(wheel_m)
@@ -319,5 +319,5 @@ class Reckoning(CorrectedPose):
 
 
 def _turn_error_rad(seconds: float) -> float:
-    """Return the standard deviation of the turn in this time, if the turn rate was known before."""
+    """Return the standard deviation of a turn that is predicted for this time from a known rate."""
     return min(math.pi, ACCELERATION_RADPS2 * seconds * seconds / 2)

@@ -23,10 +23,10 @@ RM sets the heading to zero. If the first heading in RM is nearly the last one b
 a late reply.
 """
 MOST_RAD: Final = 1e7
-"""A heading of this size in rad or more is rejected, such as 1e15 degrees.
+"""A reported heading of this size in rad or more is rejected.
 
-The server reports such a heading after its clock was set back. It integrates the turn rate over
-unsigned milliseconds, and a negative time becomes huge.
+After its clock was set back, the server may report 1e15 degrees, for example. It integrates the
+turn rate over unsigned milliseconds, and a negative time becomes huge.
 """
 AHEAD_S: Final = 0.3
 """Longest time in s for which the heading is extrapolated, from its last report to a count."""

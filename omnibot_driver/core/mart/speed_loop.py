@@ -124,7 +124,7 @@ class SpeedLoop(Motors):
     def first_units(self, speed_mps: float, rate_radps: float) -> int:
         """Return the units with which RM (forward) starts both motors, at most 60.
 
-        They are those that the slower wheel needs, or more if an earlier start did not turn it.
+        The slower wheel needs these units. The result is more if an earlier start turned no motor.
         """
         right_mps, left_mps = self.sides(abs(speed_mps), rate_radps)
         slower_mps = max(SLOWEST_START_MPS, min(right_mps, left_mps))
@@ -136,7 +136,9 @@ class SpeedLoop(Motors):
         self._least_units = max(LEAST_UNITS, self._least_units - 1)
 
     def stood(self, units: int | None = None) -> None:
-        """Record that no motor turns with the present units, or with ``units`` on both sides.
+        """Record that neither motor turns.
+
+        ``units``: the units that both motors have; None for the present units of each motor.
 
         A motor with MOST_DEAD units or more is regarded as blocked: nothing is learned.
         """
@@ -232,8 +234,8 @@ class SpeedLoop(Motors):
     def _judge_missed(self, *, right_only: bool) -> None:
         """Undo those unanswered changes of the units that have not arrived at the server.
 
-        The driver assumes the set of missing changes with which the units fit the measured speeds
-        best.
+        Any of these changes may be missing at the server. The driver tries all combinations, and
+        assumes the one whose units fit the measured speeds best.
         """
 
         def lacks(arrived: tuple[bool, ...]) -> tuple[int, int]:

@@ -80,7 +80,7 @@ SETTING_REFUSED: Final = (
 class SpotTurns:
     """The turns on the spot, which the commands R (right) and L (left) start.
 
-    ``units``: motor units of the last turn, or of the next one as soon as they are requested.
+    ``units``: motor units of the last turn; after a request to set them (SSP), of the next turn.
 
     ``seen_radps``: measured rate of the last turn, in rad/s.
 

@@ -157,7 +157,7 @@ class Starts(FailedStarts):
         """Return the request that checks the IMU.
 
         Return no packets while the check is not due, or while a late reply to another request could
-        look like its reply.
+        be mistaken for the reply to the check.
         """
         word = self.imu.word
         if now < max(self.imu.again_s, self.conversation.certain_from_s(word)):

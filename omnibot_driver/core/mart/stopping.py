@@ -51,7 +51,8 @@ The server waits 0.6 s for a wheel to turn. After the turn, it waits 0.75 s for 
 def is_slow_stop(reply: Reply, motion: Motion, lasted_s: float) -> bool:
     """Return whether a motion failed only because the wheels turned for long after its end.
 
-    The motors are then off. The server gives the same text for a turn that did not begin.
+    The motors are then off. For a controlled turn, the text of the failure is the same as if the
+    turn had not begun, so the duration decides.
 
     ``lasted_s``: time from the start to the reply, without the transit times.
     """
@@ -66,7 +67,7 @@ class Stopping:
 
     ``began_s``: time of the first stop command.
 
-    ``owed``: number of missing replies to earlier requests that look like a reply to the stop.
+    ``owed``: number of earlier requests whose missing replies would look like a reply to the stop.
 
     ``move``: the controlled move to stop, or None. Its own reply ends the stop.
 
@@ -175,9 +176,9 @@ class Stopping:
     def doubtful_result(self) -> Ok | None:
         """The doubtful reply that is probably the reply to the stop, or None.
 
-        Each missing reply to an earlier request may explain one doubtful reply. If this explains
-        all doubtful replies, the result is None. Otherwise it is the last doubtful reply, if
-        possible one with a plausible value.
+        A doubtful reply may be the reply to an earlier request that still lacks one (``owed``). If
+        there are not more doubtful replies than such requests, the result is None. Otherwise it is
+        the last doubtful reply with a plausible value, or the last one if no value is plausible.
         """
         if len(self._doubtful) <= self._owed:
             return None

@@ -58,7 +58,8 @@ STUCK_S, COASTS_S = 0.5, 0.2
 
 ``STUCK_S``: before a stuck right wheel is noticed, if the server does not report the heading.
 
-``COASTS_S``: after a stop, if the right wheel stands already. The server then ends its measurement.
+``COASTS_S``: after a stop, if the right wheel stands already. The server then ends the measurement
+of the motion, although the left wheel still coasts.
 """
 LOST_REPEAT_S: Final = 1.0
 NAMES: Final = {
@@ -283,8 +284,8 @@ class Stops(Ground, ABC):
         """Record that the server answers a stop only after the driver has used the stop port.
 
         In this state, the server's stop port could hang the next forward drive (RM); see
-        docs/boards/mart.md. A number does not show this state: it answers an earlier query, or the
-        stop of a turn on the spot, which leaves the stop port free.
+        docs/boards/mart.md. A reply with a number does not show this state. It answers an earlier
+        query, or the stop of a turn on the spot, which leaves the stop port free.
         """
         if not isinstance(reply, Ok) or self.motion is Motion.SPIN:
             return

@@ -77,7 +77,7 @@ class SwitchOff:
     def answered(self, word: Word, reply: Ok | Fail) -> None:
         """Evaluate the reply to MCS or MSM.
 
-        A conflict shows that MCS is in progress, because an earlier MCS has arrived.
+        The failure CONFLICT shows that an earlier MCS has arrived and is in progress.
         """
         self.needed, self._misses = False, 0
         if isinstance(reply, Fail) and reply.reason != CONFLICT:

@@ -50,8 +50,8 @@ class WheelCount:
 
     ``certain``: whether the last reply is certainly the reply to ENC, the query of the count.
 
-    ``maybe``: the last count, if it differs by at most 1 from the count before the start command.
-    This command may then be lost. Otherwise 0.
+    ``maybe``: the last count, if it differs by at most 1 from the count before the start command,
+    so that this command may be lost; 0 in all other cases.
     """
 
     def __init__(self) -> None:
@@ -80,9 +80,10 @@ class WheelCount:
     def refused(self) -> bool:
         """Record that the server knows of no motion; return whether the server was restarted.
 
-        Ignored if the server has acknowledged the motion. If counts of the motion have come, the
-        motion has begun, so the server was restarted. These counts are in the pose already.
-        Otherwise the motion did not begin, and the count continues from its last value.
+        Nothing changes if the server has acknowledged the motion. Otherwise there are two cases. If
+        counts of the motion have come, it had begun, so the server was restarted. The pose already
+        includes these counts. Without such counts, the motion did not begin, and the count
+        continues from its last value.
         """
         if self._confirmed:
             return False

@@ -38,18 +38,18 @@ STILL: Final = 0.08
 """An implausible change of the IMU's readings was a spike only if at most this fraction of the
 change remains in the next reading.
 
-If each of the other values changes by at most this fraction of the largest change, only one value
-is regarded as changed.
+The fraction has a second use: only one of a reading's values is regarded as changed if each of the
+others changes by at most this fraction of the largest change.
 """
 END_OF_SCALE: Final = 0.99996
-"""Smallest fraction of the accelerometer's full scale that is regarded as the end of the scale. The
-largest positive reading of 16 bits is just above it."""
+"""A reading of at least this fraction of the accelerometer's full scale is regarded as at the end
+of the scale. The largest positive reading of 16 bits is just above this fraction."""
 MOST_HELD: Final = 10
 """Largest number of readings that are held: a displacement that changed implausibly much, and the
 poses after it."""
 ALIKE: Final = 2.0
-"""Largest ratio of two durations at which their displacements are compared, because the size of an
-implausible change depends on the duration."""
+"""Two displacements are compared only if their durations differ by at most this factor, because the
+size of an implausible change depends on the duration."""
 BACK: Final = 0.25
 """A displacement that changed implausibly much was a spike only if at most this fraction of the
 change remains in the next displacement."""

@@ -21,11 +21,11 @@ from omnibot_driver.core.readings import (
 class StreamStatistics:
     """Counts and sums since the driver began.
 
-    Of the counts, only ``last_gap``, ``same_force`` and ``same_rate`` can shrink.
+    All counts only grow, except ``last_gap``, ``same_force`` and ``same_rate``.
 
-    * ``imu_period_s``: period of the IMU in s. The duration of a displacement, divided by it, shows
-      how many IMU readings the board has sent. None if lost IMU readings are not counted in this
-      way.
+    * ``imu_period_s``: period of the IMU in s, or None for a board whose lost IMU readings are not
+      counted with it. The duration of a displacement, divided by this period, is the number of IMU
+      readings that the board has sent in that time.
     """
 
     imu_period_s: float | None = None

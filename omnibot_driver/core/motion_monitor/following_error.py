@@ -34,7 +34,8 @@ So the error exceeds its limit only after three displacements in a row, or after
 class FollowingError:
     """The following error of one robot: the sum of its motion outside the envelope.
 
-    * ``slack_mps``, ``slack_radps``: speeds outside the envelope that are tolerated as well.
+    * ``slack_mps``, ``slack_radps``: tolerated excess of a velocity over the envelope, in m/s and
+      rad/s.
     * ``outside``: whether the last displacement was outside the envelope by more than the slack.
     """
 

@@ -22,7 +22,7 @@ from omnibot_driver.core.motion_monitor.set_point_history import (
 )
 
 LAG_S: Final = 0.4
-"""For this time in s after its last set-point that was not rest, a robot counts as driven."""
+"""Time in s for which a robot still counts as driven after its set-point has become rest."""
 
 PLAIN_MPS: Final = 0.05
 PLAIN_RADPS: Final = 0.15
@@ -150,9 +150,9 @@ class MotionMonitor:
         return self._blame(Fault.BEYOND_LIMITS, now) if driven else Fault.UNCOMMANDED
 
     def disregard_refused(self, count: int) -> None:
-        """Record how many displacements were rejected so far, without a check.
+        """Record how many displacements were rejected so far, and do not look for a fault.
 
-        This is called while the robot is not monitored.
+        This method is called while the robot is not monitored.
         """
         self._refused = self._refused_before = count
 
@@ -196,9 +196,10 @@ class MotionMonitor:
     def _name(self, explained: list[Velocity], *, heading_known: bool) -> Fault:
         """Return the fault of a robot that moves outside its envelope.
 
-        A velocity within 60° of a set-point's direction is too fast, and so is a yaw rate with the
-        sign of a set-point's. Otherwise the direction is wrong. If the heading is not known, a
-        linear velocity is always too fast.
+        A linear velocity counts as too fast if it is within 60° of a set-point's direction. A yaw
+        rate counts as too fast if it has the same sign as a set-point's yaw rate. Otherwise the
+        fault is a wrong direction. If the heading is not known, a linear velocity always counts as
+        too fast.
         """
         x, y, rate = self.measured.vx_mps, self.measured.vy_mps, self.measured.yaw_rate_radps
         if not self._error.way_exceeded:
@@ -213,8 +214,9 @@ class MotionMonitor:
     def _unbidden(self, seconds: float, *, begins: bool) -> Fault | None:
         """Return UNCOMMANDED if the robot moves without a command and Stop is due, else None.
 
-        While a robot is being pushed, Stop is sent at ever longer intervals. ``begins``: whether
-        the following error exceeds its limit, which is needed for the first Stop.
+        While a robot is being pushed, Stop is sent at ever longer intervals.
+
+        ``begins``: whether the following error exceeds its limit. The first Stop is due only then.
         """
         if not self._error.outside:
             self._stood_s += seconds

@@ -59,7 +59,9 @@ class WindUp:
         """
 
     def pay(self, way_mps: float, turn_radps: float, seconds: float) -> bool:
-        """Subtract motion that the set-points do not allow; return whether the wind-up explains it.
+        """Subtract from the wind-up a motion that the set-points do not allow.
+
+        Return whether the wind-up was larger than this motion, and so explains it.
 
         ``way_mps``, ``turn_radps``: excess over the allowed velocities, during ``seconds``.
         """
@@ -82,7 +84,9 @@ class WindUp:
         *,
         heading_known: bool,
     ) -> None:
-        """Add the distance by which a held robot falls behind. Otherwise the wind-up decays.
+        """Add the distance by which a held robot falls behind.
+
+        If the robot is not held, the wind-up decays.
 
         ``motion``: mean twist during ``seconds``; the set-points allow it.
 

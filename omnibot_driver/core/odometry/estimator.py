@@ -200,10 +200,10 @@ class Odometry:
     # The board's frame
 
     def _is_new_frame(self, told: Pose, confirmed: bool) -> bool:
-        """Return whether a pose is the first one, or shows that the board's frame has changed.
+        """Return whether a pose is the first one, or shows a new frame after a suspected restart.
 
-        A single pose shows this after a suspected restart, if it fits the motion since then.
-        Otherwise, the next pose must confirm it.
+        The pose must confirm the last doubted pose (``confirmed``). After a suspected restart, one
+        pose is enough if it fits the motion since the restart.
         """
         if self._board is None:
             return confirmed

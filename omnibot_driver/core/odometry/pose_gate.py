@@ -17,9 +17,12 @@ from omnibot_driver.core.readings import DisplacementReading
 
 BELIEVED_M: Final = 0.02
 BELIEVED_TURN_RAD: Final = 0.05
-"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: deviations from the expected pose, in m and rad, above
-which the next pose must confirm a pose. The possible motion of lost displacements is added to them,
-unless a pose has shown that motion already."""
+"""``BELIEVED_M``, ``BELIEVED_TURN_RAD``: largest deviations from the expected pose, in m and rad,
+with which a pose is accepted at once. A pose that deviates more must be confirmed by the next one.
+
+The possible motion of lost displacements is added to these limits, unless a pose has shown that
+motion already.
+"""
 BELIEVED_SIGMAS: Final = 3.0
 FARTHEST_M: Final = 1e5
 FARTHEST_RAD: Final = 1e5

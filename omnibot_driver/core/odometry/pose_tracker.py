@@ -85,7 +85,7 @@ class PoseTracker:
         self.uncertainty.miss(duration_s, self._fastest_mps, self._fastest_radps)
 
     def resume(self, tangent: Pose) -> None:
-        """Add the lost motion of a gap, which a pose of the board has shown, to the best pose.
+        """Add to the best pose the lost motion that a pose of the board has shown.
 
         The published pose follows as fast as the robot could move.
         """

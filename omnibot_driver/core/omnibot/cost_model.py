@@ -132,7 +132,8 @@ A greater value was misread from other bytes.
 LONGEST_STEP: Final = 2000.0
 """Largest possible step between two poses, in mm or mrad: 10 m/s or 10 rad/s for 200 ms."""
 DELTAS_MISSED: Final = 2
-"""Number of missing deltas after which no delta is expected, if none has arrived so far."""
+"""Number of missing deltas after which no delta is expected, if none has arrived since the stream
+began or was damaged."""
 
 
 class Context(NamedTuple):

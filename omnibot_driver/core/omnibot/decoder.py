@@ -83,10 +83,9 @@ class FrameDecoder:
         self.skipped: list[int] = []
         """For each frame of the last call, the number of discarded bytes right before it."""
         self.at_rest = False
-        """Whether all received bytes are decoded, on a line that usually pauses only between
-        frames.
+        """Whether all received bytes are decoded, and the line usually pauses only between frames.
 
-        If it is true, faster code may decode the next bytes.
+        If both are true, faster code may decode the next bytes.
         """
         self._dropped = self._arrived = self._wait_for = 0
         self._pose_byte_order: ByteOrder = pose_byte_order
@@ -221,8 +220,8 @@ class FrameDecoder:
     def _next_may_have_begun(self, start: int, length: int, due: bool) -> bool:
         """Return whether the last byte held may begin another frame, by the arrival times.
 
-        ``start``, ``length``: of the last frame held. ``due``: whether another frame may follow it
-        directly.
+        ``start``, ``length``: position and length of the last frame held. ``due``: whether another
+        frame may follow this frame directly.
         """
         pauses, calm = self.pauses, self.calm
         # The last frame came in one read. If frames begin only after a pause, no other frame
@@ -292,9 +291,10 @@ class FrameDecoder:
     def _settled(
         self, pieces: list[Segment], size: int, until: int, closed: bool
     ) -> Iterator[tuple[Segment, bool]]:
-        """Yield the supposed frames before the first undecided one, each with whether to accept it.
+        """Yield each supposed frame before the first undecided one, and whether it is accepted.
 
-        A frame is decided if later bytes cannot change the decision, or if it ends by ``until``.
+        A frame is decided if later bytes cannot change the decision, or if the frame ends at the
+        position ``until`` or before.
         """
         last_sure = [n for n, piece in enumerate(pieces) if piece.sure]
         settled_before = last_sure[-FRAMES_TO_SETTLE] if len(last_sure) >= FRAMES_TO_SETTLE else 0

@@ -95,8 +95,8 @@ class Walk:
 def goes_on(held: bytes | bytearray, at: int, *, closed: bool) -> bool:
     """Return whether a frame follows at ``at``. If so, odd content before ``at`` is from a shock.
 
-    The bytes after this frame must be able to begin another frame. At the end of ``held``, return
-    ``closed``: whether no more bytes come.
+    The result is False if the bytes after this frame cannot begin another frame. If ``at`` is the
+    end of ``held``, the result is ``closed``: whether no more bytes come.
     """
     if at == len(held):
         return closed

@@ -168,8 +168,8 @@ def _by_the_next_frame(
 ) -> Cause:
     """Return the cause of a pause within a frame. It is inferred from the next frame, at ``start``.
 
-    The line was idle if the next frame also contains a pause, and this pause ends whole ticks
-    later. ``first``: the read that ended the pause in question.
+    The line was idle if the next frame also contains a pause, and the ends of the two pauses are a
+    whole number of ticks apart. ``first``: the read that ended the pause in question.
     """
     length = measure(data, start) if start < len(data) else INCOMPLETE
     if length <= 0:

@@ -16,8 +16,8 @@ from omnibot_driver.core.values import value
 WRAP: Final = 256
 
 LATE_S: Final = 0.5
-"""Smallest difference, in s, between the elapsed time and the time that a counter shows, that
-suggests a restart.
+"""Smallest difference, in s, that suggests a restart: the difference between the elapsed time and
+the time that a counter shows.
 
 The drift of the clock is added to this limit. Arrival times are wrong by up to 0.24 s if the host's
 buffer is full and every tenth byte is lost.
@@ -29,9 +29,10 @@ After minutes of silence, the resulting error is too large to show a restart. On
 can then prove one.
 """
 EARLY_S: Final = 0.2
-"""After a restart, a counter may show more time than has elapsed, by at most this time in s.
+"""Largest time in s by which a counter may be ahead of the elapsed time after a restart.
 
-The cause is a late read of the last delta before the restart. A restart takes longer than this.
+If the last delta before the restart was read late, the elapsed time is measured too short. The
+restart itself takes longer than ``EARLY_S``, and is part of the elapsed time.
 """
 
 

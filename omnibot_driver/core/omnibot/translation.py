@@ -35,18 +35,19 @@ from omnibot_driver.core.readings import (
 DELTA_LSB: Final = 1e-4
 """Size of one count of a delta: 0.1 mm in m, or 0.1 mrad in rad."""
 MOST_TEXTS_LOST: Final = 9
-"""Largest number of lost "Paused" texts, one a second, that a counter may show.
+"""Largest number of lost "Paused" texts that a counter may show.
 
-The board answers a reset within these 9 s. A counter that seems to show more has restarted.
+The board sends one text a second, and answers a reset within 9 s. So a counter that seems to show
+more lost texts has restarted.
 """
 FULL: Final = 4000
-"""Smallest number of bytes in a read that may have filled the kernel's buffer of 4 KiB. Not all
-bytes of a read are decoded at once."""
+"""Smallest number of bytes, decoded after one read, at which the kernel's buffer of 4 KiB may have
+been full. The number is below 4096, because the decoder may keep some bytes of a read for later."""
 BEHIND_S: Final = 0.5
 """Shortest delay in s of a read after which the next read may be late too.
 
-The next read is late if the board needs more time to send its bytes than ``BURST_S`` plus twice the
-time since the previous read.
+The next read is late if the board needed more time to send the bytes of that read than ``BURST_S``
+plus twice the time between the two reads.
 """
 BURST_S: Final = 0.05
 LEAST_S: Final = 0.2
@@ -86,7 +87,7 @@ class Translation:
         """Time in s from the sending of the last byte to the read that returned it."""
 
     def readings(self, found: list[Frame], skipped: list[int], now: float) -> list[Reading]:
-        """Return the readings of the frames that one read, at the time ``now``, completed.
+        """Return the readings of the frames that were completed by one read at the time ``now``.
 
         ``skipped``: number of discarded bytes before each frame. The arrival time of each frame is
         estimated from its place in the read, because bytes arrive one by one.
@@ -110,8 +111,9 @@ class Translation:
     def _sent_s(self, count: int, now: float) -> float:
         """Return when the board sent the last of the ``count`` bytes that were read at ``now``.
 
-        Before a late read, the kernel's buffer may have been full. It keeps the first bytes and
-        loses the next ones. Several reads may empty it. If the read was not late, return ``now``.
+        If the read was not late, return ``now``. Before a late read, the kernel's buffer may have
+        been full: it kept the first bytes and lost later ones. So the bytes of a late read were
+        sent directly after those of the previous read. Emptying the buffer may take several reads.
         """
         duration_s, elapsed_s = count / self._schedule.bytes_per_s, now - self.heard_s
         waited = count >= FULL or duration_s > 2 * elapsed_s + BURST_S

@@ -30,8 +30,8 @@ STOP_UNSEEN: Final = (
     " Stop for 5 s after each stop; check by eye that the robot has stopped"
 )
 STOP_BLIND: Final = (
-    "stop unconfirmed: the board does not measure its wheels after this command; check by eye"
-    " that the robot has stopped (reported once)"
+    "stop unconfirmed: the board does not measure its wheels after the last motion command; check"
+    " by eye that the robot has stopped (reported once)"
 )
 STOP_UNANSWERED: Final = (
     "stop unconfirmed: the board is not responding; if the robot moves, cut its motor power; then"

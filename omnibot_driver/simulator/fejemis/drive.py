@@ -33,7 +33,8 @@ class DriveTeensy(Teensy[DriveConfig]):
 
     ``told_angle_deg``: angle of the front wheel in the last ``fwl`` command, in degrees.
 
-    ``off_at_s``: time in s at which the Teensy cuts the power; None without a requested power-off.
+    ``off_at_s``: time in s at which the Teensy cuts the power, or ``None`` if it has not been
+    requested to do so.
     """
 
     version = 110

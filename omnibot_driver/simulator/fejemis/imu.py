@@ -52,7 +52,7 @@ class Imu:
             self._calibrate(step_s)
 
     def calibrate_gyro(self) -> None:
-        """Begin to average the gyro for 1 s, even while the robot moves."""
+        """Begin to average the gyro for 1 s. If the robot turns meanwhile, the offset is wrong."""
         self._kind, self._left_s, self._samples = "gyro", CALIBRATION_S, []
 
     def calibrate_accelerometer(self) -> None:

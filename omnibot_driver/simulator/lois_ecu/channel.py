@@ -16,8 +16,8 @@ TIMER_US = 100
 SLOW_TIMER_US = 7251 / 72
 TIMER_COUNTS = 0x10000
 SHORTEST_PER_TURN_US = 300_000
-"""Duration in µs of the shortest encoder level from which a speed is computed, times the number of
-ticks per turn. With 60 ticks per turn, this level lasts 5 ms, which is a speed of 200 RPM."""
+"""Time in µs of one turn at the highest speed that can be measured, 200 RPM. From an encoder level
+that is shorter than this time / ticks per turn, the board computes no speed."""
 LIMIT_RPM = 50
 LIMIT_PERCENT = 100
 RECORD_DEPTH = 1024

@@ -31,7 +31,8 @@ class Fix:
 def fix_at(start: tuple[float, float], x_m: float, y_m: float, utc_s: float) -> Fix:
     """Return the fix ``x_m`` east and ``y_m`` north of ``start`` (latitude, longitude in degrees).
 
-    ``utc_s``: since 2000-01-01, with 365 days a year and 31 days a month.
+    ``utc_s``: time in s since 2000-01-01. Every year has 365 days, and every month has 31 days,
+    except December with 24.
     """
     latitude = start[0] + y_m / METRES_PER_DEGREE
     longitude = start[1] + x_m / (METRES_PER_DEGREE * cos(radians(start[0])))

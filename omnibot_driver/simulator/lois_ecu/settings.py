@@ -11,26 +11,28 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quirks:
-    """Deviations of the public firmware from the manual: none by default, all in ``FIRMWARE``.
+    """Deviations of the public firmware from the manual.
 
-    Numbers such as 0x12 are the manual's command numbers. Fields whose names explain
-    themselves are not listed.
+    By default, all are off. In ``FIRMWARE``, all are on. Numbers such as 0x12 are the manual's
+    command numbers. Fields whose names explain themselves are not listed.
 
     ticks_of_forward_targets: ticks count up, and only while the wheel's RPM target is positive.
     odometry_stands_at_equal_speeds: the position in 0x20 stays while both integer RPMs are equal.
     velocity_may_be_nan: two ticks within one timer count divide by zero. 0x20 has NaN or infinity.
     sign_of_command: the measured speed has the sign of the target, not of the wheel.
-    duty_drags_target: a negative duty command lowers the wheel's RPM target by 1 at each tick.
-    reverse_runs_fast: a negative controller duty lowers the target too, until the next step.
+    duty_drags_target: while a negative duty is commanded, each encoder tick lowers the wheel's RPM
+        target by 1.
+    reverse_runs_fast: while the controller's duty is negative, each encoder tick lowers the RPM
+        target by 1. The controller's next step uses the lower target, then restores the target.
     low_pass_starts_at_zero: wheels ignore RPM targets until 0x23 is written.
     extra_settings: the settings 0x21 to 0x23 exist.
     appends_odometry: 0x12 sends the odometry after the ticks, with command number 0x12.
     clock_in_ms: the timestamp of 0x12 is in ms, not in ns.
     deaf_while_sending: while the board sends, it keeps only the first character that arrives.
-    deaf_while_counting: at each tick the board receives nothing for 0.2 ms.
+    deaf_while_counting: at each encoder tick, the board receives nothing for 0.2 ms.
     button_waits_while_sending: a press stops the motors only after the present message or record.
     odometry_period_is_fixed: writing the period of 0x20 has no effect.
-    terminal_mode_zeroes_correction: each 0x11 sets the left short correction to 0.
+    terminal_mode_zeroes_correction: each 0x11 zeroes the left wheel's correction of short levels.
     terminal_mixes_sensors: each terminal mode forwards both sensors, character by character.
     reset_clears_ticks_only: 0x18 keeps the odometry and the set-points.
     terminal_passes_input_on: input first goes to the sensor, at its 9600 or 4800 baud.

@@ -44,7 +44,7 @@ class Terminal:
     def heard(self, count: int) -> None:
         """Record that ``count`` characters came from the host.
 
-        The public firmware forwards them.
+        In a terminal mode, the public firmware forwards them to the sensor.
         """
         if self.on and self._quirks.terminal_passes_input_on:
             self._to_sensor = min(self._to_sensor + count, PASSED_ON_DEPTH)

@@ -2,8 +2,8 @@
 
 """The commands of the command port: how they are recognised and checked, and their replies.
 
-The first row of the table of commands that fits a request is used. This module knows command words
-and numbers; it does not know how a motion proceeds.
+The table of commands is searched from the top, and the first row that fits the request is used.
+This module knows command words and numbers; it does not know how a motion proceeds.
 """
 
 from collections.abc import Callable
@@ -97,9 +97,10 @@ def _refuses_left_spin(server: "MartServer") -> bool:
 
 
 def _timed(server: "MartServer", text: str) -> str | None:
-    """Start a straight controlled move (TF, TB): an optional speed word, then a distance in inches.
+    """Start a straight controlled move (TF, TB).
 
-    Without the quirk ``speed_word_first``, the speed word may also follow the distance.
+    The request has an optional speed word, then a distance in inches. Without the quirk
+    ``speed_word_first``, the speed word may also follow the distance.
     """
     server.motions[Kind.CONTROLLED_LINEAR].reported_in = 0.0
     behind = text[2:]

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""What the server remembers of each kind of motion, and its reply texts, speeds and times.
+"""The state that the server keeps for each kind of motion; reply texts, speeds and times.
 
 This module only holds the values; it does not know what changes them.
 """

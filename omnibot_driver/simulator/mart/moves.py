@@ -2,8 +2,9 @@
 
 """The start of each kind of motion, and its end by a command.
 
-Each step is a function that the server, or its copy, calls later. This module knows motions; it
-does not know the words of commands.
+A start or an end has several steps. Each step is a function that the server calls later. The server
+is an argument of the function, so that a copy of the server can call it too. This module knows
+motions; it does not know the words of commands.
 """
 
 from typing import TYPE_CHECKING

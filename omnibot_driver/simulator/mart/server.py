@@ -94,7 +94,7 @@ class MartServer(ServerState):
 
     @property
     def wake_at(self) -> float:
-        """Time in s of the next event that needs no datagram. It is infinity if there is none."""
+        """Time in s of the next event, if no datagram comes before; infinity if none is planned."""
         if self._out:
             return self.now_s
         return min(self._step_at_s, inf if self._later is None else self._later.at_s)
@@ -179,9 +179,9 @@ class MartServer(ServerState):
             self.waiters.append(Waiter(port, kind, then, args))
 
     def post(self, kind: Kind) -> None:
-        """Give a notice to the first port that waits for the start or the end of such a motion.
+        """Give a notice to the first port that waits for a motion of this kind to start or end.
 
-        If no port waits for a motion of this kind, keep the notice.
+        If no port waits for such a motion, keep the notice.
         """
         for waiter in self.waiters:
             if waiter.kind is kind:

@@ -12,9 +12,10 @@ from typing import Literal
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quirks:
-    """Deviations of the public server from its manual: none by default.
+    """Deviations of the public server from its manual.
 
-    The last four were found in the public source, not on the running server.
+    By default, all are off. The last four were found in the public source, not on the running
+    server.
 
     stop_port_keeps_motion: SL stops F, B and RM, but the motion stays "in progress". Later motions
         are refused; a later SM or SRM hangs the command port.
@@ -25,8 +26,9 @@ class Quirks:
     drives_trust_imu: without an IMU, RM, R and L start, and uncontrolled motions continue. The
         server then detects no obstacle, start or stop.
     reference_speed_wraps: speeds below 1 or above 127 wrap around in RM; RMCS limits them.
-    reference_start_counts_on: the start of RM continues the sample count of the previous stop of
-        RM. If RM fails, it reports the failure text of the last F or B.
+    reference_start_counts_on: at the start of RM, the count of samples begins at its value after
+        the last stop of RM, not at 0. If RM fails, its reply has the failure text of the last F or
+        B.
     speed_word_first: a speed word after the number is ignored.
     zero_distance_is_unlimited: TF, TB, MCF and MCB drive without a limit if the request has 0 or a
         word instead of a distance.
@@ -41,9 +43,10 @@ class Quirks:
     clock_moves_heading: TIME in a motion adds turn rate * clock jump to the heading.
     undocumented_commands: without this quirk, ENC is the only undocumented command.
     heading_in_reference_moves_only: the heading of RMRA changes in RM only.
-    probe_turns: MCR 0 runs the motors until the wheel moves, or 0.5 s with a dead IMU.
-    heading_starts_off: RM's first sample turns the heading of RMRA by half the turn rate * time
-        since the previous RM.
+    probe_turns: MCR 0 runs the motors until the wheel moves. With a dead IMU, it runs them for
+        0.5 s.
+    heading_starts_off: the first sample of RM adds an error to the heading of RMRA: half the turn
+        rate, times the time since the previous RM.
     corrects_after_stop: TF, TB, PTF, MCF and MCB may correct the heading even in the sample in
         which they stop by themselves. This leaves one motor on, usually with one unit.
     """
@@ -104,8 +107,8 @@ class MartSettings:
 
     speed_mps_per_unit: wheel speed for one register unit at ``nominal_volts``.
 
-    dead_zone_units: a motor turns only above this number of register units. Only the units above it
-        give speed.
+    dead_zone_units: number of register units up to which a motor does not turn. The speed is
+        proportional to the units above this number.
 
     motor_inequality: how much faster the left motor is, as a fraction of the speed.
 

@@ -44,7 +44,7 @@ class ServerState:
     alarm: the kind of motion that is supervised.
     starting: the kind of motion whose command is not answered yet.
     custom: parameters that SLMP and SSP have set.
-    sampling_since_s: time since which a motion uses a sonar, or -1.
+    sampling_since_s: time at which a motion began to use a sonar; -1 while no motion uses one.
     front_m, rear_m, dock_m: distances from the start to the walls and to the dock. They may be
         changed, and so may the chassis and the IMU.
     """

@@ -25,8 +25,8 @@ STICKING_SPEED = 0.3
 class MotorConstants:
     """Properties of one motor.
 
-    * ``pwm_per_count``: PWM steps for a speed of one count per tick. With 46, the feed-forward
-      supplies seven eighths of the effort.
+    * ``pwm_per_count``: PWM steps for a speed of one count per tick. With the default, the manual's
+      feed-forward supplies seven eighths of the effort.
     * ``time_constant_ticks``: time constant of the speed.
     * ``delay_ticks``: delay from an effort to its effect.
     """

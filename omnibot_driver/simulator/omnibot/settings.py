@@ -32,7 +32,8 @@ class BoardSettings:
       manual's section Deprecated.
     * ``delta_period_s``: period of this message, a multiple of 10 ms. The manual also states 0.1 s.
     * ``linear_scale``: LSB per m/s of Vx, Vy and rim speeds. ``angular_scale``: LSB per rad/s.
-    * ``control``: the on-board switch: commands are velocities, or poses in the earth frame.
+    * ``control``: position of the on-board switch, which decides whether commands are velocities,
+      or poses in the earth frame.
     * ``position_scale``: LSB per m. ``heading_scale``: LSB per rad of an unwrapped heading.
     * ``estop_latches``: whether an emergency stop lasts until a reset; else it lasts until the next
       motion command.

@@ -74,9 +74,10 @@ class Noise:
 
 
 def allan(readings: Column, period_s: float) -> Allan:
-    """Return the Allan deviations of readings, (n,), that are ``period_s`` apart.
+    """Return the Allan deviations of ``readings``, which are ``period_s`` seconds apart.
 
-    The averaging times grow by a quarter of an octave from one to the next.
+    ``readings`` has the shape (n,). The averaging times grow by a quarter of an octave from one to
+    the next.
     """
     whole = np.concatenate(([0.0], np.cumsum(readings - readings.mean()) * period_s))
     longest = len(readings) // FEWEST_CLUSTERS

@@ -33,10 +33,10 @@ NEEDS: Final = {
     ),
     "step": (("delta_frame", GAINS), "a wheel controller whose model is known"),
 }
-"""For each subcommand, some parameters of the driver, and what a board lacks without them.
+"""For each subcommand: parameters of the driver, and what the board lacks if the driver has none.
 
-The subcommand needs at least one of these parameters. If the driver has none, the error message
-names what the board lacks.
+The subcommand needs at least one of these parameters. Otherwise, the error message names what the
+board lacks.
 """
 
 

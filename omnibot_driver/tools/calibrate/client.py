@@ -142,7 +142,9 @@ class Client:
     def call(self, service: str, on: bool | None = None) -> str:
         """Call a service of the driver; return the message in its response.
 
-        ``on``: for SetBool; None for Trigger. Raises ToolError if the driver reports a failure.
+        ``on``: the value for a service of type SetBool; ``None`` for a service of type Trigger.
+
+        Raises ToolError if the driver reports a failure.
         """
         kind = Trigger if on is None else SetBool
         request = Trigger.Request() if on is None else SetBool.Request(data=on)

@@ -105,8 +105,8 @@ def _remarks(found: Found) -> list[str]:
         remarks.append(
             "The signs of the axes describe a mirror image of the robot. A wrong choice of the"
             " robot's front cannot cause this, so check your answers. If your answers are right,"
-            " command velocities only: the driver does not start with these signs and"
-            " control_method 'position'."
+            " control the robot by velocities: with these signs, the driver does not start if"
+            " control_method is 'position'."
         )
     if found.delta_frame not in (None, found.before["delta_frame"]):
         remarks.append(

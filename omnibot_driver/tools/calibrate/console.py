@@ -125,8 +125,8 @@ class Console:
 def digits(finding: Finding) -> tuple[str, str, str]:
     """Return value, uncertainty and previous value of a finding, as texts.
 
-    If the uncertainty is known, all three texts end at its second significant digit, or at the
-    decimal point if this digit is before the point.
+    If the uncertainty is known, all three are rounded to the place of its second significant digit.
+    If this place is before the decimal point, they are rounded to whole numbers.
     """
     value, sigma, before = finding.value, finding.sigma, finding.before
     places = None

@@ -91,7 +91,8 @@ def control_method(slow: Drift, fast: Drift, slow_mps: float) -> ControlMethod |
 
     ``slow``, ``fast``: motions with the command ``slow_mps`` and with twice this command.
 
-    None if the motions fit neither method, for example because a busy computer delayed commands.
+    If the motions fit neither method, return ``None``. For example, a busy computer may have
+    delayed commands.
     """
     # In velocity control the speed is constant, and doubles with the command. In positional control
     # the command is a position a few mm from the origin of the board's frame. The robot has stopped

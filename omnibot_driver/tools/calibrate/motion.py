@@ -126,8 +126,9 @@ class Obedience:
     def look(self, now_s: float, seconds: float, command: Vector3, measured: Vector3) -> None:
         """Add the commanded and the measured motion since the last call, and compare the sums.
 
-        The sums cover 1 s or 3 s. Raises ToolError if the robot moved by less than a fifth of the
-        commanded motion, unless the command was slower than ``PLAIN``.
+        The sums cover 1 s, or 3 s if the board rarely measures its motion. Raises ToolError if the
+        robot moved by less than a fifth of the commanded motion. Commands slower than ``PLAIN`` are
+        not checked.
 
         ``seconds``: time since the last call. ``measured``: in the units of ``command``.
         """

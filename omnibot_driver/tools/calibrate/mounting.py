@@ -168,8 +168,8 @@ def _tilt(level: Array, tilted: Array, what: str) -> float:
     tilt_rad = math.acos(max(-1.0, min(1.0, float(level @ tilted))))
     if not LEAST_TILT_RAD <= tilt_rad <= MOST_TILT_RAD:
         raise Contradiction(
-            f"with the {what} raised the robot was tilted by {math.degrees(tilt_rad):.0f}°; raise"
-            f" the {what} by 20° to 45°"
+            f"when the {what} was raised, the robot was tilted by {math.degrees(tilt_rad):.0f}°;"
+            f" raise the {what} by 20° to 45°"
         )
     return tilt_rad
 

@@ -129,9 +129,9 @@ def tune(plant: Plant, loop: Loop, goals: Goals) -> Tuned:
 
 
 def target_of(plant: Plant, goals: Goals) -> float:
-    """Return the speed to which the set-point steps, in whole RPM, at least 5.
+    """Return the set-point after the step, in RPM.
 
-    It is ``goals.destination`` times the speed at full duty.
+    It is ``goals.destination`` times the speed at full duty, in whole RPM, but at least 5 RPM.
     """
     return float(max(round(goals.destination * plant.final_rpm(100.0)), 5))
 

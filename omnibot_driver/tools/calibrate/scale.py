@@ -124,7 +124,7 @@ def result(found: Sequence[Speed], now: Mapping[str, Any]) -> Result:
 def draw(
     figure: "Figure", found: Sequence[Speed], linear: Scale, angular: Scale, gyro: Scale
 ) -> None:
-    """Draw the measured speeds over the commanded counts, the fitted lines and the residuals."""
+    """Draw measured speeds, fitted lines and residuals. The commanded counts are the x axis."""
     axes = figure.subplots(2, 2, sharex="col", height_ratios=(2, 1))
     series = [
         (0, 0, linear, "odometry", "o", "tab:red", "x"),

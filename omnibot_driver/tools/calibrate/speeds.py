@@ -169,9 +169,9 @@ def _within(stamp_s: Column, began_s: float, ended_s: float) -> Column:
 
 
 def _way(pose: Column, axis: int) -> Column:
-    """Return the coordinate of each pose along one axis of the robot at its mean heading.
+    """Return the coordinate of each pose along one axis of the robot.
 
-    ``axis``: 0 for x, 1 for y, 2 for yaw.
+    ``axis``: 0 for x, 1 for y, 2 for yaw. The direction of x and y is that of the mean heading.
     """
     if axis == 2:
         return np.asarray(pose[:, 2])

@@ -23,7 +23,7 @@ from omnibot_driver.tools.calibrate.wheel_loop import MANUAL, TICK_S, Gains
 from omnibot_driver.tools.needs import ToolError
 
 RUN_UP_S: Final = 2.0
-"""Time, in s, that a wheel gets to reach the first speed from rest.
+"""Time, in s, that the tool allows a wheel for the start from rest to the first speed.
 
 Friction affects this start, so the tool does not evaluate it.
 """

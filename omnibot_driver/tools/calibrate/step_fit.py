@@ -140,7 +140,9 @@ class Fit:
 
 
 def steps_of(commands: Commands, wheels: Wheels, wheel: int, levels: Sequence[float]) -> list[Step]:
-    """Return the steps of one wheel between two of the commanded rates in ``levels``, in rad/s.
+    """Return the steps of one wheel from one commanded rate to another.
+
+    ``levels``: the rates, in rad/s. Steps from or to another rate are left out.
 
     Raises ToolError if gaps in the odometry leave no complete step.
     """

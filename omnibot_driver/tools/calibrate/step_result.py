@@ -20,8 +20,8 @@ The encoder and the protocol's unit of 0.1 mm cause the quantisation.
 MANY: Final = 1.5
 """The tool warns if the residuals exceed the quantisation error by more than this factor.
 
-For example, delayed commands double the residuals, and the tool finds a delay of the wheel that is
-4 ms too long.
+One possible cause is that commands were delayed. The residuals are then twice as large, and the
+delay that the tool finds for the wheel is 4 ms too long.
 """
 UNEXPLAINED: Final = 1.2
 """Largest accepted ratio of the motor model's residuals to those of the second-order model.

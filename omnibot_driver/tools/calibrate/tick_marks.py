@@ -107,8 +107,8 @@ def _first(row: Column, steps: Column) -> int:
 def _steps(rows: Sequence[Column], firsts: Sequence[int], marks: int) -> Column:
     """Return, for each mark, the relative error of the distance to the next mark.
 
-    It is the median of the errors of all times over this distance. The mean of the result is
-    shifted to zero.
+    It is the median of the errors of all times between these two marks. Then the mean is
+    subtracted, so that the mean of the result is zero.
 
     ``rows``: for each record, the relative errors of its times between ticks.
 

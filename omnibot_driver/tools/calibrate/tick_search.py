@@ -47,16 +47,16 @@ LAGS: Final = 60
 Even such distant residuals are correlated, because the load changes slowly.
 """
 MISSED: Final = 0.42
-"""Least sum of the relative errors of two successive times that shows a missed mark.
+"""Sum of the relative errors of two successive times above which the board has missed a mark.
 
-A missed mark doubles a time, so that the sum is 1. The board's clock can lose up to 6 ms, which
-makes the sum smaller. If the board only noticed a mark late, the next time is shorter, so that the
-sum is near 0.
+A missed mark doubles the first time. Its error is then 1, and so is the sum. The board's clock can
+lose up to 6 ms, which makes the sum smaller. If the board only noticed a mark late, the first time
+is too long and the second too short, so the sum is near 0.
 """
 SURE_TICKS: Final = 4
-"""Number of times at the start of a record in which the tool does not search for missed marks.
+"""Number of ticks at the start of a record among which the tool does not search for missed marks.
 
-The wheel is still so slow that the board notices every mark.
+There, the wheel is still so slow that the board notices every mark.
 """
 OUTLIER: Final = 5.0
 """Error of a time between ticks, in standard deviations, above which the time is not used."""
@@ -82,8 +82,8 @@ def turned(times_s: Column, slow_s: float, fast_s: float) -> Column:
 def constants(values: Column, order: int) -> tuple[float, float]:
     """Return the slow and the fast time constant, in s.
 
-    ``values``: the values of a search. They contain the sum and the ratio of the time constants
-    instead, because exchanged time constants describe the same plant.
+    ``values``: the values of a search. They contain the sum and the ratio of the time constants.
+    The constants themselves could be exchanged, and would still describe the same plant.
     """
     total = math.exp(values[1])
     ratio = float(values[2]) if order == 2 else 0.0
@@ -194,7 +194,7 @@ class Search:
         return np.asarray(values[:own])
 
     def correlate(self, values: Column) -> None:
-        """Measure the correlation of the residuals at these values, which later searches remove.
+        """Measure the correlation of the residuals at these values; later searches remove it.
 
         Before the marks are fitted, uneven marks cause the correlation. After their fit, only the
         changing load causes correlation.
@@ -214,7 +214,7 @@ class Search:
         return np.asarray(left[np.abs(left) < 5 * max(spread, 1e-3)])
 
     def covariance(self, values: Column) -> Column:
-        """Return the covariance of the plant's values, which all records share.
+        """Return the covariance of the plant's own values, which are the same in all records.
 
         A slowly changing load affects whole records. If the records therefore scatter more than
         the residuals predict, the covariance is increased to this scatter.
@@ -266,7 +266,7 @@ class Search:
         )
 
     def _sparsity(self) -> csr_matrix:
-        """Return the sparsity pattern of the Jacobian: (times between ticks, values)."""
+        """Return the Jacobian's sparsity pattern: a row for each time, a column for each value."""
         own, records, times = 1 + self.order, len(self._lengths), len(self._measured)
         pattern = np.zeros((times, own + records + self._marks))
         pattern[:, :own] = 1.0

@@ -36,7 +36,9 @@ ROUNDS: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Behaviour:
-    """The behaviour of a motor with some gains, as numbers or arrays.
+    """The behaviour of a motor with given gains.
+
+    Each value is a number, or an array with one element for each candidate of the gains.
 
     ``rise_s``: rise time, from 10 % to 90 % of a step of the command.
 

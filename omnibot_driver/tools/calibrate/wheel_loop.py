@@ -111,7 +111,7 @@ def _plant(motor: Motor, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
     def way(share: float) -> float:
         """Return how many counts the wheel turns from rest in ``share`` ticks.
 
-        The effort is the one that leads to a final speed of one count per tick.
+        The effort is constant, and leads to a final speed of one count per tick.
         """
         return float(share - lag * (1.0 - np.exp(-share / lag)))
 

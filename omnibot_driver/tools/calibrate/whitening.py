@@ -19,9 +19,9 @@ def correlation(rows: Sequence[Column], lags: int) -> Column:
 
     ``rows``: rows of successive residuals. ``lags``: the largest lag.
 
-    With a single lag, the result is limited to the range from -0.5 to 0: displaced encoder marks
-    cause -0.5, and independent errors cause 0. With more lags, the result is tapered: larger lags
-    get smaller factors.
+    If ``lags`` is 1, the value for lag 1 is limited to the range from -0.5 to 0: displaced encoder
+    marks cause -0.5, and independent errors cause 0. With more lags, the result is tapered: larger
+    lags get smaller factors.
     """
     every = np.concatenate(rows)
     spread = 3 * 1.4826 * float(np.median(np.abs(every)))

@@ -142,8 +142,8 @@ class Monitor(App[None]):
     def _come_back(self) -> None:
         """Draw the screen again after a suspension by SIGSTOP.
 
-        Textual then starts a thread that reads keys, but the old thread still runs. Entering
-        ``suspend`` ends the old thread.
+        To draw the screen again, Textual starts a new thread that reads keys. SIGSTOP does not end
+        the old thread, but entering ``suspend`` does.
         """
         with self.suspend():
             pass

@@ -17,7 +17,7 @@ to 0.6 s."""
 REPEAT_S: Final = 0.3
 """Time in s for which a repeated key moves the robot. Several repetitions may be lost or late."""
 ASLEEP_S: Final = 0.5
-"""Time in s without a call of ``command`` that shows that the program was suspended.
+"""If ``command`` is not called for this time in s, the program was probably suspended.
 
 Keys from before or during the suspension are discarded.
 """
@@ -40,7 +40,7 @@ MOTIONS: Final = {
     "j": (0, 0, 1),
     "l": (0, 0, -1),
 }
-"""For each key: the signs of its motion forward, to the left, and in turning to the left."""
+"""For each steering key, the signs of three velocities: forward, to the left, turning left."""
 
 
 class DeadMan:

@@ -12,7 +12,7 @@ from omnibot_driver.tools.report.log import Log, Span, Status
 
 LEVELS: Final = ("OK", "WARN", "ERROR", "STALE")
 FIRST_SECONDS: Final = 3.0
-"""Time in s at the beginning of a log in which the driver may still be connecting."""
+"""For this time in s from the beginning of a log, the driver may still be connecting."""
 OUT_OF_REACH: Final = ("disconnected", "connecting")
 LONG_OUT_OF_REACH: Final = 0.1
 SILENT_S: Final = 2.0

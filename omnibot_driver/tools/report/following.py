@@ -23,7 +23,7 @@ YAW_WEIGHT_M: Final = 0.143
 WHEEL_WEIGHT_M: Final = 0.029
 """Factors in m that convert a yaw rate and a wheel's rate to the speed of the wheel's rim.
 
-They fit an OmniBot. Other robots do not need other factors, because the factors only decide which
+They fit an OmniBot, but are used for all robots. This is accurate enough: they only decide which
 speeds are motion, and how much each axis counts in the search for the lag. They do not change the
 reported ratios of measured to commanded motion.
 """

@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 COMMAND_TIMEOUT_S: Final = 0.5
 """Time in s after which a command has no effect: the driver's default of ``cmd_vel_timeout``."""
 SETTLING_S: Final = 0.2
-"""Time in s before and after a change of state in which a gap between messages is normal."""
+"""For this time in s before and after a change of state, a gap between messages is normal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,8 +124,8 @@ class Log:
     def two_wheels(self) -> bool:
         """Whether the robot has two driving wheels; False without joint_states.
 
-        Among the boards with an IMU, only the Fejemis has two. Its IMU is mounted upright. The IMU
-        of an OmniBot, which has three, hangs upside down.
+        Among the robots with an IMU, only the Fejemis has two driving wheels. Its IMU is mounted
+        upright. The OmniBot has three driving wheels, and its IMU hangs upside down.
         """
         return len(self.wheels) == 2
 

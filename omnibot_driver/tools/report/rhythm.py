@@ -202,7 +202,7 @@ def _steps(rhythm: FrameSchedule, stream: Stream) -> Iterator[Finding]:
         yield Finding(
             Level.BAD,
             "Timing",
-            f"{counted(back, 'stamp')} of {stream.name} not later than the stamp before.",
+            f"{counted(back, 'stamp')} of {stream.name} did not increase.",
             "Was the computer's clock set back during the drive, or do two drivers publish?",
         )
     if len(rhythm.leap_s):

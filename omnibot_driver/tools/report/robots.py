@@ -38,8 +38,9 @@ def find(topics: Iterable[tuple[str, str]]) -> dict[str, Topics]:
 def _roles(topic: str, kind: str, drivers: Collection[str]) -> Mapping[str, tuple[str, bool]]:
     """Return the roles that this topic may have by its name.
 
-    For each role, the result has the namespace, and whether the role fits. The message type
-    ``kind`` must fit the role. A topic such as ``state`` must also belong to a node in ``drivers``.
+    Each role has two values: the robot's namespace, and whether the role really fits. A role fits
+    if ``kind`` is its message type. A topic such as ``state`` must also belong to a node in
+    ``drivers``.
     """
     roles: dict[str, tuple[str, bool]] = {}
     for role, series in SERIES.items():

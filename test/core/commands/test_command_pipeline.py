@@ -172,7 +172,8 @@ def test_a_ramp_is_as_steep_however_often_it_is_commanded(every_ms: int) -> None
 def test_a_reversal_is_ramped_through_zero() -> None:
     """A robot that drives forward is commanded backward.
 
-    The velocity on the line falls through zero, and never faster than the acceleration limit.
+    The velocity on the line decreases through zero to the commanded one. It never changes faster
+    than the acceleration limit allows.
     """
     bench = running(limits=GENTLE)
     for _ in range(8):
@@ -203,7 +204,7 @@ def test_turning_is_ramped_by_its_own_limit() -> None:
 
 
 def test_a_zero_command_is_stop_at_once_and_no_ramp() -> None:
-    """A zero command is sent as Stop without a ramp. A person may be in front of the robot."""
+    """A zero command is sent as Stop, without a ramp: a person may be in front of the robot."""
     bench = running(limits=GENTLE)
     for _ in range(8):
         bench.drive(0.5)

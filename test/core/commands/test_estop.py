@@ -23,7 +23,7 @@ def bench() -> Bench:
 def test_the_estop_is_out_at_once_and_refuses_commands(bench: Bench) -> None:
     """The e-stop is latched while the robot drives. The robot stops, and commands are refused.
 
-    The driver then sends only ES, the board's own emergency stop, and Stop, always together.
+    The driver then sends only ES (the board's own emergency stop) and Stop, always together.
     """
     bench.drive(0.5)
     bench.run(0.1)

@@ -3,7 +3,7 @@
 """Tests of the motion rule: only a fresh command moves the robot.
 
 A command is not fresh if it is older than the timeout, or than an interruption such as a pause. The
-board must also send data.
+board must also send data. Otherwise even a fresh command does not move the robot.
 """
 
 import contextlib

@@ -41,7 +41,7 @@ def test_an_estop_between_two_authorities_is_all_that_goes_out(stream: Stream) -
 def test_the_emergency_stop_never_waits_and_is_repeated_without_end(stream: Stream) -> None:
     """The e-stop is latched just after a command. It is sent at once, twice, and then repeated.
 
-    It consists of ES, the board's own emergency stop, and Stop, because some firmware does not know
+    It consists of ES (the board's own emergency stop) and Stop, because some firmware does not know
     ES.
     """
     order(stream, GO, 1.0)

@@ -21,7 +21,7 @@ from omnibot_driver.core.packets import packed
 
 
 class Climbing:
-    """A test motion whose frame differs each time, for the given number of frames."""
+    """A test motion whose first ``frames`` frames all differ; later frames repeat the last."""
 
     authority, is_zero = Authority.BASE, False
 
@@ -250,8 +250,8 @@ def test_whatever_happens_motion_is_fresh_paced_and_never_sent_while_latched(
 ) -> None:
     """Commands, stops, e-stops and releases come in random order.
 
-    Only commands younger than the timeout are sent, none during an e-stop, and always a Stop
-    between two commanding topics.
+    Only commands younger than the timeout are sent, and none during an e-stop. Between the commands
+    of two topics, the driver always sends a Stop.
     """
     stream, now, commanded_at = make_stream(), 100.0, -math.inf
     fresh_at, fresh, driven = -math.inf, False, b""

@@ -163,9 +163,10 @@ def test_a_turn_on_the_spot_continues_while_the_wheel_is_near_to_across(
 
 @pytest.mark.slow
 def test_a_wheel_refused_until_start_stays_refused_after_a_reconnect() -> None:
-    """Motion is refused until the user calls ~/start, and then the driver reconnects.
+    """Because of a fault, motion is refused until the user calls ~/start. The driver reconnects.
 
-    After a reconnect, the driver itself starts the board. Motion is still refused.
+    After the reconnect, the driver itself starts the board. Motion is still refused until the user
+    calls ~/start.
     """
     bench = nominal()
     bench.board._encoder.follower.refusal = UNTIL_START

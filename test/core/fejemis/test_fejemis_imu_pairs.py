@@ -23,7 +23,7 @@ LENGTHS = {"gyro": 29, "acc": 30, "pose": 33, "vel": 19, "imupose": 33}
 KNOWN_S = 0.5
 """Time in s after which the order of gyro and acceleration line is known.
 
-This is true if reads are at most 100 ms apart.
+This time is long enough if reads are at most 100 ms apart.
 """
 
 
@@ -288,10 +288,10 @@ def test_no_pair_has_lines_of_two_samples(
 @pytest.mark.slow
 @pytest.mark.parametrize("silence_s", [0.3, 2.0])
 def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s: float) -> None:
-    """The drive board is silent. It speaks again before or after a pose.
+    """The drive board is silent for a while, and then sends samples and poses again.
 
-    Before the first pose after the silence, the time of a sample is unknown. The driver leaves such
-    a sample out.
+    Two cases: its first message is a sample, or it is a pose. The time of a sample before the first
+    pose is unknown, so the driver leaves this sample out.
     """
     for phase_s in (0.0, 0.005, 0.01, 0.015):
         bench = nominal()
@@ -308,7 +308,10 @@ def test_no_sample_after_a_silence_is_stamped_with_the_time_before_it(silence_s:
 
 @pytest.mark.slow
 def test_samples_that_waited_for_the_host_are_not_left_out() -> None:
-    """The host reads every 0.2 s. Each read begins with samples before a pose; none is left out."""
+    """The host reads every 0.2 s. In each read, samples come before the first pose.
+
+    The driver leaves none of these samples out.
+    """
     bench = nominal()
     bench.run(3.0)
     bench.read_s = 0.2

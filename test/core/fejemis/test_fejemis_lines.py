@@ -328,10 +328,11 @@ def test_a_firmware_that_prints_otherwise_is_believed_soon() -> None:
 
 @pytest.mark.parametrize("windows", range(3))
 def test_other_forms_are_counted_in_windows_of_24_lines(windows: int) -> None:
-    """The last lines of a window and the first of the next include 7 lines each in another form.
+    """Two successive windows contain 7 lines in another form each.
 
-    Both counts are below the limit of 8, so these lines are discarded. An eighth line in the same
-    window ends the check of forms. Some ``windows`` without such lines come first.
+    They come at the end of the first window and at the beginning of the second. Both counts are
+    below the limit of 8, so these 14 lines are discarded. An eighth such line in the second window
+    ends the check of forms. ``windows``: the number of earlier windows without such lines.
     """
     learnt, other = (with_sum(text) + b"\n" for text in (b"acc 0.1 0.1 0.1", b"acc 0.1 0.1 1"))
     decoder = FejemisDecoder("on")

@@ -90,9 +90,10 @@ def test_a_voltage_that_waits_runs_for_its_whole_time() -> None:
 
 
 def test_a_new_lift_voltage_is_not_cancelled_by_the_repeated_switching_off() -> None:
-    """Lift and brush are switched off, which is sent three times. Meanwhile the lift is commanded.
+    """Lift and brush are switched off. Each of the two lines for this is usually sent three times.
 
-    The brush is still switched off three times. The lift is not switched off again.
+    After the first time, a lift voltage is commanded. The line for the brush is still repeated, but
+    the line for the lift is not.
     """
     machine = Machine()
     machine.off()

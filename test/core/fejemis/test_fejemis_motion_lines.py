@@ -89,7 +89,7 @@ def test_no_loss_of_one_or_two_characters_makes_another_motion() -> None:
 def test_no_loss_of_two_characters_in_any_of_many_commands() -> None:
     """Random motions are commanded. In each line, the checksum detects the loss of two characters.
 
-    The driver avoids pairs of characters that would hide the loss, and certain checksums.
+    For this purpose, the driver avoids certain pairs of characters and certain checksums.
     """
     chance = random.Random(7)
     for _ in range(150):

@@ -194,7 +194,7 @@ def test_every_message_is_a_stream_or_shown_in_diagnostics() -> None:
 def said_by_the_driver() -> set[str]:
     """Return all lines that the driver sends in a session in which everything is requested.
 
-    An example of a relayed angle and of a lift voltage is added.
+    The result also contains one relayed angle and one lift voltage, as examples.
     """
     written: dict[Written, tuple[float, ...]] = {
         Written.WHEELS: (0.08, 0.081, 20.0, 48.0, 0.41),

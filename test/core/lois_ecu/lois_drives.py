@@ -218,7 +218,7 @@ class Rig:
         return bytes([byte for byte in data if draw() >= self._loss])
 
     def say(self, data: bytes) -> None:
-        """Send these bytes to the board, and record them in the driver as its own."""
+        """Send these bytes to the board, and report them to the driver as written."""
         self.board.receive(self._arrived(data))
         self.driver.wrote(data, self.now)
 

@@ -38,7 +38,7 @@ def test_backward_its_way_is_within_3_percent_and_its_place_within_10(firmware: 
 
 @pytest.mark.parametrize("name", ["place right", "straight back", "curve back"])
 def test_the_gains_of_the_boot_are_described_by_the_covariance(name: str) -> None:
-    """With the board's own gains, the right wheel stops. The board still reports its old speed.
+    """With the board's own gains, the right wheel stops. The board still reports its last speed.
 
     The covariance fits the error of the pose. The median of three drives is checked, because a few
     drives have a larger error.
@@ -98,7 +98,7 @@ def test_a_wheel_that_was_found_at_rest_does_not_roll_because_the_heading_differ
 def test_the_covariance_of_a_turn_in_place_includes_the_delays_of_a_busy_computer(
     seed: int,
 ) -> None:
-    """The driver reads once in 0.05 to 0.35 s, so it corrects the motion of the wheels late.
+    """The driver reads once in 0.05 to 0.35 s, so it corrects its estimate of the wheels late.
 
     The heading is then wrong by up to 30°. The covariance includes this.
     """
@@ -136,8 +136,8 @@ def test_wheels_that_roll_backward_at_twice_their_set_points_are_followed(seed: 
 def test_beyond_50_rpm_the_heading_of_0x20_is_worth_less(monkeypatch: pytest.MonkeyPatch) -> None:
     """At 62 RPM, some ticks follow each other so soon that the firmware measures no speed at them.
 
-    Its heading is then less accurate, so the filter adds variance to the yaw. At 32 RPM, it adds
-    none.
+    The heading in the board's odometry (0x20) is then less accurate, so the filter adds variance to
+    the yaw. At 32 RPM, it adds none.
     """
     usual = nominal("firmware", 2)
     fast = replace(usual, motors=(MotorSettings(rpm_per_percent=1.1),) * 2)

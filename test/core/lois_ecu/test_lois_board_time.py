@@ -15,7 +15,7 @@ from omnibot_driver.core.lois_ecu.board_time import BoardTime
 def test_a_read_that_is_late_is_told(lost: float) -> None:
     """One read is 40 ms late.
 
-    The estimate shows this delay, even if the board's clock stops during sending.
+    The estimate shows this delay, even if the board's clock stops while the board sends.
     """
     board = BoardTime()
     found = []
@@ -32,7 +32,7 @@ def test_a_read_that_is_late_is_told(lost: float) -> None:
 def test_of_groups_that_are_read_at_once_none_is_older_than_the_one_before() -> None:
     """Several tick reports are read together.
 
-    The sending times that are estimated for them are in the order in which the board sent them.
+    Their estimated sending times are in the order in which the board sent them.
     """
     board = BoardTime()
     taken_s = []
@@ -96,7 +96,7 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 ) -> None:
     """Reads come at any times, and the board's clock has any rate.
 
-    The estimated delays are finite, and no report seems to be sent before the one before it.
+    The estimated delays are finite, and the estimated sending times never decrease.
     """
     board, now, counts, taken_s = BoardTime(), 10.0, 0, 0.0
     for seconds, passed in reads * 3:
@@ -112,8 +112,8 @@ def test_whatever_the_reads_are_a_delay_is_finite_and_no_group_is_older(
 def test_a_clock_that_leaps_deviates_from_the_last_groups(leap_s: float) -> None:
     """All reads are in time. Then the board's clock jumps by 0.05 s or 0.2 s, ahead or back.
 
-    The delay of the next tick report differs by as much, and is irregular. Without the jump, it is
-    not irregular.
+    The delay that is estimated for the next tick report changes by as much, and is irregular.
+    Without the jump, it is not irregular.
     """
     board, now = settled_on_time(), 0.2 * 60
     usual_s, certain = board.deviation_s(nanoseconds(now), "ns", now)

@@ -109,9 +109,9 @@ def test_after_a_restart_the_clock_shows_the_time_since_then() -> None:
 
 
 def test_a_clock_in_ns_near_zero_shows_nothing() -> None:
-    """A clock in ns wraps every 4.3 s, so a low clock and fewer ticks may be a restart or not.
+    """A clock in ns wraps every 4.3 s. A low clock and lower counts may show a restart or a wrap.
 
-    The reports then have the time of the read.
+    It is unknown which of the two happened, so the reports have the time of the read.
     """
     late_reads = listening("ns")
     found = read(late_reads, 4.0, Ticks(2000, 50, 50), Ticks(100, 3, 3), Ticks(300, 4, 4))
@@ -286,8 +286,8 @@ def test_a_full_buffer_leaves_an_error_that_the_covariance_describes(
 ) -> None:
     """The kernel's buffer could not hold all reports, so the last ones are lost.
 
-    The next counts show the distance and the turn since then, but not the curve. The covariance
-    includes this error.
+    The next counts show how far the robot drove and turned since then, but not its path. The
+    covariance includes this error.
     """
     bench = Bench(firmware)
     error_m, stddev_m = stalled_drive(bench, stall_s, twist)

@@ -18,7 +18,7 @@ TRACK_M = 0.47
 
 
 class Told:
-    """An odometry of a robot with two set-points, and the reports of its board.
+    """The odometry of a robot with constant set-points. The test invents the board's reports.
 
     ``rpm``: set-points of the left and the right wheel in RPM.
     """
@@ -74,9 +74,9 @@ def test_lost_reports_hardly_raise_the_uncertainty_of_a_steady_drive(gap_s: floa
 
 
 def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
-    """The line is interrupted in both directions, and the user stops the robot meanwhile.
+    """The line is interrupted in both directions. Meanwhile, the user commands a stop.
 
-    The robot drives on. The covariance includes the distance.
+    The stop does not arrive, so the robot drives on. The covariance includes the distance.
     """
     rig = Rig(nominal("firmware"), HOST_GAINS)
     rig.run(4.0)
@@ -89,9 +89,10 @@ def test_a_set_point_that_changed_in_a_silence_may_not_have_arrived() -> None:
 
 
 def test_the_covariance_includes_that_a_wheel_may_be_at_rest_behind_lost_reports() -> None:
-    """Most reports are lost. The few others show one speed of the right wheel, which may rest.
+    """Most reports are lost. In the others, the speed of the right wheel is always the same.
 
-    The standard deviation of the heading is at least half of the error if the wheel rests.
+    So this wheel may be at rest. If it is, the heading is wrong. The standard deviation of the
+    heading is at least half of this error.
     """
     told = Told((-10, -11))
     for rpm in ((-10, -11), (-10, -11), (-10, -11), (-11, -12)):

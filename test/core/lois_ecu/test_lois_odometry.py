@@ -131,7 +131,7 @@ def test_the_wheels_turn_as_far_as_the_robot_drives(firmware: Firmware) -> None:
 def test_a_board_that_begins_anew_does_not_move_the_robot() -> None:
     """A restart sets the board's counters to zero and stops the robot.
 
-    The pose moves less than 5 cm, which is the distance of the stop.
+    The pose moves less than 5 cm, which is the braking distance.
     """
     odometry = LoisOdometry(LoisEcuSettings())
     odometry.wrote(SetRpm(20, 20), 0.0)

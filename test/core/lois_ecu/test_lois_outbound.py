@@ -105,7 +105,7 @@ def test_a_lost_run_of_just_a_line_may_join_two_set_points() -> None:
 def test_a_lost_run_of_just_a_line_may_join_an_led_line_only_to_a_motion_before_it(
     with_sum: bool,
 ) -> None:
-    """A motion line and the line of the LED lose together as many characters as a line has.
+    """A motion line and the LED's line together lose as many characters as one line has.
 
     If the motion line comes first, the remaining characters may be a wrong motion line. To prevent
     this, the driver sends the LED's line at least 15 ms after a motion line. If the LED's line

@@ -101,7 +101,7 @@ def test_wheels_that_roll_back_are_no_restart(
 @RESOLUTIONS
 @pytest.mark.parametrize("unit", ["ms", "ns"])
 def test_signed_counts_are_followed_out_and_back(per_turn: int, unit: ClockUnit) -> None:
-    """The robot drives at 50 RPM for 6 s, and farther back. No restart is assumed.
+    """The robot drives forward at 50 RPM for 6 s, then backward for longer. No restart is assumed.
 
     The distance is right within two ticks or 0.03 m. Then the board restarts, so its counts begin
     at zero. The driver notices this restart.
@@ -140,7 +140,10 @@ def test_a_reset_is_proved_while_the_wheels_roll_out(per_turn: int) -> None:
 def test_a_wheel_that_rolls_back_proves_no_reset(
     per_turn: int, before_turns: float, after_turns: float
 ) -> None:
-    """A wheel rolls from a count of up to a turn to a count near zero. This proves no reset."""
+    """A wheel has rolled by at most one turn. It rolls back until its count is near zero.
+
+    This does not prove a reset.
+    """
     before, after = math.floor(before_turns * per_turn), math.floor(after_turns * per_turn)
     proof = ResetProof(Ticks(1000, before, before), per_turn, steady=False)
     assert not proof.look(Ticks(1200, after, after), 1.2)

@@ -3,7 +3,7 @@
 """Drives of a simulated LOIS robot with few or many encoder ticks per turn.
 
 A simulated board measures the speeds of wheels with up to about 1000 ticks per turn. With more
-ticks, this file drives by duties. The public firmware loses ticks if they are frequent.
+ticks, the tests command duties. The public firmware loses ticks if they are frequent.
 """
 
 import math

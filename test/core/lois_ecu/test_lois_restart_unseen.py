@@ -119,8 +119,8 @@ def test_a_restart_that_the_clock_cannot_show_is_in_the_covariance() -> None:
 def test_wheels_that_roll_back_while_the_clock_wraps_are_no_restart(late_s: float) -> None:
     """The robot drives forward and then back to where the counts are zero. The clock wraps then.
 
-    The ticks may also be late, so that the clock does not fit the last reports. The driver still
-    assumes no restart.
+    In one variant, a read is late as well, so that the clock does not fit the arrival times. The
+    driver still assumes no restart.
     """
     bench = Bench("documented")
     drive_s, back_s = 2.4, 2.6

@@ -91,10 +91,10 @@ def test_another_speed_ends_the_rest() -> None:
 
 
 def test_a_fall_that_was_not_told_is_seen() -> None:
-    """Both wheels have the same speed, which the board cannot report. The driver estimates 28 RPM.
+    """Both wheels have the same speed. The board's reports then do not show how high it is.
 
-    Then the board reports 14 RPM several times. Compared with the estimate, the speed has fallen,
-    so the wheel is at rest.
+    The driver estimates 28 RPM. Then the board reports 14 RPM several times. Compared with the
+    estimate, the speed has fallen, so the wheel is at rest.
     """
     wheel = told(12)
     for rpm in (30.0, 28.0):

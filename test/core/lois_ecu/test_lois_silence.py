@@ -61,7 +61,7 @@ def test_what_the_wheels_did_in_a_silence_is_known_or_in_the_covariance(
 def test_ticks_that_went_on_counting_tell_the_way_of_a_silence(
     firmware: str, seconds: float
 ) -> None:
-    """The connection is lost while the robot drives forward. The ticks still count.
+    """The connection is lost while the robot drives forward. The board continues to count ticks.
 
     So the odometry afterwards is right within a tenth of the distance.
     """

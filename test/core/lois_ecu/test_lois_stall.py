@@ -197,13 +197,13 @@ def test_what_is_to_stand_and_what_is_driven_by_duty_is_not_watched() -> None:
 def test_a_wheel_that_rolls_fast_at_one_speed_is_started_anew_and_has_rolled(
     right_rpm: int,
 ) -> None:
-    """A wheel keeps its speed while the other wheel's speed varies, so it may be at rest.
+    """A wheel's reported speed stays the same while that of the other wheel varies.
 
-    Its speed is so high that it may also still roll. The driver sends RPM 0/0 to start the wheel
-    anew, and the odometry keeps the distance that the wheel has rolled.
+    So the wheel may be at rest. But its speed is high, so it may also still roll. The driver sends
+    RPM 0/0 to start the wheel anew, and the odometry keeps the distance that the wheel has rolled.
 
-    ``right_rpm``: reported speed of the wheel, near its set-point of −31 RPM, or far above it if a
-    saturated controller keeps full power.
+    ``right_rpm``: reported speed of the wheel. Its set-point is −31 RPM. A speed of −68 RPM is that
+    of a wheel whose saturated controller keeps full power.
     """
     driver, targets, turned_rad, ways_m = LoisConversation(LoisEcuSettings()), (-34, -31), 0.0, []
     rates, cleared = [rpm * math.tau / 60 for rpm in targets], False

@@ -258,16 +258,16 @@ def test_each_reason_for_a_refusal_appears_exactly_while_it_is_true(firmware: st
         told_after.add(refusal(bench))
         bench.run(0.05)
     assert told_after == {
-        "the board has not left its terminal mode yet; wait until its data arrives"
+        "the board has not left its terminal mode yet; wait until its reports arrive"
     }
     assert refusal(bench) == ""
 
 
 def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
-    """The robot is at rest, but the driver still writes its settings, and then the mode.
+    """The robot is at rest, but the driver first writes its settings, and the mode after them.
 
-    Later the board sends its own messages, so it is not in the mode any more. Both times, the
-    reason for a refusal is that the mode is changing.
+    Later, after the mode was written, the board sends messages of its normal mode, so it is not in
+    the terminal mode. Both times, the reason for a refusal is that the mode is changing.
     """
     change = ModeChange()
     change.want(TerminalMode.GPS)
@@ -285,7 +285,7 @@ def test_a_mode_that_is_not_written_yet_is_still_changing() -> None:
 def test_a_terminal_mode_that_is_taken_back_refuses_no_motion() -> None:
     """The user sets a terminal mode, and then host again while the robot is being stopped.
 
-    The board stays in its normal mode, so motion is allowed. The earlier command is not continued.
+    The board stays in its normal mode, so motion is allowed. The earlier motion is not continued.
     """
     bench = Bench("documented")
     bench.drive_on(0.3, 1.0)

@@ -49,7 +49,7 @@ class Outcome(NamedTuple):
 
 
 def drive(faults: NetworkFaults, seed: int) -> Outcome:
-    """Make a random drive with goals, e-stops and stalls of the driver, which then shuts down."""
+    """Make a random drive with goals, e-stops and stalls of the driver. Then end the driver."""
     random = Random(seed)
     bench = MartBench(FIRMWARES[seed % 3], faults=faults, seed=seed).ready()
     longest_s = 0.0

@@ -44,7 +44,7 @@ class Driver(NamedTuple):
     ``counted``: whether the encoder was read after the last stop, at a time when no late command
     could do harm.
 
-    ``greeted``: whether the driver has stopped the server once.
+    ``greeted``: whether a stop of the driver was confirmed at least once.
 
     ``underway``: whether the motors may be under direct control (MCS), as far as the driver knows.
     """
@@ -152,7 +152,7 @@ def steps(world: World, allowed: Allowed) -> Iterator[Step]:
 def _ends(world: World) -> Iterator[Step]:
     """Yield the ways in which a controlled move ends.
 
-    If a copy of a move has arrived during this move, the copy may begin at its end.
+    If a copy of a move has arrived during this move, the server may execute the copy afterwards.
     """
     what = f"{world.server.motion.value} ends"
     over = Server(imu=world.server.imu)
@@ -201,7 +201,7 @@ def _waits(world: World) -> Iterator[Step]:
 
 
 def sweeps_first(driver: Driver) -> bool:
-    """Return whether the driver has used the stop port without ever having stopped the server.
+    """Return whether the driver used the stop port and none of its stops was ever confirmed.
 
     In that case, it must first find out which motion is in progress.
     """

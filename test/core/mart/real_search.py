@@ -49,8 +49,8 @@ not counted.
 PROOF_S: Final = 0.25
 """Longest allowed time in s from the failure of the IMU to the start of a motion.
 
-In this time, the check before the motion may have been made while the IMU still worked. A later
-motion is a fault of the driver.
+A motion that starts within this time may follow a check that was made while the IMU still worked. A
+later motion is a fault of the driver.
 """
 STARTS: Final = (b"RM", b"B", b"R", b"L", b"TF", b"TB")
 """Commands with which the server starts the motors without checking the IMU."""
@@ -190,7 +190,7 @@ def each_fate(wishes: tuple[str, ...]) -> Iterator[Trial]:
 
     There is one trial for each of the four faults of each datagram, in both directions. Of all
     datagrams in one direction, only the first MOST_DATAGRAMS times the number of wishes are
-    disturbed. A run without faults counts the datagrams.
+    disturbed. A run without faults first shows how many datagrams there are.
     """
     for way, number in enumerate(ran(Trial(wishes)).numbers):
         most = min(number + 1, MOST_DATAGRAMS * len(wishes))

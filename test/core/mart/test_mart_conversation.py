@@ -67,7 +67,7 @@ def conversation() -> Conversation:
 
 
 def test_a_reply_answers_the_pending_request() -> None:
-    """An answer has the command of the pending request, and the time that the reply took."""
+    """A reply answers the pending request. The answer also has the time that the reply took."""
     talk = conversation()
     assert talk.ask(words.ENC.request(), 1.0) == ((0, b"ENC"),)
     answer = talk.hear(parse(b"ok 123"), 1.01)
@@ -116,8 +116,8 @@ def test_no_late_ok_proves_the_imu() -> None:
 def test_the_quick_proof_of_the_imu_waits_until_no_late_ok_can_be_taken_for_it() -> None:
     """The ok to another command may come late, and could be taken for the ok to RST IMU.
 
-    So the driver delays RST IMU, the check of the IMU, until no such ok can arrive as late as the
-    reply to this check.
+    So the driver delays RST IMU, the check of the IMU: such a late ok must arrive before the
+    earliest possible reply to the check.
     """
     talk = conversation()
     talk.ask(words.CS.request(1, 1), 1.0)
@@ -156,7 +156,7 @@ def test_after_a_lost_reply_another_query_of_its_form_waits() -> None:
 def test_every_motion_is_stopped_by_its_own_word() -> None:
     """Each motion has its own stop command, which the driver uses first.
 
-    Only for controlled moves is this a command on the stop port.
+    The stop command of a controlled move goes to the stop port, those of other motions do not.
     """
     texts = {motion: [word.text for word in said] for motion, said in HALTS.items()}
     assert texts == {
@@ -311,9 +311,9 @@ def test_a_turn_that_was_told_by_another_number_is_told_by_the_wheel() -> None:
 
 
 def test_a_first_heading_of_rm_that_is_the_last_one_before_is_not_of_it() -> None:
-    """A forward drive (RM) sets the heading to zero, but its first heading still has the old value.
+    """A forward drive (RM) sets the heading to zero, but the first reply still has the old heading.
 
-    This heading is a late reply, so it is not used.
+    This reply is late, so its heading is not used.
     """
     odometry = MartOdometry(MartSettings())
     odometry.turned(-50.0, at(0.5))

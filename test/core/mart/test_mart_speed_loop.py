@@ -40,8 +40,9 @@ def test_a_motor_that_is_faster_than_expected_does_not_seem_slower_afterwards(
 ) -> None:
     """A motor turns from the first unit on, but its speed at 26 units is measured too low.
 
-    A straight line through these speeds would show motion at zero units, which is impossible. The
-    measured speed at 14 units is then higher than expected. It must not lower the expected speed.
+    A straight line through the measured speeds would show motion at zero units, which is
+    impossible. So the line of the driver shows too low a speed at 14 units. Then a higher speed is
+    measured there. This measurement must not lower the line.
     """
     line = MotorLine()
     for _ in range(8):

@@ -280,7 +280,7 @@ def test_a_turn_on_the_spot_whose_rate_falls_slowly_is_not_begun_anew_at_each_st
 def test_a_scale_that_is_changed_while_the_robot_is_at_rest_leaves_its_speed_as_it_was(
     change: dict[str, float],
 ) -> None:
-    """The user changes a scale at rest.
+    """The robot is at rest, and the user changes ``metres_per_count`` or another scale.
 
     The driver converts what it has learned about the motors, so the next drive has the right speed.
     """

@@ -24,8 +24,8 @@ flips = st.sampled_from([IMU, DELTA, POSE]).flatmap(
         st.just(kind), st.integers(0, PAYLOADS[kind] - 1), st.integers(0, 7), st.integers(0, 40)
     )
 )
-"""The bit to change: kind of frame, byte of its payload, and bit of that byte. Last, the number of
-ticks to drive before the change."""
+"""The bit to change: kind of frame, byte of its payload, and bit of that byte. The last number is
+how many ticks to drive before the change."""
 
 
 class Drive:

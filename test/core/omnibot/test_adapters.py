@@ -1,9 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests that an IMU frame is returned as soon as the packet arrives that completes it.
+"""Tests that an IMU frame is returned as soon as the packet with its last byte arrives.
 
-The tests use adapters that send in different packets. If an IMU frame ends like a header, the
-arrival times show whether another frame is due.
+The tests use adapters that split the bytes into packets in different ways. If an IMU frame ends
+like a header, the arrival times show whether another frame is due.
 """
 
 from collections.abc import Callable, Iterator

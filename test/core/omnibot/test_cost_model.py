@@ -33,7 +33,7 @@ def after_a_cycle(turns: list[int], seqs: list[int]) -> Context:
 def test_a_pose_is_held_against_the_turns_of_the_deltas_before_it(
     theta_mrad: float, contradicts: bool
 ) -> None:
-    """Five deltas turn by 5 mrad in all. The heading of the next pose differs from the sum.
+    """Five deltas after a pose turn by 5 mrad in all. The next pose shows a different turn.
 
     A difference that rounding explains has no cost. A larger difference has a cost.
     """

@@ -175,7 +175,7 @@ def work(
 def test_work_is_linear_and_memory_bounded(
     monkeypatch: pytest.MonkeyPatch, name: str, chunk_length: int, pause_s: float
 ) -> None:
-    """A pattern of bytes that is hard to decode is repeated. The work grows only in proportion.
+    """A pattern of bytes that is hard to decode is repeated. The work grows only linearly.
 
     So the last third of the stream costs about as much work as the second third. The decoder holds
     fewer bytes than its limit.

@@ -131,7 +131,7 @@ def test_a_delta_is_possible_up_to_10_m_per_s(period_s: float) -> None:
 def test_deltas_that_are_all_rounded_alike_do_not_contradict_the_pose(period_s: float) -> None:
     """Each delta is rounded by up to 0.05 mrad in the same direction, so the errors add up.
 
-    The next pose differs from the deltas by this sum, which has no cost. A difference of more than
+    The next pose may differ from the deltas by this sum, without a cost. A difference of more than
     twice this sum has a cost.
     """
     schedule = Schedule(period_s)

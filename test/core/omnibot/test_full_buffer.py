@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of a reader that is late until the kernel's buffer is full, so that the rest is lost."""
+"""Tests of a reader that is so late that the kernel's buffer fills up, and later bytes are lost."""
 
 import math
 

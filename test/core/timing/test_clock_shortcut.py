@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of the clock's shortcut for ticks that arrive when due. The shortcut changes no stamp."""
+"""Tests of the clock's shortcut for ticks that arrive on time. The shortcut changes no stamp."""
 
 import random
 

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Stamps are compared with the true sampling times of a generated line, in simulated time."""
+"""Tests that compare stamps with the true sampling times of simulated data, in simulated time."""
 
 import math
 import random
@@ -129,7 +129,7 @@ def test_an_adapter_whose_timer_beats_against_the_tick_is_seen_through(
 ) -> None:
     """An adapter sends every 16 ms, while the board's tick is 10 ms. The stamps are right.
 
-    The arrival times alone may hide a delay of 0.8 ms for seconds.
+    From the arrival times alone, a delay of 0.8 ms could remain hidden for seconds.
     """
     stamped = run(Board(seconds=90, skew=skew, imu_only=imu_only), ftdi(), 0)
     assert stamped.unevenness() < 0.2e-3
@@ -226,9 +226,9 @@ def test_a_stall_that_ends_with_one_sample_at_a_time_loses_none() -> None:
 
 @pytest.mark.parametrize("skew", [*SKEWS, 0.0])
 def test_the_skew_of_the_boards_crystal_is_told_in_ppm(skew: float) -> None:
-    """The skew is in ppm.
+    """The skew of the board's crystal is reported in ppm.
 
-    It is positive if the board's crystal is fast, which makes ticks shorter.
+    It is positive if the crystal is fast, which makes ticks shorter.
     """
     clock = DeviceClock(0.01)
     for tick in range(1000):
@@ -255,7 +255,7 @@ def test_a_restarted_board_is_followed_within_two_seconds(skew: float) -> None:
 
 @pytest.mark.parametrize("period_s", [0.01, 0.2])
 def test_bytes_that_are_no_sample_do_not_begin_the_clock(period_s: float) -> None:
-    """A damaged text arrives a second before the first frames, and tells nothing of their time.
+    """A damaged text arrives a second before the first frames, and does not start the clock.
 
     The stamps of the first frames are right, also if the host reads only five times a second.
     """
@@ -295,7 +295,7 @@ def test_a_displacement_has_the_stamp_of_its_own_tick() -> None:
 
 
 def test_what_seems_to_begin_the_count_anew_tells_nothing_of_the_ticks() -> None:
-    """Between two true displacements comes a false one, whose count looks like a restart.
+    """A false displacement arrives between two true ones. Its count looks like a board's restart.
 
     The stamps of the samples stay 10 ms apart.
     """

@@ -47,7 +47,7 @@ class Ticker:
 
 
 def all_of(port: int) -> Iterator[bytes]:
-    """Yield all bytes that a terminal holds, in pieces. One read may not return all of them."""
+    """Yield all bytes that a terminal holds, in pieces. One read may return only some of them."""
     with suppress(BlockingIOError):
         while data := os.read(port, 8192):
             yield data

@@ -74,7 +74,7 @@ def test_or_each_terminal_gets_its_own_link(tmp_path: Path) -> None:
 
 
 def test_links_that_do_not_fit_are_refused_and_nothing_stays_open(tmp_path: Path) -> None:
-    """The program refuses too many links, a link named like a file, and one to a UDP port."""
+    """The program refuses too many links, a link with the name of a file, and one to a UDP port."""
     three = [tmp_path / name for name in "abc"]
     with pytest.raises(OSError, match=r"3 links do not fit a board with 2 serial ports"):
         open_carriers(ToyLines.channels, three)

@@ -139,7 +139,8 @@ def test_what_is_sent_while_a_half_boots_is_lost() -> None:
 def test_a_half_is_lost_alone_and_comes_back(half: str, what: str) -> None:
     """One half is silent, hung or unplugged for a time.
 
-    The other half sends as usual, and the robot drives on. Only a silent half obeys commands.
+    The other half sends as usual, and the robot drives on. A silent half still obeys commands. A
+    hung or unplugged half does not.
     """
     rig = Rig().booted()
     rig.drive("rc 2 0.3 0", 1.0)

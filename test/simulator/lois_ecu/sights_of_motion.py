@@ -46,7 +46,7 @@ def odometry_stands_at_equal_speeds(quirks: Quirks) -> bool:
 def velocity_may_be_nan(quirks: Quirks) -> bool:
     """Return whether some velocities that are reported in a straight drive are not finite.
 
-    Both wheels start at once with the same duty, so many of their ticks come at the same time.
+    Both wheels start together with the same duty. Many of their ticks therefore coincide.
     """
     rig = Rig(quirks).booted()
     rig.say(SetPeriod(Stream.TICKS, 60), SetDuty(60, 60))

@@ -275,7 +275,10 @@ def lenient_hex(quirks: Quirks) -> bool:
 
 
 def slow_boot(quirks: Quirks) -> bool:
-    """Return whether the board is silent for 2 s after power-up, and reads its input only then."""
+    """Return whether the board, in the first 2 s after power-up, sends nothing and obeys nothing.
+
+    A command that it receives in this time is obeyed afterwards.
+    """
     rig = Rig(quirks)
     rig.board.receive(encode_command(SetDuty(0, 0)))
     early = rig.run(1.9)

@@ -39,10 +39,10 @@ BOTH = pytest.mark.parametrize("quirks", [DOCUMENTED, FIRMWARE], ids=["documente
 
 @BOTH
 def test_it_sends_what_the_manual_lists_by_itself(quirks: Quirks) -> None:
-    """Without a request, the board sends all periodic messages but the date, undamaged.
+    """Without a request, the board sends all periodic messages except the date.
 
-    Their periods are about 400 ms, 1 s and 1.2 s. The public firmware also appends the odometry to
-    the ticks.
+    All of them arrive undamaged. Their periods are about 400 ms, 1 s and 1.2 s. The public firmware
+    also appends the odometry to the ticks.
     """
     rig = Rig(quirks)
     heard = rig.run(22.0)
@@ -105,7 +105,10 @@ def test_both_kinds_of_zero_stop_it_in_each_mode(quirks: Quirks) -> None:
 
 @pytest.mark.parametrize("correction", [math.nan, math.inf, 1e30])
 def test_a_correction_beyond_all_numbers_ends_no_board(correction: float) -> None:
-    """An impossible correction is written. The wheels turn, and the board continues to send."""
+    """A wheel's correction of its tick times is NaN, infinite or very large.
+
+    The wheels turn, and the board continues to send.
+    """
     rig = Rig(DOCUMENTED).booted()
     rig.board.wheels[0].short_correction = correction
     rig.say(SetDuty(45, 45))

@@ -31,7 +31,7 @@ def download(rig: Rig, text: str) -> tuple[str, int, list[bytes]]:
 def test_a_file_comes_in_datagrams_of_512_bytes(
     start: str, end: str | None, text: str, name: str
 ) -> None:
-    """After a motion, its file is downloaded: first name and size, then blocks of 512 bytes."""
+    """The file of a motion is downloaded: its name and size first, then blocks of 512 bytes."""
     rig = Rig()
     answer = rig.ask(start)
     assert answer is not None

@@ -97,7 +97,10 @@ def test_a_robot_that_stands_costs_nothing_as_time_passes() -> None:
 
 
 def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
-    """A bad network loses, doubles and reorders datagrams in both directions, by its seed."""
+    """A bad network loses, doubles and reorders datagrams in both directions.
+
+    The seed determines which datagrams.
+    """
 
     def talk(seed: int) -> tuple[list[bytes], list[bytes]]:
         faults = NetworkFaults(lose=0.2, duplicate=0.2, delay_s=0.3)
@@ -122,7 +125,7 @@ def test_a_bad_network_loses_doubles_and_reorders_by_its_seed() -> None:
 
 
 def test_options_choose_the_robot_and_its_faults() -> None:
-    """The options of a sim:// URL, the same as those of the command line, reach the controller."""
+    """A sim:// URL has the same options as the command line. They reach the controller."""
     board, lines = options.from_url(
         "sim://?firmware=documented&volts=21.5&imu-dies=3&stuck=left&speed-per-unit=0.01"
         "&metres-per-count=0.001&motor-inequality=0.05&front=2&rear=1&dock=4&encoder-inverted"

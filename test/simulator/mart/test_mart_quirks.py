@@ -25,9 +25,10 @@ IN_SOURCE_ALONE = (
 
 
 def stop_port_keeps_motion(quirks: Quirks) -> bool:
-    """Return whether a motion stays in progress for the server after a stop on the stop port (SL).
+    """Return whether the server regards a motion as in progress after a stop by SL.
 
-    The server then refuses motions, and the usual stop (SM) hangs the command port.
+    SL comes on the stop port. The server then refuses motions, and the usual stop (SM) hangs the
+    command port.
     """
     rig = Rig(quirks)
     rig.drive("F")
@@ -98,7 +99,7 @@ def reference_speed_wraps(quirks: Quirks) -> bool:
 
 
 def reference_start_counts_on(quirks: Quirks) -> bool:
-    """Return whether a forward drive (RM) fails at once after a stop that took 0.57 s.
+    """Return whether a forward drive (RM) fails if it directly follows a stop that took 0.57 s.
 
     If it fails, a second RM must succeed.
     """

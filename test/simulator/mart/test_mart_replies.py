@@ -133,7 +133,7 @@ def test_cs_with_one_number_does_no_harm_while_still() -> None:
 
 
 def test_an_empty_datagram_ends_the_server() -> None:
-    """An empty datagram ends the server on the command port, but not on the stop port."""
+    """An empty datagram to the command port ends the server. One to the stop port does not."""
     rig = Rig()
     rig.stop("")
     assert rig.ask("HELLO") == "ok BBB"

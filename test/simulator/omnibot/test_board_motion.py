@@ -31,9 +31,9 @@ from omnibot_driver.simulator.omnibot import (
     ],
 )
 def test_a_commanded_velocity_is_reached(command: bytes, twist: tuple[float, float, float]) -> None:
-    """A velocity is commanded: 70 LSB are 1 m/s, and 500 LSB are 1 rad/s.
+    """The robot reaches the commanded velocity within 2 s.
 
-    After 2 s it is reached.
+    In a command, 70 LSB are 1 m/s, and 500 LSB are 1 rad/s.
     """
     board = SimulatedBoard(RUNNING)
     board.receive(command)
@@ -162,7 +162,7 @@ def test_on_the_way_to_a_pose_the_robot_keeps_to_a_walk() -> None:
 
 
 def test_zeros_in_mode_one_are_a_drive_to_the_origin_and_stop_is_a_stop() -> None:
-    """With the switch on "position", zeros in mode 1 command the origin.
+    """With the switch on "position", a frame of mode 1 with only zeros commands the origin.
 
     For this reason the stop frame has mode 2.
     """

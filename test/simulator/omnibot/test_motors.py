@@ -55,7 +55,7 @@ def test_a_stopped_wheel_comes_to_rest_and_stays(target: float) -> None:
 def test_saturation_does_not_wind_up_the_integrator() -> None:
     """A speed that the motor cannot reach is commanded for 10 s or for 1 s.
 
-    A slow speed is then reached equally soon.
+    Afterwards, a slow speed is reached equally soon in both cases.
     """
     long, short = Wheel(), Wheel()
     long.hold(300.0, 1000)

@@ -1,6 +1,9 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of errors of the simulated robot, such as a reversed axis, for tests of calibrations."""
+"""Tests of errors that the simulated robot can have, such as a reversed axis.
+
+The tests of calibrations use these errors.
+"""
 
 import struct
 from math import pi, radians
@@ -23,7 +26,7 @@ WHEEL_B = bytes.fromhex("FF FE 02 00 00 00 08 00 00")
 
 
 def driven(command: bytes, seconds: float = 1.0, **settings: object) -> SimulatedBoard:
-    """Return a running board that received ``command`` ``seconds`` ago."""
+    """Return a running board, ``seconds`` after it has received ``command``."""
     board = SimulatedBoard(BoardSettings(running=True, **settings))  # type: ignore[arg-type]
     board.receive(command)
     for _ in range(round(seconds * 100)):
@@ -105,7 +108,7 @@ def test_a_robot_that_is_held_feels_gravity_by_its_mounting(
     held: dict[str, float],
     expected: tuple[float, float, float],
 ) -> None:
-    """The robot is held at an angle. The accelerometer shows this angle and its own mounting.
+    """The robot is held at an angle. This angle and the mounting turn the measured gravity.
 
     REP-103: pitch is negative if the front is up, and roll is positive if the left is up.
     """

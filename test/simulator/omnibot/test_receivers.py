@@ -80,7 +80,7 @@ def test_frames_back_to_back_are_all_understood(typed: list[str], kind: Receiver
 def test_no_bytes_disturb_a_receiver_for_longer_than_a_frame(
     noise: bytes, awake: bool, control_frames: bool, kind: ReceiverKind
 ) -> None:
-    """After any bytes come eight zeros and a letter. Every receiver understands the letter."""
+    """Any bytes arrive, then eight zeros and a letter. Every receiver understands the letter."""
     data = (noise + bytes(8)).hex() + "53"
     commands = understood(data, kind=kind, awake=awake, control_frames=control_frames)
     assert commands[-1] is START
@@ -199,7 +199,7 @@ def test_a_window_finds_a_header_within_a_frame() -> None:
 
 
 def test_a_frame_without_its_header_acts_by_its_letters() -> None:
-    """A frame has lost its FF or FE. A 52 in its payload acts as the letter R."""
+    """A frame has lost its FF or FE. The byte 0x52 in its payload acts as the letter R."""
     for kind in (COUNTING, IDLE_GAP, WINDOW):
         assert understood("FE 01 00 52 00 00 00 00", kind=kind) == [RESET]
         assert understood("FF 01 00 52 00 00 00 00", kind=kind) == [RESET]

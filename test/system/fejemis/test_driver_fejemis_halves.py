@@ -101,7 +101,7 @@ def test_a_broken_angle_sensor_stops_the_robot(
 def test_swapped_ports_are_found_out(
     stack: ExitStack, tmp_path: Path, start_driver: Start, probe_of: Start
 ) -> None:
-    """The two ports are swapped. The driver finds this by the ids in the heartbeats.
+    """The two ports are swapped. The driver notices this by the ids in the heartbeats.
 
     The robot drives as usual.
     """

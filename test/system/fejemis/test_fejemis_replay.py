@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Test that a replay of the bytes from both Teensys publishes the same odometry."""
+"""Test that a replay of the bytes from both Teensys ends at the same pose as the recorded drive."""
 
 import signal
 from contextlib import ExitStack

@@ -89,7 +89,7 @@ class TwoPorts(InBatches[SimulatedFejemis]):
     def stands_for_good(self) -> None:
         """Wait until both driving wheels have been at rest for 0.8 s.
 
-        A command expires in a shorter time.
+        By default, ``cmd_vel_timeout`` is shorter, so earlier commands have then expired.
         """
         since: list[int] = []
 
