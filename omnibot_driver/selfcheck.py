@@ -103,9 +103,10 @@ def _is_for(node: str, file: str) -> bool:
 
 
 def _sections(content: Any, above: str = "") -> Iterator[str]:
-    """Yield a pattern of the full names of nodes for each section of a parameter file.
+    """Yield, for each section of a parameter file, a pattern of the nodes that it applies to.
 
-    In a name, ``*`` stands for one part of the name, and ``**`` for any number of parts.
+    The pattern matches full names of nodes. In the file, ``*`` stands for one part of a name, and
+    ``**`` for any number of parts.
     """
     for name, below in content.items() if isinstance(content, dict) else ():
         if name == "ros__parameters":

@@ -138,7 +138,7 @@ class _Sender:
         self._offsets = [_Offset(difference_s, at_s) for difference_s in differences_s]
 
     def may_send(self, number: int | None) -> bool:
-        """Return whether message ``number`` may be from this sender, whose numbers increase."""
+        """Return whether this sender can have sent message ``number``: its numbers increase."""
         return number is None or self.number is None or self.number < number
 
     def improbability(self, differences_s: Differences, at_s: float) -> float:

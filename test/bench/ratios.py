@@ -12,7 +12,9 @@ from statistics import median, quantiles
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """The results of one measurement, made several times: each time for the driver, then the floor.
+    """The results of a measurement that was made several times.
+
+    Each time, the driver was measured first, then the floor: the least that any driver would need.
 
     ``ours``, ``floor``: the values of driver and floor, in pairs.
 

@@ -174,7 +174,7 @@ class Rig:
 
     @property
     def terminal_lock(self) -> Any:
-        """The lock to hold while the board is changed."""
+        """The lock that a test must hold while it changes the state of the simulated board."""
         return self._terminal.lock
 
     def _make_terminal(self) -> Any:

@@ -92,9 +92,9 @@ def drive_line(speed_mps: float, turn_radps: float) -> bytes:
 
 
 def _best(signs: tuple[str, str], found: list[Candidate]) -> bytes:
-    """Return the cheapest line in which the checksum detects damage.
+    """Return the cheapest line whose checksum would reveal damage on the way to the board.
 
-    If there is none, return the cheapest line.
+    If the checksum of none would, return the cheapest line.
 
     ``signs``: the signs of speed and turn rate, as text.
     """

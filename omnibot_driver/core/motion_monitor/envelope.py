@@ -2,8 +2,8 @@
 
 """The envelope: the velocities that a robot may have under its recent set-points.
 
-It is the convex hull of recent set-points and rest, with a margin. docs/internals/motion_monitor.md
-gives the reasons.
+It is the convex hull of the recent set-points and the velocity zero, with a margin.
+docs/internals/motion_monitor.md gives the reasons.
 
 This module knows velocities in the board's own axes; it does not know times.
 """

@@ -50,9 +50,9 @@ class CorrectionSmoother:
         self._room_rad += room_rad - abs(chord.yaw_rad)
 
     def trail(self, chord: Pose, room_m: float, room_rad: float) -> None:
-        """Move ``target`` by a displacement, and ``pose`` by as much of it as the room allows.
+        """Move ``target`` by a displacement. Move ``pose`` likewise, but not farther than allowed.
 
-        ``room_m``, ``room_rad``: the most by which ``pose`` may move.
+        ``room_m``, ``room_rad``: largest distance and angle by which ``pose`` may move.
         """
         linear, angular = _part(chord.way_m, room_m), _part(abs(chord.yaw_rad), room_rad)
         behind = self.target.moved(chord)

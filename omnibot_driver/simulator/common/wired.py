@@ -27,8 +27,8 @@ def good_line(channel: Channel) -> Line:
 class WiredBoard(Generic[B]):
     """A board and one line for each of its channels, in order.
 
-    Without ``lines``, all lines are without faults. Raises ValueError if the lines do not match the
-    channels.
+    If ``lines`` is not given, every channel gets a line that has no faults. Raises ValueError if
+    the lines do not match the channels.
     """
 
     def __init__(self, board: B, lines: Sequence[Line] = ()) -> None:

@@ -41,12 +41,12 @@ class ServerState:
     """The state of the server, its robot and its surroundings.
 
     crashed: why the server ended; empty while it runs.
-    alarm: the kind of motion that is supervised.
+    alarm: the kind of motion whose progress the server supervises now; None if it supervises none.
     starting: the kind of motion whose command is not answered yet.
     custom: parameters that SLMP and SSP have set.
     sampling_since_s: time at which a motion began to use a sonar; -1 while no motion uses one.
-    front_m, rear_m, dock_m: distances from the start to the walls and to the dock. They may be
-        changed, and so may the chassis and the IMU.
+    front_m, rear_m, dock_m: distances from the start to the walls and to the dock. A test may
+        change them, the chassis and the IMU during a run.
     """
 
     def __init__(self, settings: MartSettings) -> None:

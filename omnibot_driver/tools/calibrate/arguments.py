@@ -219,7 +219,7 @@ def _step(parser: argparse.ArgumentParser) -> None:
         type=_positive,
         nargs=3,
         metavar=("K_FF", "K_VP", "K_VI"),
-        help="present gains in the firmware (default: the manual's 40 10 1.5)",
+        help="gains that the firmware uses now (default: the manual's 40 10 1.5)",
     )
     tuning = parser.add_argument_group("for boards whose gains are parameters")
     for name, default, words in (

@@ -111,10 +111,10 @@ def test_a_turn_with_a_stuck_motor_still_discards_the_goal(stuck: str) -> None:
 
 @pytest.mark.slow
 def test_an_obstacle_that_stops_a_heavy_robot_does_not_make_the_next_move_longer() -> None:
-    """An obstacle stops a move of a heavy robot. The server reports only that the stop was long.
+    """An obstacle ends a move of a heavy robot early. The server reports only a long way to stop.
 
-    The driver learns nothing from this short move. The reply to the next move shows the obstacle.
-    For a later goal, the driver requests the usual distance.
+    The driver learns nothing from this move, which was too short. The reply to the next move shows
+    the obstacle. For a later goal, the driver requests the usual distance.
     """
     bench = MartBench(front_m=0.9, motor_lag_s=0.3).ready()
     first_distance(bench, 2.0)

@@ -37,7 +37,7 @@ from omnibot_driver.simulator.lois_ecu import Quirks
 
 
 def with_sum(text: bytes) -> bytes:
-    """Return the text with its checksum, the XOR of its characters, and a line feed."""
+    """Return the text, its checksum and a line feed. The checksum is the XOR of all characters."""
     total = 0
     for character in text:
         total ^= character

@@ -1,6 +1,6 @@
 # Copyright OmniBot driver developers. SPDX-License-Identifier: Apache-2.0
 
-"""Tests of stops on the public server: which motion each one ends, and which one hangs it.
+"""Tests of stops on the public server: which motions each stop ends, and which hang the server.
 
 F, B and RM are drives, R and L are spins. SM and SRM are stops on the command port. SL and SS are
 stops on the stop port, which is never answered.
