@@ -27,7 +27,13 @@ from omnibot_driver.core.lois_ecu.messages import (
     TerminalLine,
     Ticks,
 )
-from omnibot_driver.core.lois_ecu.misconfiguration import OWN_GAINS, Suspicion, own_gains
+from omnibot_driver.core.lois_ecu.misconfiguration import (
+    OWN_GAINS,
+    TOO_FAST,
+    TOO_FAST_ADVICE,
+    Suspicion,
+    own_gains,
+)
 from omnibot_driver.core.lois_ecu.odometry import FusedOdometry
 from omnibot_driver.core.lois_ecu.readings import (
     LoisReading,
@@ -211,6 +217,8 @@ class LoisConversation:
     @property
     def advice(self) -> str | None:
         """Advice on settings that are missing or contradict the received data, or None."""
+        if self._decoder.ticks_gate.too_fast >= TOO_FAST:
+            return TOO_FAST_ADVICE
         if self.mode is Mode.NOMINAL and (gains := own_gains(self._settings)):
             return OWN_GAINS.format(gains)
         return self._suspicion.advice

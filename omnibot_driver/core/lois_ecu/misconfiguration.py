@@ -28,6 +28,12 @@ OWN_GAINS: Final = (
 )
 """Advice if the user has not set all gains; the braces are for the names of the missing ones. The
 numbers are from 150 forward drives with the compiled firmware."""
+TOO_FAST: Final = 5
+TOO_FAST_ADVICE: Final = (
+    "the tick counts change faster than a wheel can turn, so the driver rejects the tick reports,"
+    " and odom does not show the motion: check `ticks_per_revolution`"
+)
+"""Advice after ``TOO_FAST`` rejected tick reports in a row."""
 LOOK_AT: Final = 600
 """Number of bytes without a valid line before advice is given. The board sends at least 70 bytes
 per second."""

@@ -106,11 +106,15 @@ class TicksGate(Gate[Ticks]):
 
     The times in the reports show whether the board's clock counts ms or ns. Later reports must
     agree.
+
+    ``too_fast``: number of reports in a row that were rejected although their clock is plausible:
+    their counts show a speed that no wheel can have.
     """
 
     def __init__(self, ticks_per_revolution: int) -> None:
         super().__init__(self._follow)
         self.ticks_per_revolution = ticks_per_revolution
+        self.too_fast = 0
         self._fits: ClockUnit | None = None
         self._steps = 0
 
@@ -118,6 +122,10 @@ class TicksGate(Gate[Ticks]):
         """Return whether to accept the ticks. Store them, and infer the unit of the clock."""
         last = self._last
         passed = super().passes(group, now)
+        if passed:
+            self.too_fast = 0
+        elif last is not None and last[0].time_counts != group.time_counts:
+            self.too_fast += _unit_of(last[0], group, now - last[1]) is not None
         if passed and last is not None and now - last[1] > LEARNT_FROM_S:
             fits = _unit_of(last[0], group, now - last[1])
             self._steps = min(self._steps + 1, SURE_AFTER) if fits == self._fits else 0

@@ -71,17 +71,20 @@ def test_a_robot_with_such_encoders_drives_out_and_back(
     bench.run(4.0)
     assert restarts(bench) == 1
     assert place.way_to(bench.odometry[-1].pose).way_m < 0.1
+    assert not any("check `ticks_per_revolution`" in text for text in bench.notices)
 
 
 @pytest.mark.slow
 def test_a_new_resolution_applies_while_the_driver_runs() -> None:
     """The encoders have 1000 ticks per turn, but 60 is set, so fast counts are rejected.
 
-    The user sets 1000 during the connection. From then on, no report is rejected.
+    A notice names the parameter. The user sets 1000 during the connection. From then on, no report
+    is rejected.
     """
     bench = Bench("documented", LoisEcuSettings(ticks_per_revolution=60), steps=1000)
     bench.drive_on(0.65, 3.0)
     assert rejected(bench) > 5
+    assert sum("check `ticks_per_revolution`" in text for text in bench.notices) == 1
     bench.drive_on(0.0, 1.0)
     configure(bench, LoisEcuSettings(ticks_per_revolution=1000))
     bench.run(2.0)
