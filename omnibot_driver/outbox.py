@@ -77,9 +77,11 @@ class Outbox:
 
     def serve(self) -> None:
         """Make the calls that are handed over, until ``close``."""
-        while not self._closed:
+        closed = False
+        while not closed:
             self._handed_over.wait()
             self._handed_over.clear()
+            closed = self._closed  # read first, so that no call from before ``close`` is left
             self.deliver()
 
     def close(self) -> None:

@@ -148,6 +148,28 @@ def test_what_is_put_by_a_delivery_leaves_as_well() -> None:
     assert left == [1, 2]
 
 
+def test_a_call_that_is_put_just_before_the_end_leaves_as_well() -> None:
+    """The serving thread has made all calls. Then a last call is put, and the outbox is closed.
+
+    The serving thread makes this call before it ends.
+    """
+    left: list[str] = []
+
+    class Closing(Outbox):
+        def deliver(self) -> None:
+            super().deliver()
+            if not self._closed:
+                self.put(lambda: left.append("last"))
+                self.hand_over()
+                self.close()
+
+    outbox = Closing()
+    outbox.put(lambda: left.append("first"))
+    outbox.hand_over()
+    in_threads(outbox.serve)
+    assert left == ["first", "last"]
+
+
 def test_whoever_brings_more_than_can_be_told_waits() -> None:
     """The outbox is full, so a thread that calls ``deliver`` waits for the thread that delivers.
 
